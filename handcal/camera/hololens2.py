@@ -83,6 +83,7 @@ class HoloLens2Camera(Closable):
         self._view = PinholeView(self._calibration.rays)
         self.depth_intrinsics = self._view.intrinsics
         self._white = 0.0
+        self._keeps_wrapped = settings.keeps_wrapped
         request = self._stream.request(settings.divisor)
         self._newest = _Newest(Hl2ssConnection(settings.host, port, request), self._stream)
 
@@ -117,7 +118,7 @@ class HoloLens2Camera(Closable):
 
     def _without_wrapped(self, distance_m: Float32, brightness: Float32) -> Float32:
         alias_m = self._calibration.alias_m
-        if alias_m is None:
+        if alias_m is None or self._keeps_wrapped:
             return distance_m
         is_near = is_not_wrapped(distance_m, brightness, alias_m, self._white)
         return np.where(is_near, distance_m, np.float32(0.0))

@@ -46,6 +46,9 @@ class HoloLens2Settings:
     """Port of the stream; None for hl2ss's own."""
     divisor: int = 3
     """Every so many images of the camera are sent: AHAT makes 45 a second, too many for Wi-Fi."""
+    keeps_wrapped: bool = False
+    """Keep distances that may be of a surface one alias farther away. A depth check needs it: the
+    ink of its board is as dark as a far wall."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.divisor <= 255:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -193,7 +193,9 @@ def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
 
 
-def open_source(source: str, realsense: RealSenseSettings, seed: int = 1) -> Camera:
+def open_source(
+    source: str, realsense: RealSenseSettings, seed: int = 1, *, keeps_wrapped: bool = False
+) -> Camera:
     """Open the camera that an option names: of a kind, or the path of a recording."""
     from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
     from handcal.camera.realsense import RealSenseCamera
@@ -212,7 +214,9 @@ def open_source(source: str, realsense: RealSenseSettings, seed: int = 1) -> Cam
             return RealSenseCamera(realsense)
         case other:
             hololens2 = hololens2_settings(other)
-            return open_recording(Path(other)) if hololens2 is None else HoloLens2Camera(hololens2)
+            if hololens2 is None:
+                return open_recording(Path(other))
+            return HoloLens2Camera(replace(hololens2, keeps_wrapped=keeps_wrapped))
 
 
 def _replay_row(step: ReplayStep) -> dict[str, Any]:

@@ -255,7 +255,7 @@ def depth(arguments: argparse.Namespace) -> None:
 
     rig, board = _read_rig(arguments.rig), board_of(arguments)
     with ExitStack() as stack:
-        source = open_source(arguments.source, realsense_of(arguments))
+        source = open_source(arguments.source, realsense_of(arguments), keeps_wrapped=True)
         camera = stack.enter_context(source)
         _require_own(rig, camera)
         is_stopped = stack.enter_context(until_interrupted())

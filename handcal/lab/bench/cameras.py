@@ -16,6 +16,7 @@ from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured, run_trials
 from handcal.lab.study.procedure_trial import ProcedureModel, See
 from handcal.lab.study.procedures import ProcedureSettings, procedure_trial
+from handcal.lab.study.run import Case
 from handcal.lab.study.wearers import StudyWearer
 from handcal.progress import Progress
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
@@ -63,7 +64,7 @@ def measure_cameras(settings: BenchSettings, progress: Progress) -> Measured:
 
 def _errors_arcmin(see: See, number: int) -> list[float]:
     """Return the error of each eye of a wearer after the recommended plan, verified."""
-    plan = {"wearer": number, "plan": "recommended", "variant": "plain", "scale": 1.0}
+    plan: Case = {"wearer": number, "plan": "recommended", "variant": "plain", "scale": 1.0}
     rows = procedure_trial(ProcedureSettings(_SEED, ProcedureModel(see=see)), plan)
     return [cast("float", row["after_arcmin"]) for row in rows]
 
