@@ -1,4 +1,4 @@
-"""Look through a HoloLens 2's own depth camera: where the headset is, and the hand before it.
+"""Look through a HoloLens 2's own depth camera: where it is, and the hand before it.
 
     python 10_hololens2.py HOST
 
@@ -32,14 +32,14 @@ def main() -> None:
         print(f"{camera.name}: {camera.depth_intrinsics}")
         for _ in range(arguments.frames):
             frame = camera.read(5.0)
-            assert frame.T_W_H is not None
-            print(f"headset at {1e3 * frame.T_W_H[:3, 3].round(3)} mm", end="; ")
+            assert frame.T_W_D is not None
+            print(f"camera at {1e3 * frame.T_W_D[:3, 3].round(3)} mm", end="; ")
             try:
                 hand = finder.find(frame)
             except HandError as error:
                 print(error)
                 continue
-            hand_W_m = transform(frame.T_W_H @ camera.T_H_D, hand.points_m)
+            hand_W_m = transform(frame.T_W_D, hand.points_m)
             print(f"hand at {1e3 * np.median(hand_W_m, axis=0).round(3)} mm in the world")
 
 

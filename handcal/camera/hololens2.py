@@ -1,4 +1,4 @@
-"""Frames from a HoloLens 2's own depth camera, which tell the headset's pose."""
+"""Frames from a HoloLens 2's own depth camera, which tell its pose."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class HoloLens2Camera(Closable):
             depth_intrinsics=self.depth_intrinsics,
             color=self._grey(brightness),
             color_intrinsics=self.depth_intrinsics,
-            T_W_H=packet.T_W_H,
+            T_W_D=packet.T_W_H @ self.T_H_D,
         )
 
     def close(self) -> None:

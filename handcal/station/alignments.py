@@ -144,7 +144,7 @@ class AlignmentSteps:
         self._frame = frame
         problem = ""
         cloud: HandCloud | None = None
-        if frame.T_W_H is None and self._delay.see(frame):
+        if frame.T_W_D is None and self._delay.see(frame):
             self._hands.clear()  # they were placed by an assumed delay
         contradiction = (
             self.evidence.see(frame, self.camera)
@@ -161,7 +161,7 @@ class AlignmentSteps:
         except HandError as error:
             problem = str(error)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
-        hand, not_placed = self._hands.add(cloud, t_host_ns, frame.T_W_H)
+        hand, not_placed = self._hands.add(cloud, t_host_ns, frame.T_W_D)
         problem = "" if hand else problem or not_placed
         is_steady = self._hands.steady() is not None and not self._delay.is_needed
         self._ask_to_look_around()
@@ -267,10 +267,11 @@ class AlignmentSteps:
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:
         """Compare the pose that a frame tells with that of the headset's app."""
-        if frame.T_W_H is None:
+        if frame.T_W_D is None:
             return None
         with suppress(PoseError):
-            self.evidence.see_poses(frame.T_W_H, self._link.pose_at_host_ns(t_host_ns))
+            by_app = self._link.pose_at_host_ns(t_host_ns) @ self.rig.T_H_D
+            self.evidence.see_poses(frame.T_W_D, by_app)
         return self.evidence.other_world
 
     def _ask_to_look_around(self) -> None:

@@ -119,7 +119,7 @@ class Evidence:
         )
 
     def see_poses(self, by_camera: Float64, by_app: Float64) -> None:
-        """Compare T_W_H (4, 4) as the headset's own camera and its app tell it for one time."""
+        """Compare T_W_D (4, 4) as the camera tells it and as it follows from the app's pose."""
         difference = invert(by_camera) @ by_app
         turn_rad = float(Rotation.from_matrix(difference[:3, :3]).magnitude())
         self._apart.append((float(np.linalg.norm(difference[:3, 3])), turn_rad))
@@ -134,9 +134,9 @@ class Evidence:
             return None
         return Contradiction(
             "other-world",
-            f"the poses of the headset's camera and of its app are {1e3 * apart_m:.0f} mm and "
-            f"{np.degrees(turn_rad):.0f}° apart; let the app use the world and the rig node of "
-            "hl2ss, as its plugin does",
+            f"the camera is {1e3 * apart_m:.0f} mm and {np.degrees(turn_rad):.0f}° from where the "
+            "headset's app and the rig file have it; let the app use the world of hl2ss, and "
+            "measure the camera's pose again (handcal rig make --factory)",
         )
 
     def drawn_otherwise(self, problem: str) -> None:

@@ -41,7 +41,7 @@ class PlacedHand:
     movement_m: float = 0.0
     """Movement of the hand during those frames."""
     is_posed_by_camera: bool = False
-    """True if its frame told the headset's pose, so that no clock entered."""
+    """True if its frame told the camera's pose, so that no clock entered."""
 
 
 class RecentHands:
@@ -77,11 +77,11 @@ class RecentHands:
         self._seen_ns = 0
 
     def add(
-        self, cloud: HandCloud | None, t_host_ns: int, T_W_H: Float64 | None = None
+        self, cloud: HandCloud | None, t_host_ns: int, T_W_D: Float64 | None = None
     ) -> tuple[PlacedHand | None, str]:
         """Add the cloud of a new frame, None if it shows no hand, and place the clouds that can be.
 
-        A frame that tells the headset's pose T_W_H (4, 4) needs no other.
+        A frame that tells its camera's pose T_W_D (4, 4) needs no other.
 
         Returns
         -------
@@ -90,7 +90,7 @@ class RecentHands:
         """
         self._seen_ns = t_host_ns
         if cloud is not None:
-            self._unplaced.append((cloud, t_host_ns, T_W_H))
+            self._unplaced.append((cloud, t_host_ns, T_W_D))
         self._forget_old()
         hand, problem = None, ""
         while self._unplaced:
@@ -172,12 +172,13 @@ class RecentHands:
         self._placed.clear()
         self._unplaced.clear()
 
-    def _place(self, cloud: HandCloud, t_host_ns: int, T_W_H: Float64 | None) -> PlacedHand:
-        told = T_W_H is not None
-        T_W_D = (self._pose_at_host_ns(t_host_ns) if T_W_H is None else T_W_H) @ self._T_H_D
+    def _place(self, cloud: HandCloud, t_host_ns: int, told: Float64 | None) -> PlacedHand:
+        T_W_D = self._pose_at_host_ns(t_host_ns) @ self._T_H_D if told is None else told
         points_W_m = transform(T_W_D, cloud.points_m)
         middle_W_m = np.median(points_W_m[::_MEDIAN_STRIDE], axis=0)
-        return PlacedHand(cloud, t_host_ns, T_W_D, points_W_m, middle_W_m, is_posed_by_camera=told)
+        return PlacedHand(
+            cloud, t_host_ns, T_W_D, points_W_m, middle_W_m, is_posed_by_camera=told is not None
+        )
 
     def _forget_old(self) -> None:
         """Forget hands that are too old both for a confirmation and for the steadiness check."""

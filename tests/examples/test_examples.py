@@ -122,7 +122,7 @@ def test_a_hololens_shows_a_hand_in_the_world() -> None:
     packet = packet_of(1, ahat_payload(*images), rigid(translation_m=[1.0, 2.0, 3.0]))
     with Hl2ssServer(calibration_of(ahat_rays(), np.eye(4)), lambda: packet) as server:
         said = run("10_hololens2.py", "127.0.0.1", "--port", server.port, "--frames", 2)
-    assert said.count("headset at [1000. 2000. 3000.] mm; hand at [") == 2
+    assert said.count("camera at [1000. 2000. 3000.] mm; hand at [") == 2
     (x_mm, y_mm, z_mm) = numbers(r"(-?\d+)\.", said.rpartition("hand at [")[2])
     assert (x_mm, y_mm, z_mm) == pytest.approx((1000.0, 2000.0, 3490.0), abs=40.0)
 

@@ -106,7 +106,7 @@ class Stage:
         told: Float64 | None = None,
         thumb_out_rad: float = 0.0,
     ) -> Observation:
-        """Step with the next frame, of a hand or none; `told` is the pose that it tells."""
+        """Step with the next frame, of a hand or none; `told` is the pose it tells."""
         self.t_ns += PERIOD_NS
         self._frames += 1
         if pose:
@@ -115,7 +115,7 @@ class Stage:
         depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad).copy()
         depth[0, 0] = self._frames % 1000  # a live picture always changes
         frame = Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
-        return self.calibration.step(replace(frame, T_W_H=told))
+        return self.calibration.step(replace(frame, T_W_D=told))
 
     def hold(self, T_D_hand: Float64 = T_D_HAND, frames: int = 7) -> Observation:
         """Hold the hand still for a while."""
