@@ -177,7 +177,7 @@ class Hl2ssConnection(Closable):
         _, size = _HEADER.unpack_from(self._data)
         least, most = stream.packet_bytes
         if not least <= size <= most:
-            raise _foreign(stream, f"a payload of {size} bytes")
+            raise foreign(stream, f"a payload of {size} bytes")
         return self.receive(_HEADER.size + size + _POSE_BYTES, timeout_s)
 
     def close(self) -> None:
@@ -222,10 +222,10 @@ def parse_calibration(stream: Stream, data: bytes) -> HoloLensCalibration:
     T_D_rig = rest[:16].astype(np.float64).reshape(4, 4).T
     units_per_m = float(rest[16])
     if not is_rigid(T_D_rig, _RIG_M) or not _UNITS_PER_M[0] <= units_per_m <= _UNITS_PER_M[1]:
-        raise _foreign(stream, "no calibration")
+        raise foreign(stream, "no calibration")
     alias_m = float(rest[17]) / units_per_m if stream.is_wrapped else None
     if alias_m is not None and not _ALIAS_M[0] <= alias_m <= _ALIAS_M[1]:
-        raise _foreign(stream, "no calibration")
+        raise foreign(stream, "no calibration")
     return HoloLensCalibration(rays, _FLIP @ invert(T_D_rig), units_per_m, alias_m)
 
 
@@ -237,24 +237,40 @@ def parse_packet(stream: Stream, data: bytes) -> Packet:
     CameraError
         If it is not one of this stream.
     """
-    ticks, size = _HEADER.unpack_from(data)
-    if ticks * _TICK_NS >= 2**62:
-        raise _foreign(stream, "a time beyond all clocks")
+    _, size = _HEADER.unpack_from(data)
     payload = data[_HEADER.size : _HEADER.size + size]
     unpack = _ahat_images if stream.is_wrapped else _png_images
     distance, brightness = unpack(stream, payload)
+    return Packet(time_of(stream, data), distance, brightness, pose_of(stream, data))
+
+
+def time_of(stream: Stream, data: bytes) -> int:
+    """Return the time of a packet on the headset's clock, ns; CameraError if it is none."""
+    ticks = int(_HEADER.unpack_from(data)[0])
+    if ticks * _TICK_NS >= 2**62:
+        raise foreign(stream, "a time beyond all clocks")
+    return ticks * _TICK_NS
+
+
+def pose_of(stream: Stream, data: bytes) -> Float64 | None:
+    """Return a packet's pose (4, 4) in OpenCV's axes; None if the headset does not know it.
+
+    Raises
+    ------
+    CameraError
+        If it is no pose.
+    """
     T_world_rig = np.frombuffer(data[-_POSE_BYTES:], "<f4").astype(np.float64).reshape(4, 4).T
-    T_W_H = None
-    if T_world_rig.any():
-        if not is_rigid(T_world_rig, _WORLD_M):
-            raise _foreign(stream, "no pose")
-        T_W_H = opengl_transform(T_world_rig)
-    return Packet(int(ticks) * _TICK_NS, distance, brightness, T_W_H)
+    if not T_world_rig.any():
+        return None
+    if not is_rigid(T_world_rig, _WORLD_M):
+        raise foreign(stream, "no pose")
+    return opengl_transform(T_world_rig)
 
 
 def _ahat_images(stream: Stream, payload: bytes) -> tuple[UInt16, UInt16]:
     if struct.unpack_from("<II", payload) != (0, 4 * stream.pixels):
-        raise _foreign(stream, "encoded images")
+        raise foreign(stream, "encoded images")
     images = _pair(stream, np.frombuffer(payload, "<u2", 2 * stream.pixels, 8))
     return np.where(images[0] < _INVALID, images[0], 0).astype(np.uint16), images[1]
 
@@ -263,10 +279,10 @@ def _png_images(stream: Stream, payload: bytes) -> tuple[UInt16, UInt16]:
     size = struct.pack(">II", stream.width, stream.height)
     # The size is checked before the image is unpacked: a small file may hold a huge image.
     if not payload.startswith(_PNG_START + size):
-        raise _foreign(stream, f"no PNG of {stream.width}x{stream.height}")
+        raise foreign(stream, f"no PNG of {stream.width}x{stream.height}")
     image = cv2.imdecode(np.frombuffer(payload, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None or image.dtype != np.uint8 or image.size != 4 * stream.pixels:
-        raise _foreign(stream, "no PNG of 4 channels")
+        raise foreign(stream, "no PNG of 4 channels")
     return _pair(stream, np.ascontiguousarray(image).reshape(-1).view("<u2"))
 
 
@@ -275,7 +291,8 @@ def _pair(stream: Stream, values: NDArray[np.uint16]) -> tuple[UInt16, UInt16]:
     return distance, brightness
 
 
-def _foreign(stream: Stream, found: str) -> CameraError:
+def foreign(stream: Stream, found: str) -> CameraError:
+    """Return the error for data that are not those of a stream."""
     return CameraError(
         f"this is not the {stream.name} stream of a known hl2ss: {found}; install hl2ss of May "
         "2025 or newer on the HoloLens"

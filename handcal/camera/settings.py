@@ -46,6 +46,10 @@ class HoloLens2Settings:
     """Port of the stream; None for hl2ss's own."""
     divisor: int = 3
     """Every so many images of the camera are sent: AHAT makes 45 a second, too many for Wi-Fi."""
+    has_color: bool = False
+    """Send the pictures of the front colour camera, too, in place of the depth camera's grey."""
+    color_port: int | None = None
+    """Port of these; None for hl2ss's own."""
     keeps_wrapped: bool = False
     """Keep distances that may be of a surface one alias farther away. A depth check needs it: the
     ink of its board is as dark as a far wall."""

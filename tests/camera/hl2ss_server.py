@@ -51,6 +51,17 @@ def long_throw_payload(distance: NDArray[np.uint16], brightness: NDArray[np.uint
     return bytes(cv2.imencode(".png", picture)[1]) + struct.pack("<Q", 7)
 
 
+def color_payload(image: NDArray[np.uint8], fx: float, fy: float, cx: float, cy: float) -> bytes:
+    """Return the payload of a picture (H, W, 3) of the front camera: NV12."""
+    height, width = image.shape[:2]
+    planes = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2YUV_I420), np.uint8)
+    u, v = planes[height:].reshape(2, height // 2, width // 2)
+    rows = np.concatenate([planes[:height], np.dstack([u, v]).reshape(height // 2, width)])
+    padded = np.pad(rows, ((0, 0), (0, -width % 64)))
+    about = struct.pack("<4f60x2H", fx, fy, cx, cy, width, height)
+    return padded.tobytes() + about
+
+
 class Hl2ssServer(Closable):
     """Serves one client after another: the calibration, or packets until the client leaves.
 
@@ -94,6 +105,7 @@ class Hl2ssServer(Closable):
         self.requests.append(request)
         if request == b"\x02":
             client.sendall(self._calibration)
+        if request[0] != 1:
             return
         while not self._is_over.wait(0.005):
             packet = self._next_packet()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -28,6 +29,7 @@ from tests.camera.hl2ss_server import (
     Hl2ssServer,
     ahat_payload,
     calibration_of,
+    color_payload,
     long_throw_payload,
     packet_of,
 )
@@ -35,6 +37,7 @@ from tests.helpers import eventually
 
 T_H_D: Float64 = rigid([0.2, -0.1, 0.05], [0.02, -0.03, 0.01])
 T_W_H: Float64 = rigid([0.3, 0.5, -0.2], [1.0, -2.0, 3.0])
+T_W_C: Float64 = T_W_H @ rigid([0.3, 0.0, 0.0], [0.01, 0.02, 0.03])
 HELD_UP = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
 WIDE = Intrinsics(720, 720, 345.0, 345.0, 359.5, 359.5)
 CALIBRATION = calibration_of(ahat_rays(), T_H_D)
@@ -151,6 +154,68 @@ def test_long_throw_comes_as_png(serve: Serve) -> None:
     assert serve.server.requests[1] == LONG_THROW_REQUEST  # type: ignore[attr-defined]
 
 
+def pictures(ticks: int, fx: float = 500.0, T_W_C: Float64 | None = T_W_C) -> bytes:
+    """Return a picture, red above and blue below."""
+    image = np.zeros((360, 640, 3), np.uint8)
+    image[:180, :, 0] = image[180:, :, 2] = 200
+    return packet_of(ticks, color_payload(image, fx, 501.0, 320.0, 180.0), T_W_C)
+
+
+def test_the_front_camera_is_the_colour(serve: Serve) -> None:
+    color = serve(pictures(123_456 + 400_000))  # 40 ms later, the head has moved
+    front = serve.server  # type: ignore[attr-defined]
+    settings = replace(serve(), has_color=True, color_port=color.port)
+    with HoloLens2Camera(settings) as camera:
+        frames: list[Frame] = []
+
+        def has_color() -> bool:
+            frames.append(camera.read(5.0))
+            return frames[-1].color is not None
+
+        eventually(has_color)
+    frame = frames[-1]
+    assert frame.color is not None
+    assert frame.color_intrinsics == Intrinsics(640, 360, 500.0, 501.0, 320.0, 180.0)
+    np.testing.assert_allclose(frame.color[90, 320], [200, 0, 0], atol=12)
+    np.testing.assert_allclose(frame.color[270, 320], [0, 0, 200], atol=12)
+    np.testing.assert_allclose(frame.T_C_D, np.linalg.inv(T_W_C) @ T_W_H @ T_H_D, atol=1e-6)
+    eventually(lambda: len(front.requests) == 3)
+    assert [request[0] for request in front.requests] == [7, 1, 11]
+    assert [len(request) for request in front.requests] == [28, 14, 1]
+
+
+@pytest.mark.parametrize(
+    ("picture", "message"),
+    [
+        (pictures(123_456, fx=np.nan), "no camera of the requested size"),
+        (pictures(123_456, T_W_C=2.0 * T_W_C), "no pose"),
+        (pictures(123_456, T_W_C=None), "does not know where it is"),
+        (PACKET, "a payload of"),
+    ],
+    ids=["lens", "pose", "lost", "size"],
+)
+def test_a_foreign_picture_is_one_clear_error(serve: Serve, picture: bytes, message: str) -> None:
+    color = serve(picture)
+    settings = replace(serve(), has_color=True, color_port=color.port)
+
+    def fails() -> bool:
+        try:
+            camera.read(5.0)
+        except CameraError as error:
+            return message in str(error)
+        return False
+
+    with HoloLens2Camera(settings) as camera:
+        eventually(fails)
+
+
+def test_without_the_front_camera_there_is_one_clear_error(serve: Serve) -> None:
+    with Hl2ssServer(b"", lambda: None) as gone:
+        port = gone.port
+    with pytest.raises(CameraError, match="no hl2ss answers"):
+        HoloLens2Camera(replace(serve(), has_color=True, color_port=port))
+
+
 def test_invalid_distances_are_no_measurement(serve: Serve) -> None:
     distance = FLAT.copy()
     distance[:, 300:] = 4091
@@ -260,6 +325,7 @@ def test_a_stream_that_ends_is_opened_again(serve: Serve) -> None:
     ("source", "expected"),
     [
         ("hololens2:192.168.1.7", HoloLens2Settings("192.168.1.7")),
+        ("hololens2:hl,color", HoloLens2Settings("hl", has_color=True)),
         ("hololens2:hl.local,longthrow", HoloLens2Settings("hl.local", "longthrow")),
         ("realsense", None),
         ("hololens2", None),
