@@ -225,6 +225,9 @@ class Frame:
     color_intrinsics: Intrinsics | None = None
     T_C_D: Float64 = field(default_factory=lambda: np.eye(4))
     """(4, 4); from the depth camera to the colour camera; identity for depth aligned to colour."""
+    T_W_D: Float64 | None = None
+    """(4, 4); the camera's pose at the exposure, if it is the headset's own and tells it; None: it
+    follows from the headset's pose, which the app tells on the link."""
 
     __repr__ = brief
 
@@ -232,6 +235,7 @@ class Frame:
         intrinsics = self.depth_intrinsics
         freeze(self, "depth", np.uint16, intrinsics.height, intrinsics.width)
         freeze(self, "T_C_D", np.float64, 4, 4)
+        freeze(self, "T_W_D", np.float64, 4, 4)
         if (self.color is None) != (self.color_intrinsics is None):
             raise ValueError("Frame: color and color_intrinsics go together")
         if self.color_intrinsics is not None:

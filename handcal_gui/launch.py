@@ -16,10 +16,11 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QWidget
 
+from handcal.camera.hololens2 import PREFIX
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
-from handcal.station.settings import StationSettings
+from handcal.station.settings import StationSettings, with_source
 from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
@@ -107,6 +108,8 @@ def _station(settings: StationSettings, arguments: argparse.Namespace) -> Statio
             settings = replace(settings, source="simulator", headset="virtual")
         case "realsense":
             settings = replace(settings, source="realsense", headset="network")
+        case live if live.startswith(PREFIX):
+            settings = replace(with_source(settings, live), headset="network")
         case path:
             recording = str(Path(path).absolute())  # remembered, and valid from any folder
             settings = replace(settings, source="recording", recording=recording, headset="virtual")

@@ -1,4 +1,4 @@
-"""Settings of a RealSense camera."""
+"""Settings of live cameras."""
 
 from __future__ import annotations
 
@@ -32,3 +32,28 @@ class RealSenseSettings:
     temporal_filter: bool = False
     hole_filling: bool = False
     """The SDK's filters of the depth image; off, as they smooth and fill in depth."""
+
+
+@dataclass(frozen=True, slots=True)
+class HoloLens2Settings:
+    """Settings of a HoloLens 2's own depth camera, streamed by hl2ss."""
+
+    host: str = ""
+    """Address of the headset."""
+    stream: Literal["ahat", "longthrow"] = "ahat"
+    """The depth camera for hands, or that for rooms."""
+    port: int | None = None
+    """Port of the stream; None for hl2ss's own."""
+    divisor: int = 3
+    """Every so many images of the camera are sent: AHAT makes 45 a second, too many for Wi-Fi."""
+    has_color: bool = False
+    """Send the pictures of the front colour camera, too, in place of the depth camera's grey."""
+    color_port: int | None = None
+    """Port of these; None for hl2ss's own."""
+    keeps_wrapped: bool = False
+    """Keep distances that may be of a surface one alias farther away. A depth check needs it: the
+    ink of its board is as dark as a far wall."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.divisor <= 255:
+            raise ValueError(f"divisor is {self.divisor}; set 1 to 255")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -67,7 +67,11 @@ _ROI = arg(
 
 @command(
     arg("output", type=Path, help="a .db3 file, or a new folder"),
-    arg("--source", default="realsense", help="realsense, simulator, or a recording to convert"),
+    arg(
+        "--source",
+        default="realsense",
+        help="realsense, hololens2:HOST, simulator, or a recording to convert",
+    ),
     arg(
         "--seconds",
         type=number(float, 0.01, 86_400.0),
@@ -189,8 +193,11 @@ def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
 
 
-def open_source(source: str, realsense: RealSenseSettings, seed: int = 1) -> Camera:
-    """Open the camera that an option names: realsense, simulator or the path of a recording."""
+def open_source(
+    source: str, realsense: RealSenseSettings, seed: int = 1, *, keeps_wrapped: bool = False
+) -> Camera:
+    """Open the camera that an option names: of a kind, or the path of a recording."""
+    from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
     from handcal.camera.realsense import RealSenseCamera
     from handcal.camera.recordings import open_recording
     from handcal.sim.camera import SyntheticCamera
@@ -205,8 +212,11 @@ def open_source(source: str, realsense: RealSenseSettings, seed: int = 1) -> Cam
             return SyntheticCamera(world, swaying_hand, seed=seed)
         case "realsense":
             return RealSenseCamera(realsense)
-        case path:
-            return open_recording(Path(path))
+        case other:
+            hololens2 = hololens2_settings(other)
+            if hololens2 is None:
+                return open_recording(Path(other))
+            return HoloLens2Camera(replace(hololens2, keeps_wrapped=keeps_wrapped))
 
 
 def _replay_row(step: ReplayStep) -> dict[str, Any]:

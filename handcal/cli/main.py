@@ -93,7 +93,8 @@ _RIG: Mapping[str, Entry] = {
         "Calibrate one eye's display from the viewpoint camera's images of its grid.", "rig_files"
     ),
     "make": Entry(
-        "Write the depth camera's pose, from a stereo calibration, into a rig file.", "rig_files"
+        "Write the depth camera's pose, by stereo calibration or the factory, into a rig file.",
+        "rig_files",
     ),
     "depth": Entry(
         "Check the depth camera against a board at several distances, and put it into a rig file.",

@@ -19,6 +19,7 @@ from handcal.cli.rig import (
     show_views,
     views_of,
 )
+from handcal.cli.run import KEYS, LISTEN
 from handcal.cli.terminal import arg, command, number, one_of
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
@@ -172,8 +173,27 @@ def display(arguments: argparse.Namespace) -> None:
         "--stereo",
         type=Path,
         metavar="FILE",
-        required=True,
         help="JSON from 'handcal rig stereo'",
+    ),
+    arg(
+        "--factory",
+        metavar="SOURCE",
+        help="in place of --stereo: hololens2:HOST, a headset that knows its own depth camera",
+    ),
+    arg(
+        "--headset",
+        action="store_true",
+        help="with --factory: the app's poses are not of the headset's rig node; wait for the app, "
+        "and measure the camera's pose against them while the wearer looks around",
+    ),
+    *LISTEN,
+    KEYS,
+    arg(
+        "--patience-s",
+        type=number(float, 1.0, 86_400.0),
+        metavar="S",
+        default=120.0,
+        help="longest time until the headset connects",
     ),
     arg(
         "--depth-intrinsics",
@@ -192,15 +212,22 @@ def display(arguments: argparse.Namespace) -> None:
     *_RIG_AND_OUTPUT,
 )
 def make(arguments: argparse.Namespace) -> None:
-    """Write the depth camera's pose, from a stereo calibration, into a rig file."""
+    """Write the depth camera's pose, by stereo calibration or the factory, into a rig file."""
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
     from handcal.rig.steps import identity_in, intrinsics_in, pose_in
 
+    if (arguments.stereo is None) == (arguments.factory is None):
+        raise HandcalError("give either --stereo or --factory")
+    rig = _read_rig(arguments.rig)
+    if arguments.factory is not None:
+        rig = _with_factory_pose(rig, arguments)
+        _write(arguments.output, replace(rig, name=arguments.name or rig.name))
+        return
     stereo = read_stereo(arguments.stereo)
     show_verdict(stereo.verdict)
     rig = with_stereo(
-        _read_rig(arguments.rig),
+        rig,
         stereo,
         depth_intrinsics=intrinsics_in(arguments.depth_intrinsics),
         T_C_D=pose_in(arguments.depth_to_color),
@@ -209,8 +236,33 @@ def make(arguments: argparse.Namespace) -> None:
     _write(arguments.output, replace(rig, name=arguments.name or rig.name))
 
 
+def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
+    from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+    from handcal.cli.display_check import network_server
+    from handcal.rig.assemble import with_factory_pose
+    from handcal.station.camera_pose import run_camera_pose
+
+    settings = hololens2_settings(arguments.factory)
+    if settings is None:
+        raise HandcalError(f"--factory: a headset is hololens2:HOST, not {arguments.factory}")
+    with ExitStack() as stack:
+        camera = stack.enter_context(HoloLens2Camera(settings))
+        T_H_D = camera.T_H_D
+        if arguments.headset:
+            server = stack.enter_context(network_server(arguments))
+            is_stopped = stack.enter_context(until_interrupted())
+            progress = stack.enter_context(show_progress(is_stopped))
+            found = run_camera_pose(server, camera, progress=progress)
+            console.print(f"Single frames differ by {1e3 * found.spread_m:.1f} mm")
+            T_H_D = found.T_H_D
+        return with_factory_pose(rig, T_H_D, camera.depth_intrinsics, camera.identity)
+
+
 @command(
-    arg("source", help="a recording of the board with depth and colour, or realsense"),
+    arg(
+        "source",
+        help="a recording of the board with depth and colour, realsense, or hololens2:HOST",
+    ),
     arg(
         "--stills",
         action="store_true",
@@ -230,7 +282,7 @@ def depth(arguments: argparse.Namespace) -> None:
 
     rig, board = _read_rig(arguments.rig), board_of(arguments)
     with ExitStack() as stack:
-        source = open_source(arguments.source, realsense_of(arguments))
+        source = open_source(arguments.source, realsense_of(arguments), keeps_wrapped=True)
         camera = stack.enter_context(source)
         _require_own(rig, camera)
         is_stopped = stack.enter_context(until_interrupted())

@@ -59,8 +59,8 @@ _SHARE = number(float, 0.0, 1.0)
         "--camera",
         metavar="SOURCE",
         required=True,
-        help="realsense; simulator, with the virtual headset; or the path of a recording, which is "
-        "played in a loop",
+        help="realsense; hololens2:HOST, the headset's own, by hl2ss; simulator, with the virtual "
+        "headset; or the path of a recording, which is played in a loop",
     ),
     arg("--rig", type=Path, metavar="FILE", required=True, help="rig file of this headset"),
     arg(
@@ -106,12 +106,9 @@ def run(arguments: argparse.Namespace) -> None:
     """Calibrate one wearer without a window, for scripts and for testing headset apps."""
     from handcal.bridge.bridges import open_bridges
     from handcal.station.run import RunSettings, run_calibration
-    from handcal.station.settings import StationSettings
+    from handcal.station.settings import StationSettings, with_source
 
-    is_recording = arguments.camera not in ("realsense", "simulator")
     station = StationSettings(
-        source="recording" if is_recording else arguments.camera,
-        recording=arguments.camera if is_recording else "",
         realsense=realsense_of(arguments),
         headset=arguments.headset,
         host=arguments.host,
@@ -123,7 +120,7 @@ def run(arguments: argparse.Namespace) -> None:
         sessions=str(make_folder(arguments.output)),
     )
     settings = RunSettings(
-        station,
+        with_source(station, arguments.camera),
         arguments.wearer,
         arguments.plan,
         arguments.alignments,

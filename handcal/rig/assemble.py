@@ -111,6 +111,33 @@ def with_stereo(
     return _with_origin(calibrated, "T_H_D", origin)
 
 
+def with_factory_pose(
+    rig: Rig, T_H_D: Float64, depth_intrinsics: Intrinsics, depth_camera: CameraIdentity
+) -> Rig:
+    """Return `rig` with the headset's own depth camera, as its factory calibrated it.
+
+    Nothing is known of that calibration's accuracy, so T_H_D has no origin. A depth check of `rig`
+    is removed: it may be of another camera.
+
+    Parameters
+    ----------
+    rig : Rig
+    T_H_D : (4, 4) float64
+    depth_intrinsics : Intrinsics
+    depth_camera : CameraIdentity
+    """
+    origins = dict(rig.origins)
+    origins.pop("T_H_D", None)
+    return replace(
+        rig,
+        T_H_D=T_H_D,
+        depth_intrinsics=depth_intrinsics,
+        depth_camera=depth_camera,
+        depth_check=None,
+        origins=origins,
+    )
+
+
 def _origin(
     method: str,
     made: str | None,

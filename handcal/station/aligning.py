@@ -10,6 +10,7 @@ import numpy as np
 
 from handcal.display import view_of_eye
 from handcal.errors import HandError, PoseError, PosePendingError
+from handcal.geometry import invert
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.shape import ShapeChange, change_text
@@ -136,7 +137,10 @@ class Aligning:
             hand = hands.nearest(confirmation.t_host_ns, self._settings.match_tolerance_s)
             hand = merge_hold(hands.held_at(hand), hand)
             rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
-            T_W_H = link.pose_at_host_ns(confirmation.t_host_ns)
+            if hand.is_posed_by_camera:
+                T_W_H = hand.T_W_D @ invert(self._rig.T_H_D)
+            else:
+                T_W_H = link.pose_at_host_ns(confirmation.t_host_ns)
             shape = self._guard.shape_change(hand.points_W_m, hand.cloud.is_cut)
         except PosePendingError:
             return None

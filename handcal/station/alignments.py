@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.camera.clock import FrameClock
-from handcal.errors import HandError
+from handcal.errors import HandError, PoseError
 from handcal.geometry import invert, rigid, transform
 from handcal.hand.shipped import make_finder
 from handcal.link.reliable import Delivery, Outgoing
@@ -143,12 +144,13 @@ class AlignmentSteps:
         self._frame = frame
         problem = ""
         cloud: HandCloud | None = None
-        if self._delay.see(frame):
+        if frame.T_W_D is None and self._delay.see(frame):
             self._hands.clear()  # they were placed by an assumed delay
         contradiction = (
             self.evidence.see(frame, self.camera)
             or self.evidence.see_delay(self._delay.delay_s, self._delay.largest_delay_s)
             or self.evidence.see_delivery(self._drawing.is_lost and self._link.connected)
+            or self._see_world(frame, t_host_ns)
         )
         try:
             if contradiction is None:
@@ -159,7 +161,7 @@ class AlignmentSteps:
         except HandError as error:
             problem = str(error)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
-        hand, not_placed = self._hands.add(cloud, t_host_ns)
+        hand, not_placed = self._hands.add(cloud, t_host_ns, frame.T_W_D)
         problem = "" if hand else problem or not_placed
         is_steady = self._hands.steady() is not None and not self._delay.is_needed
         self._ask_to_look_around()
@@ -262,6 +264,15 @@ class AlignmentSteps:
     def store_waiting(self) -> None:
         """Write data that could not be written before; FileError if they still cannot be."""
         self._store.write_waiting()
+
+    def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:
+        """Compare the pose that a frame tells with that of the headset's app."""
+        if frame.T_W_D is None:
+            return None
+        with suppress(PoseError):
+            by_app = self._link.pose_at_host_ns(t_host_ns) @ self.rig.T_H_D
+            self.evidence.see_poses(frame.T_W_D, by_app)
+        return self.evidence.other_world
 
     def _ask_to_look_around(self) -> None:
         """Have the wearer move the head as long as the camera's delay is needed for a cursor."""

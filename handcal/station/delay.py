@@ -197,7 +197,12 @@ class DelayMeter:
         return float(np.linalg.norm([*moved_m, age_s * speed_m_s]))
 
     def _carried_m_s(self, hand: PlacedHand) -> float:
-        """Return the speed at which the head carries what is at the hand's place; 0 if unknown."""
+        """Return the speed at which the head carries what is at the hand's place; 0 if unknown.
+
+        Where the frame told the pose, no delay matters, and it is 0.
+        """
+        if hand.is_posed_by_camera:
+            return 0.0
         around_ns = (hand.t_host_ns - _CARRY_NS, hand.t_host_ns + _CARRY_NS)
         try:
             before, after = (self._pose_at_host_ns(t_ns) for t_ns in around_ns)

@@ -8,18 +8,25 @@ result, and is named.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from handcal.geometry import invert
 from handcal.rig.compare import compare_camera
 from handcal.rig.report import depth_finding, display_finding
-from handcal.types import CameraIdentity, Frame, Intrinsics, Rig
+from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, Rig
 
 FROZEN_FRAMES = 4
 """Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""
 _REFUSALS = 2
+_COMPARED = 20
+_APART_M, _APART_RAD = 0.02, np.radians(2.0)
+"""Poses of one rig in one world agree better at least once in so many frames, also while the head
+moves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +56,7 @@ class Evidence:
         self._last: Frame | None = None
         self._equal = 0
         self._drawn_otherwise = 0
+        self._apart: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
         if rig.depth_check is not None and not (finding := depth_finding(rig.depth_check)).is_fine:
             self._add(
                 "depth-bias",
@@ -108,6 +116,27 @@ class Evidence:
         return Contradiction(
             "lost-start",
             "the headset does not acknowledge the projections sent to it; restart its app",
+        )
+
+    def see_poses(self, by_camera: Float64, by_app: Float64) -> None:
+        """Compare T_W_D (4, 4) as the camera tells it and as it follows from the app's pose."""
+        difference = invert(by_camera) @ by_app
+        turn_rad = float(Rotation.from_matrix(difference[:3, :3]).magnitude())
+        self._apart.append((float(np.linalg.norm(difference[:3, 3])), turn_rad))
+
+    @property
+    def other_world(self) -> Contradiction | None:
+        """Evidence that forbids frames while camera and app speak of other worlds or rigs."""
+        if len(self._apart) < _COMPARED:
+            return None
+        apart_m, turn_rad = (min(values) for values in zip(*self._apart, strict=True))
+        if apart_m <= _APART_M and turn_rad <= _APART_RAD:
+            return None
+        return Contradiction(
+            "other-world",
+            f"the camera is {1e3 * apart_m:.0f} mm and {np.degrees(turn_rad):.0f}° from where the "
+            "headset's app and the rig file have it; let the app use the world of hl2ss, and "
+            "measure the camera's pose again (handcal rig make --factory)",
         )
 
     def drawn_otherwise(self, problem: str) -> None:

@@ -40,6 +40,8 @@ class PlacedHand:
     """Number of frames from which the surface was made."""
     movement_m: float = 0.0
     """Movement of the hand during those frames."""
+    is_posed_by_camera: bool = False
+    """True if its frame told the camera's pose, so that no clock entered."""
 
 
 class RecentHands:
@@ -71,11 +73,15 @@ class RecentHands:
         self._steady_m = steady_m
         self._keep_ns = round(1e9 * (steady_s + _KEEP_S))
         self._placed: deque[PlacedHand] = deque()
-        self._unplaced: deque[tuple[HandCloud, int]] = deque()
+        self._unplaced: deque[tuple[HandCloud, int, Float64 | None]] = deque()
         self._seen_ns = 0
 
-    def add(self, cloud: HandCloud | None, t_host_ns: int) -> tuple[PlacedHand | None, str]:
+    def add(
+        self, cloud: HandCloud | None, t_host_ns: int, T_W_D: Float64 | None = None
+    ) -> tuple[PlacedHand | None, str]:
         """Add the cloud of a new frame, None if it shows no hand, and place the clouds that can be.
+
+        A frame that tells its camera's pose T_W_D (4, 4) needs no other.
 
         Returns
         -------
@@ -84,13 +90,12 @@ class RecentHands:
         """
         self._seen_ns = t_host_ns
         if cloud is not None:
-            self._unplaced.append((cloud, t_host_ns))
+            self._unplaced.append((cloud, t_host_ns, T_W_D))
         self._forget_old()
         hand, problem = None, ""
         while self._unplaced:
-            waiting, t_ns = self._unplaced[0]
             try:
-                hand = self._place(waiting, t_ns)
+                hand = self._place(*self._unplaced[0])
             except PosePendingError as error:
                 problem = str(error)
                 break
@@ -167,11 +172,13 @@ class RecentHands:
         self._placed.clear()
         self._unplaced.clear()
 
-    def _place(self, cloud: HandCloud, t_host_ns: int) -> PlacedHand:
-        T_W_D = self._pose_at_host_ns(t_host_ns) @ self._T_H_D
+    def _place(self, cloud: HandCloud, t_host_ns: int, told: Float64 | None) -> PlacedHand:
+        T_W_D = self._pose_at_host_ns(t_host_ns) @ self._T_H_D if told is None else told
         points_W_m = transform(T_W_D, cloud.points_m)
         middle_W_m = np.median(points_W_m[::_MEDIAN_STRIDE], axis=0)
-        return PlacedHand(cloud, t_host_ns, T_W_D, points_W_m, middle_W_m)
+        return PlacedHand(
+            cloud, t_host_ns, T_W_D, points_W_m, middle_W_m, is_posed_by_camera=told is not None
+        )
 
     def _forget_old(self) -> None:
         """Forget hands that are too old both for a confirmation and for the steadiness check."""

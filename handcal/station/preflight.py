@@ -9,6 +9,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from handcal.camera.hololens2 import identity_of
 from handcal.camera.recording import check_recording
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.ros import ros_recording
@@ -84,6 +85,8 @@ def _camera(settings: StationSettings) -> Finding:
         case "realsense":
             device = choose_device(connected_devices(), settings.realsense.serial)
             return with_rig(examine_camera(device), _chosen_rig(settings), device.identity)
+        case "hololens2":
+            return _hololens2(settings)
         case "recording":
             return _recording(settings)
         case "simulator":
@@ -93,6 +96,17 @@ def _camera(settings: StationSettings) -> Finding:
 def _chosen_rig(settings: StationSettings) -> Path | None:
     """Return the rig file; None for the shipped example, which is of no real camera."""
     return settings.rig_path if settings.rig else None
+
+
+def _hololens2(settings: StationSettings) -> Finding:
+    if not settings.hololens2.host:
+        return _broken("no HoloLens 2 is chosen", "enter its address, as its settings show it")
+    identity = identity_of(settings.hololens2)
+    found = _limited(
+        f"{identity.model} at {settings.hololens2.host}, not tried yet",
+        "start hl2ss on it; it is opened at the start",
+    )
+    return with_rig(found, _chosen_rig(settings), identity)
 
 
 def _recording(settings: StationSettings) -> Finding:

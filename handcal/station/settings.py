@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from handcal.camera.hololens2 import hololens2_settings
 from handcal.camera.playback import PlaybackSettings
-from handcal.camera.settings import RealSenseSettings
+from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.io.resources import resource_path
 from handcal.sim.hand import Side
 from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings
 from handcal.station.procedure import CalibrationSettings
 
-Source = Literal["simulator", "recording", "realsense"]
+Source = Literal["simulator", "recording", "realsense", "hololens2"]
 HeadsetKind = Literal["virtual", "network"]
 DEFAULT_PORT = 47800
 
@@ -31,6 +32,7 @@ class StationSettings:
     )
     """Default: in real time and in a loop."""
     realsense: RealSenseSettings = field(default_factory=RealSenseSettings)
+    hololens2: HoloLens2Settings = field(default_factory=HoloLens2Settings)
     headset: HeadsetKind = "virtual"
     """The virtual headset runs as a separate process on this machine and includes the simulated
     wearer."""
@@ -66,3 +68,20 @@ class StationSettings:
     def rig_path(self) -> Path:
         """Path of the rig file to read."""
         return Path(self.rig) if self.rig else resource_path("example_rig.yaml")
+
+
+def with_source(settings: StationSettings, source: str) -> StationSettings:
+    """Return settings with the camera of this name.
+
+    Parameters
+    ----------
+    settings : StationSettings
+    source : str
+        ``realsense``, ``simulator``, ``hololens2:HOST``, or the path of a recording.
+    """
+    match source:
+        case "realsense" | "simulator":
+            return replace(settings, source=source)
+    if (hololens2 := hololens2_settings(source)) is not None:
+        return replace(settings, source="hololens2", hololens2=hololens2)
+    return replace(settings, source="recording", recording=source)

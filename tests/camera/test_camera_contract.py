@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -12,20 +13,24 @@ import pytest
 
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
+from handcal.camera.hololens2 import HoloLens2Camera
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording, record_frames
+from handcal.camera.settings import HoloLens2Settings
 from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.sim.ahat import ahat_rays
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import RoomSettings, make_room
 from handcal.sim.sway import swaying_hand
 from handcal.types import CameraIdentity, Frame, Intrinsics
+from tests.camera.hl2ss_server import Hl2ssServer, ahat_payload, calibration_of, packet_of
 from tests.camera.rosbag import write_rosbag
 from tests.helpers import eventually
 
 COUNT = 6
-KINDS = ("simulator", "realsense", "folder", "recording", "mcap", "rosbag-db3")
+KINDS = ("simulator", "realsense", "hololens2", "folder", "recording", "mcap", "rosbag-db3")
 D415 = CameraIdentity("Intel RealSense D415", "123", "5.16.0.1")
 OpenCamera: TypeAlias = Callable[[], Camera]
 
@@ -50,6 +55,9 @@ def open_camera(
         case "realsense":
             plug_in(sizes=((848, 480),))
             return RealSenseCamera
+        case "hololens2":
+            port = request.getfixturevalue("hl2ss_port")
+            return lambda: HoloLens2Camera(HoloLens2Settings("127.0.0.1", port=port))
         case "mcap" | "rosbag-db3" as kind:
             write_rosbag(tmp_path / "bag", make_frames(COUNT), is_mcap=kind == "mcap")
             return lambda: open_recording(tmp_path / "bag")
@@ -57,6 +65,20 @@ def open_camera(
             path = tmp_path / ("made" if kind == "folder" else "made.db3")
             record_frames(path, make_frames(COUNT), D415)
             return lambda: open_recording(path)
+
+
+@pytest.fixture
+def hl2ss_port() -> Iterator[int]:
+    """Yield the port of a HoloLens 2 whose images are noise."""
+
+    def noise() -> Iterator[bytes]:
+        rng = np.random.default_rng(1)
+        for ticks in count(1):
+            image = rng.integers(400, 500, (512, 512), np.uint16)
+            yield packet_of(10_000 * ticks, ahat_payload(image, image), np.eye(4))
+
+    with Hl2ssServer(calibration_of(ahat_rays(), np.eye(4)), noise().__next__) as server:
+        yield server.port
 
 
 def test_frames_come_in_order_with_both_clocks(open_camera: OpenCamera) -> None:
@@ -107,6 +129,7 @@ def test_a_camera_tells_which_device_it_is(open_camera: OpenCamera) -> None:
     with open_camera() as camera:
         simulated = CameraIdentity("Simulated camera", "simulated", "")
         others = {"Simulated camera": simulated, "Recording bag": CameraIdentity()}
+        others["HoloLens 2 AHAT at 127.0.0.1"] = CameraIdentity("HoloLens 2 AHAT")
         assert camera.identity == others.get(camera.name, D415)
 
 

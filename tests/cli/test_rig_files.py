@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from handcal.camera.folder import record_folder
+from handcal.camera.hl2ss import STREAMS
 from handcal.cli.main import parse
 from handcal.display import view_of_eye
 from handcal.errors import HandcalError
@@ -21,10 +22,12 @@ from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.tracked_file import write_tracked
 from handcal.rig.views import ViewsError
+from handcal.sim.ahat import ahat_rays
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
 from handcal.types import CameraIdentity, Frame, Intrinsics
 from tests import board_frames
+from tests.camera.hl2ss_server import Hl2ssServer, calibration_of
 from tests.helpers import DATA
 
 RIG = example_rig()
@@ -191,3 +194,24 @@ def test_the_depth_camera_is_checked_and_the_rig_file_keeps_it(
 def test_a_display_too_small_for_the_squares_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(HandcalError, match="no room"):
         run("grid", "--display", 200, 200, "--png", tmp_path / "grid.png")
+
+
+def test_a_headset_tells_the_pose_of_its_own_camera(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    T_H_D = rigid([0.2, 0.0, 0.1], [0.02, -0.03, 0.01])
+    write_rig(tmp_path / "rig.yaml", RIG)
+    make = "make", "--rig", tmp_path / "rig.yaml", "--output", tmp_path / "new.yaml"
+    with Hl2ssServer(calibration_of(ahat_rays(), T_H_D), lambda: None) as server:
+        ahat = replace(STREAMS["ahat"], port=server.port)
+        monkeypatch.setitem(STREAMS, "ahat", ahat)
+        run(*make, "--factory", "hololens2:127.0.0.1")
+    made = read_rig(tmp_path / "new.yaml")
+    np.testing.assert_allclose(made.T_H_D, T_H_D, atol=1e-6)
+    assert made.depth_camera == CameraIdentity("HoloLens 2 AHAT")
+    assert made.depth_intrinsics.width == 512
+    assert "T_H_D" not in made.origins
+    with pytest.raises(HandcalError, match="not realsense"):
+        run(*make, "--factory", "realsense")
+    with pytest.raises(HandcalError, match="either --stereo or --factory"):
+        run(*make)

@@ -10,9 +10,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import handcal
+from handcal.geometry import rigid
+from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
+from handcal.sim.hand import make_hand
+from handcal.sim.render import World, render
+from handcal.sim.room import make_room
+from handcal.types import Intrinsics
+from tests.camera.hl2ss_server import Hl2ssServer, ahat_payload, calibration_of, packet_of
 from tests.helpers import ROOT, write_small_rig, write_thin_session
 
 pytestmark = pytest.mark.process
@@ -20,6 +28,8 @@ pytestmark = pytest.mark.process
 EXAMPLES = ROOT / "examples"
 ELSEWHERE = {"08_headset_client.py": "tests/link/test_headset_example.py"}
 """Run by a test of their own."""
+WIDE = Intrinsics(480, 480, 230.0, 230.0, 239.5, 239.5)
+HELD_UP = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
 
 
 def run(name: str, *words: object, code: int = 0) -> str:
@@ -105,6 +115,19 @@ def test_a_figure_is_plotted(tmp_path: Path) -> None:
     assert (tmp_path / "new/figure.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_hololens_shows_a_hand_in_the_world() -> None:
+    depth_m, _ = render(World(make_hand(1), make_room(1)), np.eye(4), HELD_UP, WIDE)
+    images = sense_distance(
+        depth_m, np.full_like(depth_m, 0.5), WIDE, np.random.default_rng(0), AhatSettings()
+    )
+    packet = packet_of(1, ahat_payload(*images), rigid(translation_m=[1.0, 2.0, 3.0]))
+    with Hl2ssServer(calibration_of(ahat_rays(), np.eye(4)), lambda: packet) as server:
+        said = run("10_hololens2.py", "127.0.0.1", "--port", server.port, "--frames", 2)
+    assert said.count("camera at [1000. 2000. 3000.] mm; hand at [") == 2
+    (x_mm, y_mm, z_mm) = numbers(r"(-?\d+)\.", said.rpartition("hand at [")[2])
+    assert (x_mm, y_mm, z_mm) == pytest.approx((1000.0, 2000.0, 3490.0), abs=40.0)
+
+
 @pytest.mark.parametrize(
     ("name", "words", "message"),
     [
@@ -145,7 +168,7 @@ def test_a_figure_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 def test_every_example_is_run_and_has_a_docstring_and_a_main() -> None:
     tested = Path(__file__).read_text(encoding="utf-8")
     names = sorted(path.name for path in EXAMPLES.glob("*.py"))
-    assert len(names) == 9
+    assert len(names) == 10
     for name in names:
         if name in ELSEWHERE:
             assert name in (ROOT / ELSEWHERE[name]).read_text(encoding="utf-8")

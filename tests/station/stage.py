@@ -103,9 +103,10 @@ class Stage:
         T: Float64 = T_W_H,
         *,
         pose: bool = True,
+        told: Float64 | None = None,
         thumb_out_rad: float = 0.0,
     ) -> Observation:
-        """Step with the next frame, of a hand or none."""
+        """Step with the next frame, of a hand or none; `told` is the pose it tells."""
         self.t_ns += PERIOD_NS
         self._frames += 1
         if pose:
@@ -113,9 +114,8 @@ class Stage:
         t_camera_ns = self.t_ns + CAMERA_AHEAD_NS
         depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad).copy()
         depth[0, 0] = self._frames % 1000  # a live picture always changes
-        return self.calibration.step(
-            Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
-        )
+        frame = Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
+        return self.calibration.step(replace(frame, T_W_D=told))
 
     def hold(self, T_D_hand: Float64 = T_D_HAND, frames: int = 7) -> Observation:
         """Hold the hand still for a while."""

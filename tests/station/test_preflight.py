@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ import pytest
 from handcal.camera.folder import record_folder
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.sdk_devices import Device
-from handcal.camera.settings import RealSenseSettings
+from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.errors import LinkError
 from handcal.io.resources import resource_path
 from handcal.link.pairing import new_pairing_key
@@ -26,7 +27,7 @@ from handcal.rig.rig_file import write_rig
 from handcal.station import preflight
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part, check_station, is_ready
-from handcal.station.settings import StationSettings
+from handcal.station.settings import StationSettings, with_source
 from handcal.types import CameraIdentity, Frame, Intrinsics
 
 KEY = new_pairing_key()
@@ -89,6 +90,28 @@ def test_a_realsense_is_found_or_missed(
     )
     devices[0] = replace(D415, usb="2.1")
     assert find("camera", live).health is Health.LIMITED
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("realsense", {"source": "realsense"}),
+        ("simulator", {"source": "simulator"}),
+        ("a/recording", {"source": "recording", "recording": "a/recording"}),
+        ("hololens2:hl", {"source": "hololens2", "hololens2": HoloLens2Settings("hl")}),
+    ],
+)
+def test_a_source_names_the_camera(source: str, expected: dict[str, Any]) -> None:
+    assert with_source(StationSettings(), source) == replace(StationSettings(), **expected)
+
+
+def test_a_hololens_needs_its_address(settings: StationSettings) -> None:
+    live = replace(settings, source="hololens2", headset="network")
+    assert find("camera", live).found == "no HoloLens 2 is chosen"
+    there = replace(live, hololens2=HoloLens2Settings("192.168.1.7"))
+    finding = find("camera", there)
+    assert finding.found == "HoloLens 2 AHAT at 192.168.1.7, not tried yet"
+    assert finding.health is Health.LIMITED
 
 
 @pytest.mark.parametrize("source", ["realsense", "recording"])

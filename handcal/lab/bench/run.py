@@ -9,6 +9,7 @@ from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from handcal.lab.bench.cameras import measure_cameras
 from handcal.lab.bench.delivery import measure_delivery
 from handcal.lab.bench.measured_clouds import measure_covariance, measure_cuts
 from handcal.lab.bench.offline import measure_offline
@@ -28,6 +29,7 @@ PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "wearer": measure_wearer,
     "cuts": measure_cuts,
     "covariance": measure_covariance,
+    "cameras": measure_cameras,
     "offline": measure_offline,
     "paper_simulation": measure_paper_simulation,
     "scale": measure_scale,

@@ -34,6 +34,8 @@ class BenchSettings:
     """Rigs calibrated from rendered photographs, which takes minutes for each."""
     offline_wearers: int = 100
     """Wearers who calibrate with each of these rigs, and with the true one."""
+    camera_wearers: int = 20
+    """Wearers who calibrate with each simulated depth camera; 0 to skip it."""
     study_trials: int = 8
     """Alignments per value in a small noise study, run twice; 0 to skip it."""
 
@@ -50,6 +52,7 @@ QUICK = BenchSettings(
     peer_points=(500, 1000, 2000),
     peer_trials=1,
     offline_rigs=0,
+    camera_wearers=0,
     study_trials=0,
 )
 """Smoke-test settings: a few seconds; the figures are not meaningful."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -43,6 +43,9 @@ from handcal.types import (
 
 EyeDistanceSource: TypeAlias = Literal["none", "ruler", "headset"]
 
+See: TypeAlias = Callable[[np.random.Generator, StudyWearer, Float64], tuple[Float64, Bool]]
+"""Returns, for the hand's pose T_H_hand (4, 4), points (N, 3) in H, and which are beside a cut."""
+
 _OUTLINE_FROM_POINTS = 1500
 _FOREARM_M = 0.04
 _EYE_DISTANCE_SIGMA_M = 0.001
@@ -67,6 +70,8 @@ class ProcedureModel:
     eye_distance: EyeDistanceSource = "none"
     prior: LearnedPrior | None = None
     """As learned from earlier sessions; None for the default."""
+    see: See | None = None
+    """Measures the hand with a simulated camera; None: `points` of its ideal surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,6 +166,8 @@ def _raise(rng: np.random.Generator, wearer: StudyWearer, model: ProcedureModel)
 def _see(
     rng: np.random.Generator, wearer: StudyWearer, model: ProcedureModel, T_H_hand: Float64
 ) -> tuple[Float64, Bool]:
+    if model.see is not None:
+        return model.see(rng, wearer, T_H_hand)
     points_D_m, is_cut = visible_points(
         wearer.hand,
         invert(wearer.rig.T_H_D) @ T_H_hand,

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLineEdit, QStackedWidget, QWidget
 
 from handcal.camera.recordings import RECORDING_SUFFIXES
-from handcal.camera.settings import RealSenseSettings
+from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.station.settings import Source, StationSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
 from handcal_gui.translation import tr
@@ -18,6 +18,7 @@ from handcal_gui.widgets.path_field import PathField
 _SOURCES: dict[Source, str] = {
     "simulator": tr("Simulator"),
     "realsense": "RealSense",
+    "hololens2": "HoloLens 2",
     "recording": tr("Recording"),
 }
 _PATTERN = tr("RealSense recordings ({})").format(
@@ -26,7 +27,7 @@ _PATTERN = tr("RealSense recordings ({})").format(
 
 
 class CameraField(QWidget):
-    """Simulator, RealSense with serial number and settings, or a recording with its path.
+    """Simulator, RealSense with its settings, HoloLens 2 by address, or a recording by path.
 
     Attributes
     ----------
@@ -52,14 +53,19 @@ class CameraField(QWidget):
         )
         camera = QWidget()
         fill_row(camera, self._serial, edit, grows=self._serial)
+        self._host = with_name(
+            QLineEdit(placeholderText=tr("Address of the headset")), "hololens2Host", tr("Address")
+        )
+        self._hololens2 = HoloLens2Settings()
         self._recording = PathField(tr("Recording"), "either", _PATTERN)
         details = QStackedWidget()
-        for page in (QWidget(), camera, self._recording):  # in the order of _SOURCES
+        for page in (QWidget(), camera, self._host, self._recording):  # in the order of _SOURCES
             details.addWidget(page)
         fill_row(self, self._source, details, grows=details)
         self._source.currentIndexChanged.connect(details.setCurrentIndex)
         self._source.currentIndexChanged.connect(self.changed)
         self._serial.textChanged.connect(self.changed)
+        self._host.textChanged.connect(self.changed)
         edit.clicked.connect(self.edit_realsense)
         self._recording.changed.connect(self.changed)
 
@@ -68,6 +74,8 @@ class CameraField(QWidget):
         self._source.setCurrentIndex(self._source.findData(settings.source))
         self._realsense = settings.realsense
         self._serial.setText(settings.realsense.serial)
+        self._hololens2 = settings.hololens2
+        self._host.setText(settings.hololens2.host)
         self._recording.set_path(settings.recording)
 
     def take(self, settings: StationSettings) -> StationSettings:
@@ -76,6 +84,7 @@ class CameraField(QWidget):
             settings,
             source=self._source.currentData(),
             realsense=replace(self._realsense, serial=self._serial.text().strip()),
+            hololens2=replace(self._hololens2, host=self._host.text().strip()),
             recording=self._recording.path,
         )
 

@@ -28,7 +28,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.playback import PlaybackSettings
-from handcal.camera.settings import RealSenseSettings
+from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
@@ -287,6 +287,16 @@ def test_what_is_set_of_a_realsense_reaches_the_settings(
     assert chosen == replace(before, temporal_filter=True)
     find(page, QLineEdit, "serial").setText("43")
     assert page.new.settings.realsense == replace(chosen, serial="43")
+
+
+def test_the_address_of_a_hololens_reaches_the_settings(
+    open_page: Callable[..., StartPage],
+) -> None:
+    chosen = HoloLens2Settings("192.168.1.7", divisor=5)
+    page = open_page(source="hololens2", headset="network", hololens2=chosen)
+    assert page.new.settings.hololens2 == chosen
+    find(page, QLineEdit, "hololens2Host").setText(" hl.local ")
+    assert page.new.settings.hololens2 == replace(chosen, host="hl.local")
 
 
 def test_the_gate_stays_open(open_page: Callable[..., StartPage]) -> None:

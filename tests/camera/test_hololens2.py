@@ -1,0 +1,335 @@
+"""A HoloLens 2 as depth camera, before a stand-in for its server."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+import pytest
+
+from handcal.camera.feed import CameraFeed, FeedSettings
+from handcal.camera.hl2ss import STREAMS, parse_calibration
+from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+from handcal.camera.radial import is_not_wrapped, white_brightness
+from handcal.camera.settings import HoloLens2Settings
+from handcal.errors import CameraError, CameraTimeoutError
+from handcal.geometry import rigid
+from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
+from handcal.sim.hand import make_hand
+from handcal.sim.render import World, render
+from handcal.sim.room import make_room
+from handcal.types import Float32, Float64, Frame, Intrinsics, UInt16
+from tests.camera.hl2ss_server import (
+    AHAT_REQUEST,
+    LONG_THROW_REQUEST,
+    Hl2ssServer,
+    ahat_payload,
+    calibration_of,
+    color_payload,
+    long_throw_payload,
+    packet_of,
+)
+from tests.helpers import eventually
+
+T_H_D: Float64 = rigid([0.2, -0.1, 0.05], [0.02, -0.03, 0.01])
+T_W_H: Float64 = rigid([0.3, 0.5, -0.2], [1.0, -2.0, 3.0])
+T_W_C: Float64 = T_W_H @ rigid([0.3, 0.0, 0.0], [0.01, 0.02, 0.03])
+HELD_UP = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
+WIDE = Intrinsics(720, 720, 345.0, 345.0, 359.5, 359.5)
+CALIBRATION = calibration_of(ahat_rays(), T_H_D)
+FLAT = np.full((512, 512), 500, np.uint16)
+PACKET = packet_of(123_456, ahat_payload(FLAT, FLAT), T_W_H)
+Serve: TypeAlias = Callable[..., HoloLens2Settings]
+
+
+@pytest.fixture
+def serve() -> Iterator[Serve]:
+    """Return a function that serves a calibration and a packet, again and again."""
+    with ExitStack() as stack:
+
+        def serve(
+            packet: bytes | Callable[[], bytes | None] = PACKET,
+            calibration: bytes = CALIBRATION,
+            **how: object,
+        ) -> HoloLens2Settings:
+            next_packet = packet if callable(packet) else lambda: packet
+            server = stack.enter_context(Hl2ssServer(calibration, next_packet))
+            serve.server = server  # type: ignore[attr-defined]
+            return HoloLens2Settings("127.0.0.1", port=server.port, **how)  # type: ignore[arg-type]
+
+        yield serve
+
+
+def view(settings: HoloLens2Settings) -> Frame:
+    with HoloLens2Camera(settings) as camera:
+        return camera.read(5.0)
+
+
+def sensed(depth_m: Float32, reflectance: float | Float32, **how: float) -> tuple[UInt16, UInt16]:
+    shares = np.broadcast_to(np.float32(reflectance), depth_m.shape)
+    rng = np.random.default_rng(0)
+    return sense_distance(depth_m, shares, WIDE, rng, AhatSettings(**how))
+
+
+@pytest.fixture(scope="module")
+def held_up() -> tuple[World, UInt16, UInt16]:
+    """Return a world with a hand before a white wall 1.7 m away, and its measurement."""
+    world = World(make_hand(1), make_room(1))
+    depth_m, _ = render(world, np.eye(4), HELD_UP, WIDE)
+    reflectance = np.where(depth_m < 0.75, 0.55, 0.8).astype(np.float32)
+    return world, *sensed(depth_m, reflectance)
+
+
+def test_depth_is_that_of_a_pinhole_camera(
+    serve: Serve, held_up: tuple[World, UInt16, UInt16]
+) -> None:
+    world, distance, brightness = held_up
+    frame = view(serve(packet_of(5, ahat_payload(distance, brightness), T_W_H)))
+    camera = frame.depth_intrinsics
+    assert (camera.width, camera.height, camera.distortion) == (512, 512, ())
+    assert (camera.fx, camera.fy) == pytest.approx((252.0, 252.0), rel=1e-3)
+    assert (camera.cx, camera.cy) == pytest.approx((257.0, 257.0), abs=0.05)
+    truth_m, _ = render(world, np.eye(4), HELD_UP, camera)
+    is_hand = truth_m < 0.75
+    error_m = frame.depth_scale_m * frame.depth - truth_m
+    seen = is_hand & (frame.depth > 0)
+    assert seen.sum() > 0.97 * is_hand.sum()
+    assert abs(np.median(error_m[seen])) < 0.0005
+    assert np.median(np.abs(error_m[seen])) < 0.002
+    # The wall shows 0.6 m, like something near, but is too dark for it.
+    assert np.count_nonzero(frame.depth[~is_hand]) < 0.03 * is_hand.sum()
+    assert frame.color is not None
+    assert frame.color[seen].mean() > 3.0 * frame.color[~is_hand].mean()
+
+
+def test_a_small_hand_tells_a_large_far_wall_apart() -> None:
+    """Most of what seems near is the wall: not it, but the brightest is taken for skin."""
+    distance_m = np.full((512, 512), 1.6 - 1.055, np.float32)
+    brightness = np.full((512, 512), 400.0 * 0.8 / 1.6**2, np.float32)
+    distance_m[200:250, 200:250] = 0.5
+    brightness[200:250, 200:250] = 400.0 * 0.55 / 0.5**2
+    brightness[:5, :5] = 10_000.0  # a mirror
+    white = white_brightness(distance_m, brightness)
+    assert white == pytest.approx(440.0)
+    is_near = is_not_wrapped(distance_m, brightness, 1.055, white)
+    assert is_near[200:250, 200:250].all()
+    assert np.count_nonzero(is_near) == 50 * 50 + 25
+    assert white_brightness(np.zeros_like(distance_m), brightness) == 0.0
+
+
+def test_a_plane_is_flat_up_to_the_sides(serve: Serve) -> None:
+    plane = sensed(np.full((720, 720), 0.45, np.float32), 0.5, noise=0.0, blur_px=0.1)
+    frame = view(serve(packet_of(5, ahat_payload(*plane), T_W_H)))
+    z_m = frame.depth_scale_m * frame.depth[frame.depth > 0]
+    assert z_m.size > 0.9 * frame.depth.size
+    np.testing.assert_allclose(z_m, 0.45, atol=0.0008)  # distances are in whole millimetres
+
+
+def test_a_frame_tells_its_pose_and_its_time(serve: Serve) -> None:
+    settings = serve()
+    with HoloLens2Camera(settings) as camera:
+        frame = camera.read(5.0)
+        np.testing.assert_allclose(camera.T_H_D, T_H_D, atol=1e-6)
+    assert frame.T_W_D is not None
+    np.testing.assert_allclose(frame.T_W_D, T_W_H @ T_H_D, atol=1e-6)
+    assert frame.t_camera_ns == 12_345_600
+    assert serve.server.requests == [b"\x02", AHAT_REQUEST]  # type: ignore[attr-defined]
+
+
+def test_long_throw_comes_as_png(serve: Serve) -> None:
+    rays = np.dstack(np.meshgrid((np.arange(320) - 160) / 200, (np.arange(288) - 144) / 200))
+    distance = np.full((288, 320), 2000, np.uint16)
+    packet = packet_of(9, long_throw_payload(distance, distance // 20), T_W_H)
+    calibration = calibration_of(rays.astype(np.float32), T_H_D, alias=None)
+    frame = view(serve(packet, calibration, stream="longthrow"))
+    assert frame.depth_scale_m * frame.depth[144, 160] == pytest.approx(2.0)
+    # Distances are from the centre, so z is smaller at the side.
+    assert frame.depth_scale_m * frame.depth[144, 0] == pytest.approx(
+        2.0 / np.hypot(1.0, 0.8), abs=1e-4
+    )
+    assert serve.server.requests[1] == LONG_THROW_REQUEST  # type: ignore[attr-defined]
+
+
+def pictures(ticks: int, fx: float = 500.0, T_W_C: Float64 | None = T_W_C) -> bytes:
+    """Return a picture, red above and blue below."""
+    image = np.zeros((360, 640, 3), np.uint8)
+    image[:180, :, 0] = image[180:, :, 2] = 200
+    return packet_of(ticks, color_payload(image, fx, 501.0, 320.0, 180.0), T_W_C)
+
+
+def test_the_front_camera_is_the_colour(serve: Serve) -> None:
+    color = serve(pictures(123_456 + 400_000))  # 40 ms later, the head has moved
+    front = serve.server  # type: ignore[attr-defined]
+    settings = replace(serve(), has_color=True, color_port=color.port)
+    with HoloLens2Camera(settings) as camera:
+        frames: list[Frame] = []
+
+        def has_color() -> bool:
+            frames.append(camera.read(5.0))
+            return frames[-1].color is not None
+
+        eventually(has_color)
+    frame = frames[-1]
+    assert frame.color is not None
+    assert frame.color_intrinsics == Intrinsics(640, 360, 500.0, 501.0, 320.0, 180.0)
+    np.testing.assert_allclose(frame.color[90, 320], [200, 0, 0], atol=12)
+    np.testing.assert_allclose(frame.color[270, 320], [0, 0, 200], atol=12)
+    np.testing.assert_allclose(frame.T_C_D, np.linalg.inv(T_W_C) @ T_W_H @ T_H_D, atol=1e-6)
+    eventually(lambda: len(front.requests) == 3)
+    assert [request[0] for request in front.requests] == [7, 1, 11]
+    assert [len(request) for request in front.requests] == [28, 14, 1]
+
+
+@pytest.mark.parametrize(
+    ("picture", "message"),
+    [
+        (pictures(123_456, fx=np.nan), "no camera of the requested size"),
+        (pictures(123_456, T_W_C=2.0 * T_W_C), "no pose"),
+        (pictures(123_456, T_W_C=None), "does not know where it is"),
+        (PACKET, "a payload of"),
+    ],
+    ids=["lens", "pose", "lost", "size"],
+)
+def test_a_foreign_picture_is_one_clear_error(serve: Serve, picture: bytes, message: str) -> None:
+    color = serve(picture)
+    settings = replace(serve(), has_color=True, color_port=color.port)
+
+    def fails() -> bool:
+        try:
+            camera.read(5.0)
+        except CameraError as error:
+            return message in str(error)
+        return False
+
+    with HoloLens2Camera(settings) as camera:
+        eventually(fails)
+
+
+def test_without_the_front_camera_there_is_one_clear_error(serve: Serve) -> None:
+    with Hl2ssServer(b"", lambda: None) as gone:
+        port = gone.port
+    with pytest.raises(CameraError, match="no hl2ss answers"):
+        HoloLens2Camera(replace(serve(), has_color=True, color_port=port))
+
+
+def test_invalid_distances_are_no_measurement(serve: Serve) -> None:
+    distance = FLAT.copy()
+    distance[:, 300:] = 4091
+    frame = view(serve(packet_of(5, ahat_payload(distance, FLAT), T_W_H)))
+    assert frame.depth[:, :290].all()
+    assert not frame.depth[:, 330:].any()  # the lens draws the sides together
+
+
+def test_a_lost_headset_gives_no_frame_until_it_knows_its_place(serve: Serve) -> None:
+    lost = packet_of(5, ahat_payload(FLAT, FLAT), None)
+    is_lost = True
+    with HoloLens2Camera(serve(lambda: lost if is_lost else PACKET)) as camera:
+        with pytest.raises(CameraTimeoutError, match="does not know where it is"):
+            camera.read(5.0)
+        is_lost = False
+
+        def is_back() -> bool:
+            with suppress(CameraTimeoutError):
+                return camera.read(5.0).T_W_D is not None
+            return False
+
+        eventually(is_back)
+
+
+@pytest.mark.parametrize(
+    ("packet", "message"),
+    [
+        (b"HTTP/1.1 400 Bad Request\r\n" * 4, "AHAT stream"),
+        (struct.pack("<QI", 5, 2**32 - 1), "a payload of 4294967295 bytes"),
+        (packet_of(5, b"\x00" * 1_048_592, T_W_H), "encoded images"),
+        (packet_of(2**63, PACKET[12:-64], T_W_H), "a time beyond"),
+        (packet_of(5, PACKET[12:-64], 2.0 * T_W_H), "no pose"),
+        (packet_of(5, PACKET[12:-64], np.nan * T_W_H), "no pose"),
+    ],
+    ids=["text", "size", "encoded", "time", "pose", "nan"],
+)
+def test_a_foreign_stream_is_one_clear_error(serve: Serve, packet: bytes, message: str) -> None:
+    with HoloLens2Camera(serve(packet)) as camera, pytest.raises(CameraError, match=message):
+        camera.read(5.0)
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        long_throw_payload(FLAT, FLAT),  # of another size
+        b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\x00\x01\x40\x00\x00\x01\x20" + 64 * b"\xff",
+        64 * b"\x00",
+    ],
+    ids=["size", "damaged", "none"],
+)
+def test_a_damaged_png_is_one_clear_error(serve: Serve, payload: bytes) -> None:
+    rays = np.dstack(np.meshgrid((np.arange(320) - 160) / 200, (np.arange(288) - 144) / 200))
+    calibration = calibration_of(rays.astype(np.float32), T_H_D, alias=None)
+    settings = serve(packet_of(5, payload, T_W_H), calibration, stream="longthrow")
+    with pytest.raises(CameraError, match="no PNG of"):
+        view(settings)
+
+
+@pytest.mark.parametrize(
+    "calibration",
+    [
+        calibration_of(np.zeros_like(ahat_rays()), T_H_D),
+        calibration_of(-ahat_rays(), T_H_D),
+        calibration_of(np.full_like(ahat_rays(), np.nan), T_H_D),
+        calibration_of(ahat_rays(), np.nan * T_H_D),
+        calibration_of(ahat_rays(), 2.0 * T_H_D),
+        calibration_of(ahat_rays(), T_H_D, units_per_m=0.0),
+        calibration_of(ahat_rays(), T_H_D, alias=np.inf),
+        CALIBRATION[:1000],
+        b"",
+    ],
+    ids=["zero", "backward", "nan", "nan pose", "scaled", "units", "alias", "cut off", "empty"],
+)
+def test_a_damaged_calibration_is_one_clear_error(serve: Serve, calibration: bytes) -> None:
+    with pytest.raises(CameraError, match=r"damaged|no calibration|ended the stream"):
+        HoloLens2Camera(serve(calibration=calibration))
+
+
+def test_rays_that_are_none_at_the_corners_are_left_out() -> None:
+    rays = ahat_rays().copy()
+    rays[:90, :90] = np.inf
+    calibration = parse_calibration(STREAMS["ahat"], calibration_of(rays, T_H_D))
+    assert calibration.alias_m == pytest.approx(1.055)
+    assert np.isinf(calibration.rays[0, 0, 0])
+
+
+def test_nobody_there_is_one_clear_error() -> None:
+    with Hl2ssServer(b"", lambda: None) as server:
+        port = server.port
+    with pytest.raises(CameraError, match=r"no hl2ss answers at 127\.0\.0\.1"):
+        HoloLens2Camera(HoloLens2Settings("127.0.0.1", port=port))
+    with pytest.raises(CameraError, match="say which HoloLens 2"):
+        HoloLens2Camera(HoloLens2Settings())
+
+
+def test_a_stream_that_ends_is_opened_again(serve: Serve) -> None:
+    left = [PACKET, None, PACKET, PACKET[:5000], None]
+    settings = serve(lambda: left.pop(0) if left else PACKET)
+    with CameraFeed(lambda: HoloLens2Camera(settings), FeedSettings(reopen_s=0.01)) as feed:
+        eventually(feed.read)
+        eventually(lambda: feed.read() is None and "ended the stream" in feed.status.problem)
+        eventually(lambda: feed.read() and not left)
+        assert not feed.status.problem
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("hololens2:192.168.1.7", HoloLens2Settings("192.168.1.7")),
+        ("hololens2:hl,color", HoloLens2Settings("hl", has_color=True)),
+        ("hololens2:hl.local,longthrow", HoloLens2Settings("hl.local", "longthrow")),
+        ("realsense", None),
+        ("hololens2", None),
+    ],
+)
+def test_a_source_names_the_headset(source: str, expected: HoloLens2Settings | None) -> None:
+    assert hololens2_settings(source) == expected

@@ -1,0 +1,14 @@
+"""Whole calibrations with simulated depth cameras."""
+
+from dataclasses import replace
+
+from handcal.lab.bench import QUICK
+from handcal.lab.bench.cameras import measure_cameras
+from handcal.progress import Progress
+
+
+def test_each_camera_calibrates_the_same_wearer() -> None:
+    measured = measure_cameras(replace(QUICK, camera_wearers=1), Progress())
+    assert [len(errors) for errors in measured.details.values()] == [2, 2]
+    # Without a calibration these eyes are wrong by 15′ and 8′.
+    assert max(max(errors) for errors in measured.details.values()) < 5.0
