@@ -133,6 +133,7 @@ def solve_again(
             contradictions=record.facts.contradictions,
             verified=record.facts.verified,
             plan="recommended" if record.facts.plan == "recommended" else None,
+            usable_eyes=record.facts.usable_eyes,
         )
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error
