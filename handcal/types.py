@@ -370,7 +370,7 @@ class EyeShift:
 
 
 def phi_text(shift: EyeShift) -> str:
-    """Return φ ± σ in one line: ``φ = (-4.04 ± 0.70, +0.82 ± 0.68, +2.15 ± 1.80) mm``."""
+    """Return φ ± σ in one line: ``φ = (-3.91 ± 0.69, +0.74 ± 0.66, +1.91 ± 1.90) mm``."""
     return f"φ = ({', '.join(_coordinates_mm(shift))}) mm"
 
 

@@ -8,7 +8,7 @@ measure the error of the result.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +17,6 @@ import numpy as np
 
 from handcal.display import reprojection_arcmin
 from handcal.errors import HandcalError
-from handcal.link.server import LinkStatistics
 from handcal.progress import Progress
 from handcal.register.fuse import eye_position_m
 from handcal.register.solve import solve_alignment
@@ -26,22 +25,21 @@ from handcal.sim.hand import Side
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
+from handcal.station.follow import Patience, deliver, follow_plan
 from handcal.station.former import SLIP_M
-from handcal.station.plan import NextStep, PlanSettings, StepName, paper_alignments, usable_eyes
-from handcal.station.procedure import Calibration, Observation, State
+from handcal.station.plan import PlanSettings, paper_alignments, usable_eyes
+from handcal.station.procedure import Calibration, Observation
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName, Rig
 
-_DELIVERY_S = 5.0
-_PATIENCE_S = 60.0
+# A slow computer gets more time.
+_PATIENCE = Patience(60.0, frames=300)
 _RULER_SIGMA_M = 0.001
 _RULER, _SLIP = 1, 2  # their random numbers are not the wearer's
 _LASTING_S = 4.0
 """Passing evidence, such as a late camera on a busy computer, counts if it lasts this long."""
-_PATIENCE_STEPS = 300
-"""Minimum number of station steps before giving up, so that a slow computer gets more time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,15 +127,15 @@ def run_demo(
         if settings.eye_distance == "ruler":
             station.calibration.set_eye_distance(measured)
         begun_m = dict(station.calibration.applied_shift_m)
-        progress.at(0.0, "Connecting to the virtual headset")
+        watch = _Watch(station.calibration)
+        station.watch(watch.see)
+        alignments = paper_alignments(settings.eyes, settings.alignments)
         try:
-            if _is_automatic(settings):
-                watch = _watch_plan(station, progress)
-            else:
-                watch = _follow_plan(station, settings, progress)
+            follow_plan(station, alignments, _PATIENCE, progress)
+            seconds = watch.seconds
+            statistics = deliver(station).link
         except ContradictedError as error:
             return _contradicted(station, settings, error.contradiction)
-        statistics = _delivered(station)
         station.finish()
     calibration, rig = station.calibration, station.rig
     return {
@@ -145,7 +143,7 @@ def run_demo(
         "session": str(station.session.path),
         "alignments": len(calibration.alignments),
         "plan": settings.plan,
-        "seconds": watch.seconds,
+        "seconds": seconds,
         **_judge(calibration, station, settings, begun_m),
         "guard": {
             "rejected": calibration.refused,
@@ -174,15 +172,6 @@ class ContradictedError(HandcalError):
     def __init__(self, contradiction: Contradiction) -> None:
         super().__init__(contradiction.text)
         self.contradiction = contradiction
-
-
-def _require_no_contradiction(calibration: Calibration, passing: Contradiction | None) -> None:
-    """Raise ContradictedError if evidence, passing or not, lets no alignment be taken."""
-    found = [*calibration.evidence.contradictions]
-    if passing is not None:
-        found.append(passing)
-    if found and not calibration.alignments:
-        raise ContradictedError(found[0])
 
 
 def _contradicted(
@@ -240,14 +229,6 @@ def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
         raise HandcalError(f"the worn rig is not of a person: {problem}") from problem
 
 
-def _delivered(station: Station) -> LinkStatistics:
-    """Return the link's counters once every message is acknowledged, or after a while."""
-    deadline_s = time.monotonic() + _DELIVERY_S
-    while (statistics := station.step().link).unacked and time.monotonic() < deadline_s:
-        pass
-    return statistics
-
-
 def _is_automatic(settings: DemoSettings) -> bool:
     """Return whether the station follows the plan by itself; else the script does."""
     return settings.plan == "recommended" or bool(settings.former)
@@ -257,91 +238,33 @@ def _is_automatic(settings: DemoSettings) -> bool:
 class _Watch:
     """Watches a station step by step."""
 
-    station: Station
+    calibration: Calibration
     seen: list[Observation] = field(default_factory=list)
     began_s: float | None = None
-    ended_s: float = 0.0
+    fine_s: float = field(default_factory=time.monotonic)
+    """Time of the newest frame without evidence against it."""
 
     @property
     def seconds(self) -> float:
-        """Time from the first sight of the hand to the newest result."""
-        return 0.0 if self.began_s is None else self.ended_s - self.began_s
+        """Time since the first sight of the hand."""
+        return 0.0 if self.began_s is None else time.monotonic() - self.began_s
 
-    def until(self, is_reached: Callable[[Snapshot, Observation], bool], complaint: str) -> None:
-        """Step until something is reached; HandcalError after a while or for a problem."""
-        fine_s = time.monotonic()
-        deadline_s = fine_s + _PATIENCE_S
-        steps = 0
-        while time.monotonic() < deadline_s or steps < _PATIENCE_STEPS:
-            steps += 1
-            self.station.require_headset()
-            snapshot = self.station.step()
-            if snapshot.problem:
-                raise HandcalError(snapshot.problem)
-            observation = snapshot.observation
-            if observation is not None:
-                self.seen.append(observation)
-                if self.began_s is None and observation.hand is not None:
-                    self.began_s = time.monotonic()
-                passing, now_s = observation.contradiction, time.monotonic()
-                fine_s = now_s if passing is None else fine_s
-                lasts = now_s - fine_s > _LASTING_S
-                _require_no_contradiction(self.station.calibration, passing if lasts else None)
-                if is_reached(snapshot, observation):
-                    self.ended_s = time.monotonic()
-                    return
-        raise HandcalError(f"{complaint} within {_PATIENCE_S:.0f} s")
-
-
-def _watch_plan(station: Station, progress: Progress) -> _Watch:
-    """Let the station follow its plan to the end."""
-    watch = _Watch(station)
-    last: NextStep | None = None
-
-    def is_other(snapshot: Snapshot, _seen: Observation) -> bool:
-        step = snapshot.procedure.next_step
-        is_new = step is not None and (step.name, step.eyes) != (last and (last.name, last.eyes))
-        return is_new and (step is None or step.name not in _PASSING)
-
-    share = 0.0
-    while last is None or last.name is not StepName.DONE:
-        watch.until(
-            is_other, f"the wearer did not get beyond: {last.text if last else 'the start'}"
-        )
-        last = station.plan.next_step(watch.seen[-1].is_steady)
-        share += 0.15 * (0.9 - share)  # how many steps remain is not known
-        progress.at(share, f"{' and '.join(last.eyes)} {last.text}".strip())
-    return watch
-
-
-_PASSING = (StepName.SOLVE, StepName.APPLY, StepName.WAIT, StepName.CURSOR, StepName.VERIFY)
-
-
-def _follow_plan(station: Station, settings: DemoSettings, progress: Progress) -> _Watch:
-    """Do every planned alignment of the paper's plan; solve and apply after each."""
-    calibration = station.calibration
-    plan = paper_alignments(settings.eyes, settings.alignments)
-    watch = _Watch(station)
-
-    for number, eyes in enumerate(plan):
-        which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
-        label = f"Alignment {number + 1} of {len(plan)}, {which}"
-        progress.at((number + 0.1) / len(plan), f"{label}: waiting for a steady hand")
-        watch.until(
-            lambda _, seen: seen.is_steady and calibration.is_applied,
-            "the wearer did not hold the hand still",
-        )
-        calibration.make_cursor(eyes)
-        progress.at((number + 0.3) / len(plan), f"{label}: wearer aligns")
-        watch.until(
-            lambda _, seen: seen.state is State.ALIGNED, "the wearer did not align the hand"
-        )
-        progress.at((number + 0.9) / len(plan), f"{label}: solving")
-        calibration.solve()
-        calibration.apply()
-        calibration.wait_applied()
-        progress.at((number + 1.0) / len(plan), f"{label}: applied and acknowledged")
-    return watch
+    def see(self, snapshot: Snapshot) -> None:
+        """Take a snapshot; ContradictedError if evidence lets no alignment be taken."""
+        observation, now_s = snapshot.observation, time.monotonic()
+        if observation is None:
+            return
+        self.seen.append(observation)
+        if self.began_s is None and observation.hand is not None:
+            self.began_s = now_s
+        passing = observation.contradiction
+        if passing is None:
+            self.fine_s = now_s
+        found = [*self.calibration.evidence.contradictions]
+        if passing is not None and now_s - self.fine_s > _LASTING_S:
+            found.append(passing)
+        if found and not self.calibration.alignments:
+            raise ContradictedError(found[0])
 
 
 def _judge(

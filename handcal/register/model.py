@@ -100,3 +100,31 @@ def balance(cursor_m: Float64, hand_m: Float64, shift_m: Float64, distance_m: fl
         wanted = [left_x.sum(), left_y.sum(), -(left_x @ slope_x + left_y @ slope_y)]
         shift_m = shift_m - np.linalg.solve(normal, wanted)
     return shift_m
+
+
+def balanced_turn(outline_m: Float64, R: Float64, about_m: Float64) -> Float64:
+    """Return the movement, (3,), by which a wearer balances a turned hand on its cursor.
+
+    An outline that is turned about a point covers the outline as it was nowhere exactly. The
+    wearer moves the hand to where both differ least, by least squares in the image.
+
+    Parameters
+    ----------
+    outline_m : (N, 3) float64
+        The cursor's outline, in E.
+    R : (3, 3) float64
+        The turned outline is ``about_m + (outline_m - about_m) @ R``.
+    about_m : (3,) float64
+    """
+    drawn = outline_m[:, :2] / outline_m[:, 2:]
+    turned_m = about_m + (outline_m - about_m) @ R
+    moved_m = np.zeros(3)
+    J = np.zeros((len(outline_m), 2, 3))
+    for _ in range(_BALANCE_STEPS):
+        at_m = turned_m + moved_m
+        seen = at_m[:, :2] / at_m[:, 2:]
+        J[:, 0, 0] = J[:, 1, 1] = 1.0 / at_m[:, 2]
+        J[:, :, 2] = -seen / at_m[:, 2:]
+        rows = J.reshape(-1, 3)
+        moved_m -= np.linalg.solve(rows.T @ rows, rows.T @ (seen - drawn).ravel())
+    return moved_m

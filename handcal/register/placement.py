@@ -85,7 +85,7 @@ def next_alignment(
     """Return a plan's next alignment, or None if none is needed now or the most were made.
 
     Of ``paper``: both eyes, the cursor where the hand is. Of ``recommended``: left, right and both
-    in turn, each cursor where it tells most. None is needed before each eye is verified
+    in turn, each cursor where it tells most. None is needed while an eye is to be verified
     (`next_check`), nor once every eye is accepted or keeps its offline calibration.
 
     Parameters
@@ -116,7 +116,7 @@ def next_alignment(
         If nearly all points of the hand lie at cut edges.
     """
     fewest = settings.fewest if plan == "recommended" else 1
-    is_enough = results is not None and _is_enough(plan, results, usable_eyes)
+    is_enough = results is not None and _is_enough(plan, results, usable_eyes, settings)
     if len(done) >= settings.most or (len(done) >= fewest and is_enough):
         return None
     eyes = planned_eyes(plan, done, usable_eyes)
@@ -156,22 +156,35 @@ def next_check(
     if results is None:
         return None
     counts = {eye: len(one.earlier) + 1 for eye, one in verified.items()}
-    wanted = [
+    wanted = _to_verify(results, counts, usable_eyes, settings)
+    return min(wanted, key=lambda eye: counts.get(eye, 0), default=None)
+
+
+def _to_verify(
+    results: Results,
+    counts: Mapping[Eye, int],
+    usable_eyes: Sequence[Eye],
+    settings: PlacementSettings,
+) -> list[Eye]:
+    """Return the eyes to verify: each once, and again while it is not accepted."""
+    return [
         eye
         for eye in usable_eyes
         if eye in results.verdicts
         and counts.get(eye, 0) < settings.checks
-        and (eye not in counts or results.verdicts[eye].name in ("repeat", "keep"))
+        and (not counts.get(eye) or results.verdicts[eye].name in ("repeat", "keep"))
     ]
-    return min(wanted, key=lambda eye: counts.get(eye, 0), default=None)
 
 
-def _is_enough(plan: PlanName, results: Results, usable_eyes: Sequence[Eye]) -> bool:
-    """Return whether no alignment is needed now: every eye is accepted or kept, or not verified."""
+def _is_enough(
+    plan: PlanName, results: Results, usable_eyes: Sequence[Eye], settings: PlacementSettings
+) -> bool:
+    """Return whether no alignment is needed now: an eye is to be verified, or all are judged."""
     if not set(results.verdicts) >= set(usable_eyes):
         return False
-    may_verify = plan == "recommended" and not set(results.fused.verified) >= set(usable_eyes)
-    return may_verify or all(one.name != "repeat" for one in results.verdicts.values())
+    counts = {eye: len(found) for eye, found in results.fused.verified.items()}
+    may_verify = plan == "recommended" and _to_verify(results, counts, usable_eyes, settings)
+    return bool(may_verify) or all(one.name != "repeat" for one in results.verdicts.values())
 
 
 def _places(

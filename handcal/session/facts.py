@@ -12,6 +12,7 @@ import numpy as np
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
 from handcal.types import (
+    EYES,
     CameraIdentity,
     Eye,
     EyeDistance,
@@ -68,6 +69,8 @@ class SessionFacts:
     headset: HeadsetIdentity | None = None
     plan: EyePlan | PlanName | None = None
     """The plan that was followed, or only the order in which the eyes were aligned."""
+    usable_eyes: tuple[Eye, ...] = EYES
+    """The eyes that the plan calibrates: one for a wearer who sees with one."""
     former: str = ""
     """Name of the session with whose φ this one began; empty if with none."""
     eye_distance: EyeDistance | None = None
@@ -79,6 +82,8 @@ class SessionFacts:
     """Names of what supports and what contradicts the results."""
 
     def __post_init__(self) -> None:
+        if not self.usable_eyes or len(set(self.usable_eyes)) < len(self.usable_eyes):
+            raise ValueError("usable_eyes must name one eye, or both once")
         object.__setattr__(self, "verified", MappingProxyType(dict(self.verified)))
 
 

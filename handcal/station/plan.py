@@ -8,7 +8,7 @@ its verdict, or when nothing more is to be gained.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -100,23 +100,36 @@ class Plan:
     settings : PlanSettings
     checks_first : bool
         True if the headset draws with a stored φ, which is verified before anything else.
+    skipped : collection of eye
+        Eyes that are not verified: those skipped before the session was resumed.
+
+    Attributes
+    ----------
+    skipped : set of eye
     """
 
     def __init__(
-        self, calibration: Calibration, settings: PlanSettings, checks_first: bool = False
+        self,
+        calibration: Calibration,
+        settings: PlanSettings,
+        checks_first: bool = False,
+        skipped: Collection[Eye] = (),
     ) -> None:
         self.settings = settings
         self._calibration = calibration
         self._checks_first = checks_first
         self._decided: tuple[object, Planned | None] | None = None
         self._is_over = False
-        self._skipped: set[Eye] = set()
+        self.skipped = set(skipped)
 
     def next_step(self, is_steady: bool) -> NextStep:
         """Return the next step; nothing changes. `is_steady`: the hand is in view and still."""
         calibration = self._calibration
         if (name := _BY_STATE.get(calibration.state)) is not None:
             return NextStep(name, calibration.eyes, _TEXTS[name])
+        if calibration.results is None and (calibration.alignments or calibration.verifications):
+            # One was deleted or restored, or the eye distance has changed.
+            return NextStep(StepName.SOLVE, calibration.eyes, _TEXTS[StepName.SOLVE])
         unverified = self._unverified()
         if self._checks_first and not calibration.alignments and unverified:
             return self._with_hand(StepName.VERIFY, unverified[:1], is_steady)
@@ -174,7 +187,7 @@ class Plan:
         FileError
             If the session cannot be written; the verification ends anyway.
         """
-        self._skipped |= {*self._calibration.eyes} if self._calibration.verifying else set()
+        self.skipped |= {*self._calibration.eyes} if self._calibration.verifying else set()
         self._calibration.skip_verification()
 
     def _make_cursor(self, planned: Planned) -> None:
@@ -212,7 +225,7 @@ class Plan:
         return self._decided[1]
 
     def _unverified(self) -> tuple[Eye, ...]:
-        done = {*self._calibration.verifications, *self._skipped}
+        done = {*self._calibration.verifications, *self.skipped}
         return tuple(eye for eye in self.settings.usable_eyes if eye not in done)
 
     def _reason_to_end(self, unverified: tuple[Eye, ...]) -> str | None:
@@ -238,7 +251,7 @@ class Plan:
         return next_check(
             self._calibration.results,
             self._calibration.verifications,
-            usable_eyes=tuple(e for e in self.settings.usable_eyes if e not in self._skipped),
+            usable_eyes=tuple(e for e in self.settings.usable_eyes if e not in self.skipped),
             settings=self.settings.placement,
         )
 

@@ -57,7 +57,7 @@ def solve(
     >>> session = handcal.open_session("resources/example_session")
     >>> results = handcal.solve(session)
     >>> print(results.eyes["left"])
-    φ = (-4.04 ± 0.70, +0.82 ± 0.68, +2.15 ± 1.80) mm; rms 1.42 mm, 97 % inliers, converged
+    φ = (-3.91 ± 0.69, +0.74 ± 0.66, +1.91 ± 1.90) mm; rms 1.42 mm, 97 % inliers, converged
     >>> results.verdicts["left"].name
     'accept'
     """
@@ -133,6 +133,7 @@ def solve_again(
             contradictions=record.facts.contradictions,
             verified=record.facts.verified,
             plan="recommended" if record.facts.plan == "recommended" else None,
+            usable_eyes=record.facts.usable_eyes,
         )
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error

@@ -46,8 +46,9 @@ from handcal.station.procedure import Calibration, Observation, ProcedureError, 
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.solve_again import stored_solve_settings
+from handcal.station.verifying import skipped_eyes
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import Eye, Float64, Frame, HeadsetIdentity, Target
+from handcal.types import EYES, Eye, Float64, Frame, HeadsetIdentity, PlanName, Target
 
 _VIEW_PERIOD_S = 0.1
 _STORE_PERIOD_S = 1.0
@@ -140,9 +141,13 @@ class Station(Closable):
             plan = settings.plan
             if resume is not None:
                 is_recommended = facts.plan == "recommended"
-                plan = replace(plan, name="recommended" if is_recommended else "paper")
-            elif plan.name != "paper":
-                self.session.save_facts(plan=plan.name)
+                name: PlanName = "recommended" if is_recommended else "paper"
+                plan = replace(plan, name=name, usable_eyes=facts.usable_eyes)
+            else:
+                if plan.name != "paper":
+                    self.session.save_facts(plan=plan.name)
+                if plan.usable_eyes != EYES:
+                    self.session.save_facts(usable_eyes=plan.usable_eyes)
             if former is not None and resume is None:
                 self.session.save_facts(former=former.name)
                 self.session.save_fine_tuned(begun.shift_m)
@@ -157,7 +162,12 @@ class Station(Closable):
                 usable_eyes=plan.usable_eyes,
                 former_m=begun.shift_m,
             )
-            self.plan = Plan(self.calibration, plan, checks_first=bool(facts.former or former))
+            self.plan = Plan(
+                self.calibration,
+                plan,
+                checks_first=bool(facts.former or former),
+                skipped=skipped_eyes(self._record.events),
+            )
             self._stack = stack.pop_all()
         self.comparing = Comparing(self.session, self.show_offline)
         self._number = 0

@@ -22,7 +22,7 @@ from handcal.register.nudge import nudged_shift_m
 from handcal.session.journal import Event
 from handcal.session.state import SessionEvent
 from handcal.station.hands import PlacedHand
-from handcal.types import Eye, EyeDisplay, Float64, Rig, Verification
+from handcal.types import EYES, Eye, EyeDisplay, Float64, Rig, Verification
 
 VERIFYING = "verifying"
 """The journal's event at the start of a verification and after each nudge."""
@@ -218,6 +218,12 @@ def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Veri
     except (KeyError, TypeError, ValueError):
         return None  # the eye is verified from the start
     return verifying
+
+
+def skipped_eyes(events: Iterable[Event]) -> set[Eye]:
+    """Return the eyes whose verification was skipped in a session."""
+    named = [event.data.get("eye") for event in events if event.name == SKIPPED]
+    return {eye for eye in EYES if eye in named}
 
 
 def verify_prompt(eye: Eye) -> str:

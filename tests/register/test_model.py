@@ -2,10 +2,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from handcal.display import update_matrix
 from handcal.geometry import project, transform
-from handcal.register.model import cursor_displacement, design, fit_shift, predict
+from handcal.register.model import (
+    balanced_turn,
+    cursor_displacement,
+    design,
+    fit_shift,
+    predict,
+)
 
 SHIFTS = st.tuples(*[st.floats(-0.02, 0.02)] * 3).map(np.array)
 DISTANCES = st.floats(1.0, 5.0)
@@ -71,3 +78,23 @@ def test_fit_is_the_least_squares_one() -> None:
     A = design(cursor_m, HAND_M, 2.0, exact=True).reshape(-1, 3)
     expected = np.linalg.lstsq(A, (cursor_m - HAND_M).ravel())[0]
     np.testing.assert_allclose(found_m, expected, atol=1e-12)
+
+
+@given(turned_rad=st.tuples(*[st.floats(-0.16, 0.16)] * 3).map(np.array))
+def test_a_turned_outline_is_balanced_wherever_it_is_turned_about(turned_rad: np.ndarray) -> None:
+    R = Rotation.from_rotvec(turned_rad).as_matrix()
+
+    def balanced_m(about_m: np.ndarray) -> np.ndarray:
+        turned_m = about_m + (HAND_M - about_m) @ R
+        return turned_m + balanced_turn(HAND_M, R, about_m)
+
+    placed_m = balanced_m(HAND_M.mean(axis=0))
+    np.testing.assert_allclose(balanced_m(HAND_M[0]), placed_m, atol=5e-5)
+
+    # No small movement from there makes both outlines agree better in the image.
+    def apart(moved_m: np.ndarray) -> float:
+        seen = (placed_m + moved_m)[:, :2] / (placed_m + moved_m)[:, 2:]
+        return float(np.sum((seen - HAND_M[:, :2] / HAND_M[:, 2:]) ** 2))
+
+    for step_m in 2e-3 * np.vstack([np.eye(3), -np.eye(3)]):
+        assert apart(step_m) > apart(np.zeros(3))

@@ -107,12 +107,17 @@ def test_the_plan_ends_when_nothing_more_is_needed_or_the_most_were_made() -> No
     assert _next(eyes, many) is None
     # As many are wanted before the eyes are verified, however good the result is.
     assert _next(eyes, many, PlacementSettings(fewest=7, most=10)) is not None
-    # An eye that is not accepted is verified first; more alignments come after that.
+    # An eye that is not accepted is verified first, and again; more alignments come after that.
     refused = _all_named(many, "repeat")
     assert _next(eyes, refused, PlacementSettings(most=10)) is None
-    unverifiable = replace(refused, fused=replace(many.fused, verified=dict.fromkeys(EYES, ())))
-    assert _next(eyes, unverifiable, PlacementSettings(most=10)) is not None
-    assert _next(eyes, unverifiable, PlacementSettings(most=6)) is None
+    check = many.fused.observed[0]
+    once, twice = (
+        replace(refused, fused=replace(many.fused, verified=dict.fromkeys(EYES, (check,) * count)))
+        for count in (1, 2)
+    )
+    assert _next(eyes, once, PlacementSettings(most=10)) is None
+    assert _next(eyes, twice, PlacementSettings(most=10)) is not None
+    assert _next(eyes, twice, PlacementSettings(most=6)) is None
 
 
 def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:

@@ -38,6 +38,7 @@ FACTS: dict[str, Any] = {
     "camera": CAMERA,
     "headset": HEADSET,
     "plan": "each",
+    "usable_eyes": ("right",),
     "eye_distance": EyeDistance(0.0632, 0.002, "headset"),
     "verified": {"left": Verification((0.001, 0.0, 1 / 3), (1.5, -2.0), (0.002, 0.0, 0.0))},
     "evidence": ("digest", "picture"),
@@ -74,6 +75,8 @@ def test_a_fact_replaces_an_earlier_one_and_each_eye_its_own(tmp_path: Path) -> 
     "wrong",
     [
         {"plan": "middle"},
+        {"usable_eyes": ()},
+        {"usable_eyes": ("left", "left")},
         {"plans": "each"},
         {"eye_distance": 0.063},
         {"evidence": (1,)},

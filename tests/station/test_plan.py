@@ -17,6 +17,7 @@ from handcal.register.placement import PlacementSettings
 from handcal.session.session import Session
 from handcal.station.plan import NextStep, Plan, PlanSettings, StepName
 from handcal.station.procedure import Calibration, State
+from handcal.station.verifying import skipped_eyes
 from handcal.types import EYES, Eye
 from tests.helpers import eventually
 from tests.station.stage import HEADSET_AHEAD_NS, RIG, SETTINGS, T_D_HAND, Stage
@@ -187,7 +188,41 @@ def test_asking_changes_nothing(make: Callable[..., Planned]) -> None:
     assert planned.stage.state() is State.SHOW_HAND
 
 
-def test_a_skipped_eye_is_not_verified_by_the_plan(make: Callable[..., Planned]) -> None:
+def test_the_whole_recommended_plan_with_one_usable_eye(make: Callable[..., Planned]) -> None:
+    planned = make(replace(RECOMMENDED, placement=AT_THE_HAND, usable_eyes=("right",)))
+    for _ in range(AT_THE_HAND.most):
+        assert planned.until(StepName.CURSOR).eyes == ("right",)
+        planned.confirm()
+    assert planned.until(StepName.VERIFY).eyes == ("right",)
+    planned.fits("right")
+    planned.until(StepName.DONE)
+    calibration = planned.stage.calibration
+    assert [one.eyes for one in calibration.alignments.values()] == [("right",)] * 2
+    assert calibration.results is not None
+    assert set(calibration.results.eyes) == set(calibration.verifications) == {"right"}
+
+
+def test_what_is_left_is_solved_again_after_an_alignment_was_deleted(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make(replace(RECOMMENDED, placement=AT_THE_HAND, verify=False))
+    calibration = planned.stage.calibration
+    for _ in range(AT_THE_HAND.most):
+        planned.until(StepName.CURSOR)
+        planned.confirm()
+    planned.until(StepName.DONE)
+    calibration.delete_alignment(2)
+    assert planned.plan.next_step(is_steady=False).name is StepName.SOLVE
+    assert planned.advance().name is StepName.SOLVE
+    assert calibration.results is not None
+    assert list(calibration.results.alignments) == [1]
+    # The place that has become free is filled, with what is known from the rest.
+    assert planned.until(StepName.CURSOR).eyes == ("right",)
+
+
+def test_a_skipped_eye_is_not_verified_by_the_plan(
+    make: Callable[..., Planned], session: Session
+) -> None:
     planned = make(replace(RECOMMENDED, placement=ONCE, usable_eyes=("left",)))
     planned.until(StepName.ALIGN)
     planned.confirm()
@@ -196,3 +231,4 @@ def test_a_skipped_eye_is_not_verified_by_the_plan(make: Callable[..., Planned])
     assert planned.stage.state() is State.APPLIED
     planned.until(StepName.DONE)
     assert planned.stage.calibration.verifications == {}
+    assert skipped_eyes(Session.open(session.path).events) == {"left"}

@@ -22,10 +22,12 @@ from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.faults import Fault
+from handcal.station.plan import PlanSettings
 from handcal.station.procedure import CalibrationSettings, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
+from handcal.station.verifying import SKIPPED
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
 from tests.helpers import Patience, eventually
 
@@ -270,6 +272,18 @@ def test_a_resumed_session_keeps_the_prior_it_began_with(
         session.save_alignment(simulated(1))
     with Station(settings, resume=session.path) as station:
         assert station.settings.calibration.solve.fuse.prior.learned == learned
+
+
+def test_a_resumed_session_keeps_its_usable_eyes_and_those_skipped(
+    settings: StationSettings,
+) -> None:
+    one_eye = replace(settings, plan=PlanSettings("recommended", ("right",)))
+    with Station(one_eye) as station:
+        station.session.record(SKIPPED, eye="right")
+    with Station(settings, resume=station.session.path) as station:
+        assert station.plan.settings.name == "recommended"
+        assert station.plan.settings.usable_eyes == ("right",)
+        assert station.plan.skipped == {"right"}
 
 
 @pytest.mark.parametrize(

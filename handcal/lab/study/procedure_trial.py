@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -103,6 +104,7 @@ def lead_through(
     *,
     verify: bool,
     placement: PlacementSettings,
+    usable_eyes: tuple[Eye, ...] = EYES,
 ) -> Calibrated:
     """Lead a wearer through a plan: raise, align, and verify each eye if `verify`."""
     usual = sitting.settings
@@ -115,6 +117,7 @@ def lead_through(
     verified: dict[Eye, Verification] = {}
     results: Results | None = None
     at_rest_m = raised.T_H_hand
+    check = partial(next_check, usable_eyes=usable_eyes, settings=placement)
     while True:
         planned = next_alignment(
             raised.points_m,
@@ -125,6 +128,7 @@ def lead_through(
             [alignment.eyes for alignment, _ in solved],
             shift_m,
             plan=plan,
+            usable_eyes=usable_eyes,
             settings=placement,
             solve=solve,
         )
@@ -134,7 +138,7 @@ def lead_through(
             )
             solved.append((alignment, solve_alignment(alignment, wearer.rig)))
             seconds += usual.reaction_s + usual.movement_s + usual.dwell_s
-        elif verify and (eye := next_check(results, verified, settings=placement)) is not None:
+        elif verify and (eye := check(results, verified)) is not None:
             found = _verify(rng, wearer, sitting, model, eye, shift_m[eye], at_rest_m)
             verified[eye] = found.after(verified.get(eye))
             seconds += model.verify_s
@@ -148,6 +152,7 @@ def lead_through(
             eye_distance=eye_distance,
             verified=verified,
             plan=plan,
+            usable_eyes=usable_eyes,
         )
         shift_m |= results.rendered_shift_m
 

@@ -1,6 +1,6 @@
 import json
 import sys
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,7 @@ import pytest
 from handcal.cli.main import main
 from handcal.errors import HandcalError
 from handcal.lab.settings import ProcedureStudySettings
-from handcal.lab.study.procedure_trial import ProcedureModel
+from handcal.lab.study.procedure_trial import ProcedureModel, lead_through
 from handcal.lab.study.procedures import (
     ProcedureRow,
     ProcedureSettings,
@@ -19,7 +19,12 @@ from handcal.lab.study.procedures import (
 )
 from handcal.lab.study.run import Case
 from handcal.lab.study.store import StudyRow
+from handcal.lab.study.wearers import draw_wearer
+from handcal.register.placement import PlacementSettings
+from handcal.sim.hand import HandSettings, Side, make_hand
+from handcal.sim.people import begin_sitting
 from handcal.sim.wearer import WearerSettings
+from handcal.types import EYES, Eye
 
 MODEL = ProcedureModel(points=500)
 SETTINGS = ProcedureSettings(3, MODEL)
@@ -53,6 +58,30 @@ def test_a_wearer_without_errors_is_calibrated_by_the_plan_in_its_time() -> None
         assert float(row["after_arcmin"] or 9.0) < 2.0
         assert row["verdict"] == "accept"
         assert row["seconds"] == pytest.approx(RAISING_S + 2 * ALIGNING_S + 2 * MODEL.verify_s)
+
+
+@pytest.mark.parametrize(("side", "usable"), [("left", EYES), ("right", ("right",))])
+def test_a_left_hand_and_one_usable_eye_are_led_through_the_whole_plan(
+    side: Side, usable: tuple[Eye, ...]
+) -> None:
+    rng = np.random.default_rng(5)
+    wearer = draw_wearer(rng, 3, USUAL)
+    wearer = replace(wearer, hand=make_hand(3, HandSettings(side=side)))
+    found = lead_through(
+        rng,
+        wearer,
+        begin_sitting(rng, USUAL, "plain", 0.05),
+        MODEL,
+        "recommended",
+        verify=True,
+        placement=PlacementSettings(),
+        usable_eyes=usable,
+    )
+    assert set(found.results.eyes) == set(found.results.fused.verified) == set(usable)
+    for eye in EYES:
+        before_m = np.linalg.norm(wearer.true_shift_m[eye])
+        error_m = np.linalg.norm(found.shift_m[eye] - wearer.true_shift_m[eye])
+        assert error_m < 0.5 * before_m if eye in usable else not found.shift_m[eye].any()
 
 
 def test_without_verification_the_plan_takes_three_alignments() -> None:
