@@ -214,7 +214,7 @@ class Technician:
         wait_for(f"{name} {count}", tried, self._window)
 
 
-@pytest.mark.slow  # tests/gui/test_program.py covers the keys, the held bar and the resumption
+@pytest.mark.slow  # tests/gui covers the keys, one that is held, and the resumption
 def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
     display: Display, tmp_path: Path, preferences: Path, headset_of: Callable[[int], int]
 ) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -207,6 +207,23 @@ def test_space_asks_for_what_comes_next_and_escape_closes_the_message(
     window.banner.show_message("Could not solve")
     QTest.keyClick(window, Qt.Key.Key_Escape)
     assert window.banner.text == ""
+
+
+def test_keys_that_repeat_one_held_down_are_recognized(window: MainWindow) -> None:
+    """Of an X server, which sends a release and a press with one time stamp for each."""
+    bar = window.findChild(ActionBar)
+    assert isinstance(bar, ActionBar)
+    found = []
+    for t_ms, is_repeat in ((10, False), (500, False), (530, False), (900, False), (940, True)):
+        override, release = QEvent.Type.ShortcutOverride, QEvent.Type.KeyRelease
+        no_modifier = Qt.KeyboardModifier.NoModifier
+        for kind in (release, override) if t_ms in (500, 530) else (override, release):
+            event = QKeyEvent(kind, Qt.Key.Key_Space, no_modifier, " ", is_repeat)
+            event.setTimestamp(t_ms)
+            bar.notice_key(event)
+            if kind is override:
+                found.append(bar.is_repeat)
+    assert found == [False, True, True, False, True]
 
 
 def test_help_lists_every_key_of_an_action(program: Program) -> None:
