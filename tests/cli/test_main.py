@@ -274,7 +274,7 @@ def test_doctor_fails_only_for_what_must_be_mended(
         ("solve", "required: session"),
         ("solve somewhere --method fast", "invalid choice: 'fast'"),
         ("headset --port 0", "'0' is not a whole number from 1 to 65535"),
-        ("headset", "required: --port"),
+        ("headset", "give --port and a pairing key, or --pair"),
         ("record", "required: output"),
         ("record a --seconds 0", "'0' is not a number from 0.01"),
         ("record a --profile 640x480", "invalid choice: '640x480'"),
