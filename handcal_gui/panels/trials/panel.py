@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QLabel,
     QToolButton,
     QWidget,
 )
@@ -106,6 +105,7 @@ class TrialsPanel(QWidget):
         self._comparison.answered.connect(self.comparison_answered)
         self._fill_choices()
         self._make_record_action()
+        self._hint = paragraph("trialsHint", _HOW)
         self._message = paragraph("message")
         self._summary = paragraph("summary")
         self._table = RecordTable(
@@ -133,6 +133,7 @@ class TrialsPanel(QWidget):
         before, self._record = self._record, record
         if before is None or trials_id(before) != trials_id(record):
             statistics = summarise_trials(record.trials.values())
+            self._hint.setVisible(not record.trials)  # the trials need its room
             self._table.show_rows(trial_rows(record))
             self._summary.setText(statistics_text(record.trials))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
@@ -284,7 +285,6 @@ class TrialsPanel(QWidget):
         )
 
     def _lay_out(self) -> None:
-        hint = QLabel(text=_HOW, wordWrap=True)
         record = QToolButton()
         record.setDefaultAction(self.record_action)
         choices = hbox(self._eyes, self._depth, record, 1, spacing=SPACING_PX)
@@ -296,7 +296,7 @@ class TrialsPanel(QWidget):
         ):
             tabs.addTab(page, title)
         vbox(
-            hint,
+            self._hint,
             choices,
             hbox(self._shows_target, (self._message, 1), spacing=2 * SPACING_PX),
             self._comparison,
