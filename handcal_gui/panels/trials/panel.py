@@ -98,6 +98,7 @@ class TrialsPanel(QWidget):
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._shows_target = QCheckBox(tr("Show the target in the headset"))
         self._target: tuple[Eye, float] | None = None  # requested
+        self._compared = 0
         self._comparison = ComparisonRow()
         self._comparison.begun.connect(self.compare_requested)
         self._comparison.ended.connect(self.end_comparison_requested)
@@ -131,6 +132,7 @@ class TrialsPanel(QWidget):
     def show_record(self, record: SessionRecord) -> None:
         """Show the trials of a session."""
         before, self._record = self._record, record
+        self._compared = len(read_comparisons(record.events))
         if before is None or trials_id(before) != trials_id(record):
             statistics = summarise_trials(record.trials.values())
             self._hint.setVisible(not record.trials)  # the trials need its room
@@ -213,12 +215,12 @@ class TrialsPanel(QWidget):
         self._show_comparison(can_compare=can_show)
 
     def _show_comparison(self, *, can_compare: bool) -> None:
-        snapshot, record = self._snapshot, self._record
+        snapshot = self._snapshot
         self._comparison.show_comparison(
             None if snapshot is None else snapshot.comparing,
             has_seen_both=snapshot is not None and snapshot.has_compared_both,
             can_begin=can_compare,
-            count=0 if record is None else len(read_comparisons(record.events)),
+            count=self._compared,
         )
 
     def _request_target(self) -> None:
