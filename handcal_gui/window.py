@@ -190,7 +190,6 @@ class MainWindow(QMainWindow):
         self._keep_layout()
         self._arrangement = arrangement
         self._station.setChecked(arrangement == "station")
-        self._guide.fill_window(arrangement == "station")
         page, self._page = self._page, "start"
         self.show_page(page)
 
@@ -201,7 +200,9 @@ class MainWindow(QMainWindow):
         self.statusBar().setVisible(page == "live")
         self._stack.setCurrentIndex(list(self._pages).index(page))
         is_small = self.width() < _SMALL_PX[0] or self.height() < _SMALL_PX[1]
-        self._guide.picture.set_camera(is_small or self._arrangement == "station")
+        is_alone = self._arrangement == "station"
+        self._guide.picture.set_camera(is_small or is_alone)
+        self._guide.fill_window(is_alone and not is_small)
         layout = self._layouts.get(page, self._default_layouts[is_small])
         self.restoreState(layout, _LAYOUT_VERSION)
         if self.minimumSizeHint().height() > self.screen().availableGeometry().height():

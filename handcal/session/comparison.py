@@ -90,4 +90,4 @@ def sign_test(first: int, second: int) -> float:
     """Return the two-sided p-value of two counts that are equally likely by chance, exactly."""
     total = first + second
     tail = sum(math.comb(total, k) for k in range(min(first, second) + 1))
-    return float(min(1.0, 2.0 * tail / 2**total))
+    return float(min(1.0, 2 * tail / 2**total))

@@ -65,7 +65,7 @@ class ReviewPage(QWidget):
             self._facts,
             self._card,
             buttons,
-            0,
+            1,
             on=self,
             margins=2 * SPACING_PX,
             spacing=2 * SPACING_PX,

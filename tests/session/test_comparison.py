@@ -66,4 +66,5 @@ def test_a_session_keeps_comparisons_and_leaves_out_what_is_damaged(tmp_path: Pa
 def test_the_sign_test_is_that_of_the_binomial_distribution() -> None:
     assert sign_test(0, 0) == sign_test(5, 5) == 1.0
     assert sign_test(10, 0) == sign_test(0, 10) == 2 / 2**10
+    assert sign_test(2000, 0) == 0.0
     assert sign_test(8, 2) == 2 * (1 + 10 + comb(10, 2)) / 2**10

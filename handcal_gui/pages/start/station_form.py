@@ -23,6 +23,13 @@ from handcal_gui.widgets.fields import button, fill_row
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.path_field import PathField
 
+TITLES: dict[Part, str] = {
+    "camera": tr("Camera"),
+    "headset": tr("Headset"),
+    "rig": tr("Rig file"),
+    "sessions": tr("Session folder"),
+}
+
 
 class StationForm(QWidget):
     """A form for the settings of a station.
@@ -131,8 +138,8 @@ class StationForm(QWidget):
         _add_row(grid, tr("Wearer"), wearer)
         _add_row(grid, tr("Plan"), self._plan)
         grid.setRowMinimumHeight(grid.rowCount(), SPACING_PX)
-        for part, title in PARTS.items():
-            _add_row(grid, title, fields[part])
+        for part in PARTS:
+            _add_row(grid, TITLES[part], fields[part])
             grid.addWidget(self._findings[part], grid.rowCount(), 1)
         grid.addWidget(self._advanced, grid.rowCount(), 1)
         grid.setRowStretch(grid.rowCount(), 1)  # or the fields move apart on a tall page

@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QLabel,
     QToolButton,
     QWidget,
 )
@@ -99,6 +98,7 @@ class TrialsPanel(QWidget):
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._shows_target = QCheckBox(tr("Show the target in the headset"))
         self._target: tuple[Eye, float] | None = None  # requested
+        self._compared = 0
         self._comparison = ComparisonRow()
         self._comparison.begun.connect(self.compare_requested)
         self._comparison.ended.connect(self.end_comparison_requested)
@@ -106,6 +106,7 @@ class TrialsPanel(QWidget):
         self._comparison.answered.connect(self.comparison_answered)
         self._fill_choices()
         self._make_record_action()
+        self._hint = paragraph("trialsHint", _HOW)
         self._message = paragraph("message")
         self._summary = paragraph("summary")
         self._table = RecordTable(
@@ -131,8 +132,10 @@ class TrialsPanel(QWidget):
     def show_record(self, record: SessionRecord) -> None:
         """Show the trials of a session."""
         before, self._record = self._record, record
+        self._compared = len(read_comparisons(record.events))
         if before is None or trials_id(before) != trials_id(record):
             statistics = summarise_trials(record.trials.values())
+            self._hint.setVisible(not record.trials)  # the trials need its room
             self._table.show_rows(trial_rows(record))
             self._summary.setText(statistics_text(record.trials))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
@@ -212,12 +215,12 @@ class TrialsPanel(QWidget):
         self._show_comparison(can_compare=can_show)
 
     def _show_comparison(self, *, can_compare: bool) -> None:
-        snapshot, record = self._snapshot, self._record
+        snapshot = self._snapshot
         self._comparison.show_comparison(
             None if snapshot is None else snapshot.comparing,
             has_seen_both=snapshot is not None and snapshot.has_compared_both,
             can_begin=can_compare,
-            count=0 if record is None else len(read_comparisons(record.events)),
+            count=self._compared,
         )
 
     def _request_target(self) -> None:
@@ -284,7 +287,6 @@ class TrialsPanel(QWidget):
         )
 
     def _lay_out(self) -> None:
-        hint = QLabel(text=_HOW, wordWrap=True)
         record = QToolButton()
         record.setDefaultAction(self.record_action)
         choices = hbox(self._eyes, self._depth, record, 1, spacing=SPACING_PX)
@@ -296,7 +298,7 @@ class TrialsPanel(QWidget):
         ):
             tabs.addTab(page, title)
         vbox(
-            hint,
+            self._hint,
             choices,
             hbox(self._shows_target, (self._message, 1), spacing=2 * SPACING_PX),
             self._comparison,

@@ -162,7 +162,7 @@ def test_bridges_watch_the_station_and_end_before_it(qtbot: QtBot) -> None:
     socket.create_server((LOCAL, port)).close()  # the port is free again
 
 
-def test_a_bridge_that_cannot_be_opened_is_told_and_the_calibration_goes_on(qtbot: QtBot) -> None:
+def test_a_calibration_goes_on_without_a_bridge_that_cannot_be_opened(qtbot: QtBot) -> None:
     pytest.importorskip("pyigtl")
     station = FakeStation()
     with socket.create_server((LOCAL, 0)) as taken:
