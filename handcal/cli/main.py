@@ -89,6 +89,10 @@ _RIG: Mapping[str, Entry] = {
     "grid": Entry(
         "Make the grid that a display shows to the viewpoint camera, pixel for pixel.", "rig_files"
     ),
+    "gray": Entry(
+        "Make the Gray-code patterns that a display shows one after the other, in place of a grid.",
+        "rig_files",
+    ),
     "display": Entry(
         "Calibrate one eye's display from the viewpoint camera's images of its grid.", "rig_files"
     ),

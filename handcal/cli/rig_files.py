@@ -70,7 +70,40 @@ def grid(arguments: argparse.Namespace) -> None:
 
 
 @command(
+    arg(
+        "--display",
+        type=number(int, 60, 16384),
+        nargs=2,
+        metavar=("WIDTH", "HEIGHT"),
+        default=(1268, 720),
+        help="size of the display in pixels",
+    ),
+    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the patterns"),
+)
+def gray(arguments: argparse.Namespace) -> None:
+    """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
+    from handcal.io.images import write_png
+    from handcal.rig.gray_code import gray_patterns
+
+    made = dict(gray_patterns(*arguments.display))
+    make_folder(arguments.output)
+    for name, pattern in made.items():
+        write_png(arguments.output / f"{name}.png", pattern)
+    console.print(
+        f"{arguments.output}: {len(made)} patterns; show each unscaled, and name the camera's "
+        "image of it alike",
+        markup=False,
+    )
+
+
+@command(
     arg("images", type=Path, nargs="+", help="images of the grid, or folders of images"),
+    arg(
+        "--gray-code",
+        action="store_true",
+        help="the images are one folder with those of the Gray-code patterns, named alike (handcal "
+        "rig gray)",
+    ),
     arg("--eye", choices=EYES, required=True, help="eye whose display is calibrated"),
     arg(
         "--camera-intrinsics",
@@ -142,13 +175,12 @@ def display(arguments: argparse.Namespace) -> None:
 
     from handcal.rig.assemble import with_display
     from handcal.rig.formats import read_intrinsics
-    from handcal.rig.steps import DisplayInputs, calibrate_eye_display
+    from handcal.rig.gray_code import flatness_arcmin, read_gray_code
+    from handcal.rig.steps import DisplayInputs, calibrate_by_gray_code, calibrate_eye_display
 
     rig, eye = _read_rig(arguments.rig), arguments.eye
     camera = read_intrinsics(arguments.camera_intrinsics)
     viewpoint = _viewpoint(arguments, camera)
-    grid = grid_of(arguments, rig.eyes[eye].width_px, rig.eyes[eye].height_px)
-    views = views_of(arguments.images, grid.board, arguments.drop)
     inputs = DisplayInputs(
         square_px=arguments.square_px,
         distance_m=arguments.distance_m,
@@ -157,8 +189,21 @@ def display(arguments: argparse.Namespace) -> None:
     )
     if arguments.square_arcmin is not None:
         inputs = replace(inputs, square_arcmin=arguments.square_arcmin)
-    result = calibrate_eye_display(rig, eye, views, camera, viewpoint, inputs)
-    show_views(views, result.homography.residuals_px)
+    size = rig.eyes[eye].width_px, rig.eyes[eye].height_px
+    if arguments.gray_code:
+        if len(arguments.images) != 1:
+            raise HandcalError("--gray-code takes one folder with the images of all patterns")
+        seen = read_gray_code(arguments.images[0], *size)
+        result = calibrate_by_gray_code(rig, eye, seen, camera, viewpoint, inputs)
+        flat, bent = flatness_arcmin(seen, camera, *size)
+        console.print(
+            f"{len(seen.pixels)} points; a flat screen leaves {flat:.1f}′ between them, and with a "
+            f"distortion by the display's pixels {bent:.1f}′"
+        )
+    else:
+        views = views_of(arguments.images, grid_of(arguments, *size).board, arguments.drop)
+        result = calibrate_eye_display(rig, eye, views, camera, viewpoint, inputs)
+        show_views(views, result.homography.residuals_px)
     place_mm = " ".join(f"{one:.2f}" for one in -1e3 * result.display.t_C0_V_m)
     console.print(
         f"z(C0→S) {result.display.z_C0_S_m:.3f} m; C0 at {place_mm} mm in V; display rotated by "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,12 +14,13 @@ from handcal.rig.camera import CameraSettings, LensChoice
 from handcal.rig.display import (
     DisplayCalibration,
     DisplaySettings,
+    Screen,
     calibrate_display,
     fit_homography,
     pixel_size_m,
 )
 from handcal.rig.formats import read_camera, read_identity, read_intrinsics, read_pose, read_stereo
-from handcal.rig.grid import grid_on, on_display
+from handcal.rig.grid import GridView, grid_on, on_display
 from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_stereo
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
@@ -132,11 +133,39 @@ def calibrate_eye_display(
         If no view shows the grid, or the display has no room for it.
     """
     screen = screen_of(rig, eye)
+    grid = grid_on(screen.width_px, screen.height_px, inputs.square_px)
+    seen = {name: on_display(found, grid) for name, found in used(grid_views, 1).items()}
+    return _calibrated(screen, seen, camera, viewpoint, inputs)
+
+
+def calibrate_by_gray_code(
+    rig: Rig,
+    eye: Eye,
+    seen: GridView,
+    camera: Intrinsics,
+    viewpoint: ViewpointPose,
+    inputs: DisplayInputs,
+) -> DisplayCalibration:
+    """Calibrate one eye's display from Gray-code patterns (`read_gray_code`) in place of the grid.
+
+    Raises
+    ------
+    HandcalError
+        If the images are not of the camera's size.
+    """
+    return _calibrated(screen_of(rig, eye), {"Gray code": seen}, camera, viewpoint, inputs)
+
+
+def _calibrated(
+    screen: Screen,
+    seen: Mapping[str, GridView],
+    camera: Intrinsics,
+    viewpoint: ViewpointPose,
+    inputs: DisplayInputs,
+) -> DisplayCalibration:
     pose_V_H = pose_in(inputs.pose_V_H)
     if pose_V_H is not None:
         screen = replace(screen, T_V_H=pose_V_H)
-    grid = grid_on(screen.width_px, screen.height_px, inputs.square_px)
-    seen = {name: on_display(found, grid) for name, found in used(grid_views, 1).items()}
     homography = fit_homography(seen, camera, screen.width_px, screen.height_px)
     return calibrate_display(homography, camera, viewpoint, screen, inputs.settings)
 

@@ -13,17 +13,18 @@ import pytest
 from handcal.camera.folder import record_folder
 from handcal.camera.hl2ss import STREAMS
 from handcal.cli.main import parse
-from handcal.display import view_of_eye
-from handcal.errors import HandcalError
+from handcal.display import eye_projection, view_of_eye
+from handcal.errors import FileError, HandcalError
 from handcal.geometry import invert, rigid
 from handcal.rig.board import Board
+from handcal.rig.compare import compare_rigs
 from handcal.rig.example import FOCAL_PX, example_rig
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.tracked_file import write_tracked
 from handcal.rig.views import ViewsError
 from handcal.sim.ahat import ahat_rays
-from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
+from handcal.sim.boards import BoardPainter, PictureSettings, board_poses, pixel_rays
 from handcal.sim.viewpoint import photograph_display
 from handcal.types import CameraIdentity, Frame, Intrinsics
 from tests import board_frames
@@ -33,6 +34,7 @@ from tests.helpers import DATA
 RIG = example_rig()
 CAMERA = Intrinsics(960, 540, 1350.0, 1348.0, 482.0, 267.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
 PICTURES = PictureSettings(samples=1)
+T_E_C = rigid([0.03, -0.02, 0.05])
 
 
 def run(*words: object) -> None:
@@ -47,7 +49,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run("grid", "--png", folder / "grid.png")
     shown = cv2.imread(str(folder / "grid.png"), cv2.IMREAD_GRAYSCALE)
     rng = np.random.default_rng(1)
-    T_E_C = rigid([0.03, -0.02, 0.05])
     display = RIG.eyes["left"]
     (folder / "grids").mkdir()
     image = photograph_display(
@@ -65,9 +66,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def calibrate(folder: Path, output: Path, *more: object) -> None:
+def calibrate(folder: Path, output: Path, *more: object, images: Path | None = None) -> None:
     run(
-        *("display", folder / "grids", "--eye", "left", "--output", output),
+        *("display", images or folder / "grids", "--eye", "left", "--output", output),
         *("--camera-intrinsics", folder / "camera.json", "--tracked", folder / "poses.json"),
         *("--board-images", folder / "boards", *more),
     )
@@ -86,6 +87,29 @@ def test_a_display_is_calibrated_from_photographs(
     run("compare", output, output, "--json", tmp_path / "c.json")
     differences = json.loads((tmp_path / "c.json").read_text())["differences"]
     assert all(one["value"] < 1e-6 for one in differences)
+
+
+def test_a_display_is_calibrated_by_gray_code(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen = tmp_path / "seen"
+    seen.mkdir()
+    run("gray", "--output", tmp_path / "shown")
+    P = eye_projection(RIG.eyes["left"])[:, :3] @ T_E_C[:3, :3]
+    x, y, away = np.moveaxis(pixel_rays(CAMERA, 1) @ P.T.astype(np.float32), 2, 0)
+    for path in sorted((tmp_path / "shown").glob("*.png")):
+        shown = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        assert shown is not None
+        image = cv2.remap(shown, x / away, y / away, cv2.INTER_LINEAR)
+        cv2.imwrite(str(seen / path.name), image)
+    output = tmp_path / "rig.yaml"
+    calibrate(folder, output, "--distance-m", 2, "--gray-code", images=seen)
+    differences = {one.name: one.value for one in compare_rigs(read_rig(output), RIG)}
+    assert differences["left: largest move of a display pixel"] < 1.0
+    assert "a flat screen leaves 0." in capsys.readouterr().out
+    (seen / "x-3.png").unlink()
+    with pytest.raises(FileError, match=r"1 of 32 images are missing, such as x-3\.png"):
+        calibrate(folder, output, "--distance-m", 2, "--gray-code", images=seen)
 
 
 def test_a_file_gives_the_rendering_camera(folder: Path, tmp_path: Path) -> None:

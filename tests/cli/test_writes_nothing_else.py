@@ -71,6 +71,7 @@ COMMANDS = {
     "record": "OUTPUT/recording --source simulator --frames 2",
     "headset": "--port 49152 --duration-s 0.5",
     "rig board": "--pdf OUTPUT/board.pdf --png OUTPUT/board.png",
+    "rig gray": "--display 200 100 --output OUTPUT/gray",
     "rig grid": "--png OUTPUT/grid.png",
     "rig check": "RIG --json OUTPUT/checked.json",
     "rig compare": "RIG RIG",

@@ -123,8 +123,13 @@ class RestWatch:
             return "it moves: wait until it is at rest"
         if not self._is_new(capture.kind == GRID, gray, rest[2], found):
             return "it is the one taken last: cover it, then show the next"
-        self._rest, self._taken, self._was_away = None, (capture.kind == GRID, gray), False
+        self.took(image, capture)
         return ""
+
+    def took(self, image: UInt8, capture: PlannedCapture) -> None:
+        """Note an image, (H, W, 3) uint8, that was taken, by itself or by a person."""
+        self._rest, self._was_away = None, False
+        self._taken = capture.kind == GRID, _gray(image)
 
     def _is_new(
         self, is_grid: bool, gray: UInt8, at_rest: UInt8, found: Mapping[int, Float64]

@@ -19,6 +19,7 @@ from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.lab.evaluate.cube_capture import RestWatch, instruction, keep_capture
 from handcal.lab.evaluate.cube_folder import GRID, CapturePlan, PlannedCapture, missing_captures
 from handcal.lab.evaluate.run import cube_and_grid, position_warp
+from handcal.progress import Progress
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
 from handcal.rig.warp import RotationWarp
@@ -139,14 +140,18 @@ class CaptureDialog(PreparationDialog):
 
     def take(self) -> None:
         """Keep the present image as the selected capture, if it has the expected content."""
-        images, chosen, looked_for = self._camera.images, self._list.chosen, self._looked_for
-        if images is None or chosen is None or looked_for is None or self._bar.is_busy:
+        images, chosen = self._camera.images, self._list.chosen
+        looked_for, watch = self._looked_for, self._watch
+        if images is None or chosen is None or looked_for is None or watch is None:
             return
-        self._bar.run(
-            "Checking the image",
-            lambda *_: keep_capture(images[0], self._folder, chosen, *looked_for),
-            lambda seen: self._show_taken(chosen, seen),
-        )
+
+        def work(_: Progress) -> str:
+            seen = keep_capture(images[0], self._folder, chosen, *looked_for)
+            watch.took(images[0], chosen)
+            return seen
+
+        if not self._bar.is_busy:
+            self._bar.run("Checking the image", work, lambda seen: self._show_taken(chosen, seen))
 
     def done(self, result: int) -> None:
         """Close camera and dialog."""
@@ -182,7 +187,7 @@ class CaptureDialog(PreparationDialog):
         """Keep an image at rest; return what it shows, or why not. Runs in the job's thread."""
         image, chosen, t_ns = seen
         assert self._looked_for is not None
-        self._watch = self._watch or RestWatch(*self._looked_for)
+        assert self._watch is not None
         why_not = self._watch.consider(image, chosen, t_ns)
         if why_not:
             return "", why_not
@@ -245,6 +250,7 @@ class CaptureDialog(PreparationDialog):
 
     def _begin(self, found: tuple[tuple[Cube, Grid], list[int]]) -> None:
         self._looked_for, numbers = found
+        self._watch = RestWatch(*self._looked_for)
         self._camera.add_cameras(numbers)
         self._refresh()
 
