@@ -102,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--source",
         metavar="SOURCE",
-        help="simulator, realsense, hololens2:HOST, or a recording: .db3 or .bag file, or folder",
+        help="simulator, realsense, oak, orbbec, hololens2:HOST, or a recording",
     )
     parser.add_argument("--rig", type=Path, metavar="FILE", help="the rig file")
     parser.add_argument("--seed", type=_seed, metavar="N", help="seed of the simulated wearer")

@@ -16,7 +16,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QWidget
 
-from handcal.camera.hololens2 import PREFIX
+from handcal.camera.live import is_live
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
@@ -108,7 +108,7 @@ def _station(settings: StationSettings, arguments: argparse.Namespace) -> Statio
             settings = replace(settings, source="simulator", headset="virtual")
         case "realsense":
             settings = replace(settings, source="realsense", headset="network")
-        case live if live.startswith(PREFIX):
+        case live if is_live(live):
             settings = replace(with_source(settings, live), headset="network")
         case path:
             recording = str(Path(path).absolute())  # remembered, and valid from any folder

@@ -29,8 +29,10 @@ from handcal.types import CameraIdentity, Float32, Float64, Frame, UInt8
 
 PREFIX = "hololens2:"
 _LONG_THROW, _WITH_COLOR = ",longthrow", ",color"
-_CALIBRATION_S = 10.0
+_CALIBRATION_S = 4.0
 _POLL_S = 0.2
+_FADING = 0.99
+"""Of what is known of white, from one image to the next: a mirror must not count for long."""
 _APART_NS = 50_000_000
 _KEPT = 4
 _SHOWN_M = 0.3
@@ -116,7 +118,7 @@ class HoloLens2Camera(Closable):
         distance_m: Float32 = packet.distance.astype(np.float32)
         distance_m /= np.float32(self._calibration.units_per_m)
         brightness = packet.brightness.astype(np.float32)
-        self._white = max(self._white, white_brightness(distance_m, brightness))
+        self._white = max(_FADING * self._white, white_brightness(distance_m, brightness))
         distance_m = self._without_wrapped(distance_m, brightness)
         frame = Frame(
             index=index,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from handcal.camera.color import ColorCamera, Tell
 from handcal.camera.folder import DESCRIPTION
-from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+from handcal.camera.live import is_live, open_live
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
@@ -28,9 +28,9 @@ def open_view_source(
     Parameters
     ----------
     source : str
-        ``realsense`` for its colour images; ``hololens2:HOST`` for the grey ones of its depth
-        camera; the number of a camera of this computer; or the path of a recording, a video or a
-        folder of images.
+        ``realsense``, ``oak`` or ``orbbec`` for its colour images; ``hololens2:HOST`` for the grey
+        ones of its depth camera; the number of a camera of this computer; or the path of a
+        recording, a video or a folder of images.
     realsense : RealSenseSettings, optional
     playback : PlaybackSettings, optional
         Playback of a recording or video.
@@ -45,8 +45,8 @@ def open_view_source(
     """
     if source == REALSENSE:
         return ColorCamera(RealSenseCamera(realsense), tell)
-    if (hololens2 := hololens2_settings(source)) is not None:
-        return ColorCamera(HoloLens2Camera(hololens2), tell)
+    if is_live(source):
+        return ColorCamera(open_live(source), tell)
     if source.isdecimal():
         return open_viewpoint(int(source))
     path = Path(source).expanduser()

@@ -70,7 +70,7 @@ _ROI = arg(
     arg(
         "--source",
         default="realsense",
-        help="realsense, hololens2:HOST, simulator, or a recording to convert",
+        help="realsense, hololens2:HOST, oak, orbbec, simulator, or a recording to convert",
     ),
     arg(
         "--seconds",
@@ -198,6 +198,7 @@ def open_source(
 ) -> Camera:
     """Open the camera that an option names: of a kind, or the path of a recording."""
     from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+    from handcal.camera.live import is_live, open_live
     from handcal.camera.realsense import RealSenseCamera
     from handcal.camera.recordings import open_recording
     from handcal.sim.camera import SyntheticCamera
@@ -213,10 +214,9 @@ def open_source(
         case "realsense":
             return RealSenseCamera(realsense)
         case other:
-            hololens2 = hololens2_settings(other)
-            if hololens2 is None:
-                return open_recording(Path(other))
-            return HoloLens2Camera(replace(hololens2, keeps_wrapped=keeps_wrapped))
+            if (hololens2 := hololens2_settings(other)) is not None:
+                return HoloLens2Camera(replace(hololens2, keeps_wrapped=keeps_wrapped))
+            return open_live(other) if is_live(other) else open_recording(Path(other))
 
 
 def _replay_row(step: ReplayStep) -> dict[str, Any]:

@@ -59,8 +59,9 @@ _SHARE = number(float, 0.0, 1.0)
         "--camera",
         metavar="SOURCE",
         required=True,
-        help="realsense; hololens2:HOST, the headset's own, by hl2ss; simulator, with the virtual "
-        "headset; or the path of a recording, which is played in a loop",
+        help="realsense; hololens2:HOST, the headset's own, by hl2ss; oak or orbbec, also with "
+        ":SERIAL; simulator, with the virtual headset; or the path of a recording, which is played "
+        "in a loop",
     ),
     arg("--rig", type=Path, metavar="FILE", required=True, help="rig file of this headset"),
     arg(

@@ -87,6 +87,10 @@ def _camera(settings: StationSettings) -> Finding:
             return with_rig(examine_camera(device), _chosen_rig(settings), device.identity)
         case "hololens2":
             return _hololens2(settings)
+        case "oak" | "orbbec" as kind:
+            name = "OAK-D" if kind == "oak" else "Orbbec camera"
+            which = f"{name} {settings.serial}".rstrip()
+            return _limited(f"{which}, not tried yet", "it is opened at the start")
         case "recording":
             return _recording(settings)
         case "simulator":

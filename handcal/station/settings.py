@@ -15,7 +15,7 @@ from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings
 from handcal.station.procedure import CalibrationSettings
 
-Source = Literal["simulator", "recording", "realsense", "hololens2"]
+Source = Literal["simulator", "recording", "realsense", "hololens2", "oak", "orbbec"]
 HeadsetKind = Literal["virtual", "network"]
 DEFAULT_PORT = 47800
 
@@ -33,6 +33,8 @@ class StationSettings:
     """Default: in real time and in a loop."""
     realsense: RealSenseSettings = field(default_factory=RealSenseSettings)
     hololens2: HoloLens2Settings = field(default_factory=HoloLens2Settings)
+    serial: str = ""
+    """Serial number of an OAK-D or Orbbec camera; empty: the first."""
     headset: HeadsetKind = "virtual"
     """The virtual headset runs as a separate process on this machine and includes the simulated
     wearer."""
@@ -77,11 +79,14 @@ def with_source(settings: StationSettings, source: str) -> StationSettings:
     ----------
     settings : StationSettings
     source : str
-        ``realsense``, ``simulator``, ``hololens2:HOST``, or the path of a recording.
+        ``realsense``, ``simulator``, a name of `open_live`, or the path of a recording.
     """
-    match source:
-        case "realsense" | "simulator":
-            return replace(settings, source=source)
+    kind, _, serial = source.partition(":")
+    match source, kind:
+        case ("realsense" | "simulator") as plain, _:
+            return replace(settings, source=plain)
+        case _, ("oak" | "orbbec") as named:
+            return replace(settings, source=named, serial=serial)
     if (hololens2 := hololens2_settings(source)) is not None:
         return replace(settings, source="hololens2", hololens2=hololens2)
     return replace(settings, source="recording", recording=source)

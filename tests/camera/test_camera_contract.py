@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from itertools import count
@@ -14,6 +15,8 @@ import pytest
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
 from handcal.camera.hololens2 import HoloLens2Camera
+from handcal.camera.oak import OakCamera
+from handcal.camera.orbbec import OrbbecCamera
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording, record_frames
 from handcal.camera.settings import HoloLens2Settings
@@ -27,10 +30,14 @@ from handcal.sim.sway import swaying_hand
 from handcal.types import CameraIdentity, Frame, Intrinsics
 from tests.camera.hl2ss_server import Hl2ssServer, ahat_payload, calibration_of, packet_of
 from tests.camera.rosbag import write_rosbag
+from tests.camera.stand_ins import OakStandIn, OrbbecStandIn
 from tests.helpers import eventually
 
 COUNT = 6
-KINDS = ("simulator", "realsense", "hololens2", "folder", "recording", "mcap", "rosbag-db3")
+KINDS = (
+    *("simulator", "realsense", "hololens2", "orbbec", "oak"),
+    *("folder", "recording", "mcap", "rosbag-db3"),
+)
 D415 = CameraIdentity("Intel RealSense D415", "123", "5.16.0.1")
 OpenCamera: TypeAlias = Callable[[], Camera]
 
@@ -46,6 +53,7 @@ def open_camera(
     world: World,
     plug_in: Callable[..., Any],
     make_frames: Callable[..., Iterator[Frame]],
+    monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> OpenCamera:
     match request.param:
@@ -58,6 +66,12 @@ def open_camera(
         case "hololens2":
             port = request.getfixturevalue("hl2ss_port")
             return lambda: HoloLens2Camera(HoloLens2Settings("127.0.0.1", port=port))
+        case "orbbec":
+            monkeypatch.setitem(sys.modules, "pyorbbecsdk", OrbbecStandIn())
+            return OrbbecCamera
+        case "oak":
+            monkeypatch.setitem(sys.modules, "depthai", OakStandIn())
+            return OakCamera
         case "mcap" | "rosbag-db3" as kind:
             write_rosbag(tmp_path / "bag", make_frames(COUNT), is_mcap=kind == "mcap")
             return lambda: open_recording(tmp_path / "bag")
@@ -129,6 +143,8 @@ def test_a_camera_tells_which_device_it_is(open_camera: OpenCamera) -> None:
     with open_camera() as camera:
         simulated = CameraIdentity("Simulated camera", "simulated", "")
         others = {"Simulated camera": simulated, "Recording bag": CameraIdentity()}
+        others["Orbbec Femto Bolt"] = CameraIdentity("Orbbec Femto Bolt", "AB1", "1.0.9")
+        others["OAK-D Pro"] = CameraIdentity("OAK-D Pro", "18A")
         others["HoloLens 2 AHAT at 127.0.0.1"] = CameraIdentity("HoloLens 2 AHAT")
         assert camera.identity == others.get(camera.name, D415)
 

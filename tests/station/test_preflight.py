@@ -98,6 +98,8 @@ def test_a_realsense_is_found_or_missed(
         ("realsense", {"source": "realsense"}),
         ("simulator", {"source": "simulator"}),
         ("a/recording", {"source": "recording", "recording": "a/recording"}),
+        ("oak", {"source": "oak"}),
+        ("orbbec:AB1", {"source": "orbbec", "serial": "AB1"}),
         ("hololens2:hl", {"source": "hololens2", "hololens2": HoloLens2Settings("hl")}),
     ],
 )
@@ -109,6 +111,8 @@ def test_a_hololens_needs_its_address(settings: StationSettings) -> None:
     live = replace(settings, source="hololens2", headset="network")
     assert find("camera", live).found == "no HoloLens 2 is chosen"
     there = replace(live, hololens2=HoloLens2Settings("192.168.1.7"))
+    by_number = replace(live, source="orbbec", serial="AB1")
+    assert find("camera", by_number).found == "Orbbec camera AB1, not tried yet"
     finding = find("camera", there)
     assert finding.found == "HoloLens 2 AHAT at 192.168.1.7, not tried yet"
     assert finding.health is Health.LIMITED

@@ -19,6 +19,8 @@ _SOURCES: dict[Source, str] = {
     "simulator": tr("Simulator"),
     "realsense": "RealSense",
     "hololens2": "HoloLens 2",
+    "oak": "OAK-D",
+    "orbbec": "Orbbec",
     "recording": tr("Recording"),
 }
 _PATTERN = tr("RealSense recordings ({})").format(
@@ -27,7 +29,7 @@ _PATTERN = tr("RealSense recordings ({})").format(
 
 
 class CameraField(QWidget):
-    """Simulator, RealSense with its settings, HoloLens 2 by address, or a recording by path.
+    """Simulator, RealSense with its settings, others by address or number, or a recording.
 
     Attributes
     ----------
@@ -57,15 +59,23 @@ class CameraField(QWidget):
             QLineEdit(placeholderText=tr("Address of the headset")), "hololens2Host", tr("Address")
         )
         self._hololens2 = HoloLens2Settings()
+        self._other = QLineEdit(placeholderText=tr("Serial number; any if empty"))
+        with_name(self._other, "otherSerial", tr("Serial number"))
         self._recording = PathField(tr("Recording"), "either", _PATTERN)
         details = QStackedWidget()
-        for page in (QWidget(), camera, self._host, self._recording):  # in the order of _SOURCES
+        pages = {"realsense": camera, "hololens2": self._host, "recording": self._recording}
+        pages |= dict.fromkeys(("oak", "orbbec"), self._other)
+        empty = QWidget()
+        for page in (empty, *dict.fromkeys(pages.values())):
             details.addWidget(page)
         fill_row(self, self._source, details, grows=details)
-        self._source.currentIndexChanged.connect(details.setCurrentIndex)
+        self._source.currentIndexChanged.connect(
+            lambda: details.setCurrentWidget(pages.get(self._source.currentData(), empty))
+        )
         self._source.currentIndexChanged.connect(self.changed)
         self._serial.textChanged.connect(self.changed)
         self._host.textChanged.connect(self.changed)
+        self._other.textChanged.connect(self.changed)
         edit.clicked.connect(self.edit_realsense)
         self._recording.changed.connect(self.changed)
 
@@ -74,6 +84,7 @@ class CameraField(QWidget):
         self._source.setCurrentIndex(self._source.findData(settings.source))
         self._realsense = settings.realsense
         self._serial.setText(settings.realsense.serial)
+        self._other.setText(settings.serial)
         self._hololens2 = settings.hololens2
         self._host.setText(settings.hololens2.host)
         self._recording.set_path(settings.recording)
@@ -85,6 +96,7 @@ class CameraField(QWidget):
             source=self._source.currentData(),
             realsense=replace(self._realsense, serial=self._serial.text().strip()),
             hololens2=replace(self._hololens2, host=self._host.text().strip()),
+            serial=self._other.text().strip(),
             recording=self._recording.path,
         )
 

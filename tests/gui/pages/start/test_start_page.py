@@ -297,6 +297,11 @@ def test_the_address_of_a_hololens_reaches_the_settings(
     assert page.new.settings.hololens2 == chosen
     find(page, QLineEdit, "hololens2Host").setText(" hl.local ")
     assert page.new.settings.hololens2 == replace(chosen, host="hl.local")
+    choose(page, "source", "orbbec")
+    other = find(page, QLineEdit, "otherSerial")
+    assert other.isVisible()
+    other.setText("AB1")
+    assert (page.new.settings.source, page.new.settings.serial) == ("orbbec", "AB1")
 
 
 def test_the_gate_stays_open(open_page: Callable[..., StartPage]) -> None:

@@ -1,0 +1,33 @@
+"""Live cameras other than a RealSense, opened by name."""
+
+from __future__ import annotations
+
+from handcal.camera.camera import Camera
+from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+from handcal.camera.oak import OakCamera
+from handcal.camera.orbbec import OrbbecCamera
+
+
+def is_live(source: str) -> bool:
+    """Return whether a name is that of a camera that `open_live` opens."""
+    return hololens2_settings(source) is not None or source.partition(":")[0] in ("oak", "orbbec")
+
+
+def open_live(source: str) -> Camera:
+    """Open the camera of a name.
+
+    Parameters
+    ----------
+    source : str
+        ``oak``, ``orbbec``, or either with its serial number, as ``oak:18443010``; or
+        ``hololens2:HOST`` (`hololens2_settings`).
+
+    Raises
+    ------
+    CameraError
+        If it is not there, or its package is not installed.
+    """
+    if (hololens2 := hololens2_settings(source)) is not None:
+        return HoloLens2Camera(hololens2)
+    kind, _, serial = source.partition(":")
+    return OakCamera(serial) if kind == "oak" else OrbbecCamera(serial)
