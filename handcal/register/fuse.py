@@ -79,9 +79,9 @@ class FuseSettings:
     """Standard deviation of a verification by a usual wearer in each of two directions."""
     verified_depth_sigma: float = 0.005
     """Relative standard deviation of its size; people see a place better than a size."""
-    wearer_scales: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0)
+    wearer_scales: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 8.0)
     """Errors of a wearer's overlay, in those of a usual wearer."""
-    wearer_weights: tuple[float, ...] = (0.8, 0.14, 0.05, 0.01)
+    wearer_weights: tuple[float, ...] = (0.7, 0.16, 0.08, 0.05, 0.01)
     """Probability of each of `wearer_scales`."""
 
     def __post_init__(self) -> None:

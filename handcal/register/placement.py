@@ -51,8 +51,8 @@ class PlacementSettings:
     """Alignments of the recommended plan before the eyes are verified."""
     most: int = 6
     """Alignments after which no other is planned."""
-    checks: int = 2
-    """Largest number of verifications of one eye: the second is for an eye that the first does not
+    checks: int = 3
+    """Largest number of verifications of one eye: the others are for an eye that the first does not
     lead to *accept*. People see two outlines coincide better than they hold a hand."""
 
 

@@ -30,8 +30,9 @@ class VerdictSettings:
 
     target_arcmin: float = 8.0
     """Largest expected error in the display that the lab accepts."""
-    probability_min: float = 0.95
-    """Least probability that the calibration is better than none."""
+    probability_min: float = 0.99
+    """Least probability that the calibration is better than none. High, as a careless wearer whose
+    few observations happen to agree passes for a usual one."""
     eye_box_m: float = 0.020
     """Longest plausible φ."""
     eye_distance_min_m: float = 0.050

@@ -23,6 +23,12 @@ from handcal.types import EYES, Alignment, Eye, Float64, Rig
 
 KEEP_PROMPT = "Keep your hand up."
 """Shown while the next cursor or verification follows at once."""
+# What a wearer balances when the hand is turned is known only if told.
+_MOVE = "Move your hand under the cursor, finger tips and wrist alike, then confirm."
+ADVISE_EVERY_NS = 1_000_000_000
+"""Least time between two pieces of advice, to be read."""
+# The advice does not come and go at its limit.
+_STILL_TURNED = 0.7
 _SHAPE_EVERY_NS = 250_000_000
 """A measurement of the shape takes half of a frame's time, and nobody reads faster."""
 
@@ -93,6 +99,8 @@ class Aligning:
         self._guard = RotationGuard(cursor.points_W_m, cursor.cloud.is_cut)
         self._shape: ShapeChange | None = None
         self._shape_ns = 0
+        self._advice = ""
+        self._advised_ns = 0
 
     def follow(self, observation: Observation, hand: PlacedHand) -> Observation:
         """Return the observation with rotation and change of shape of the live hand."""
@@ -117,6 +125,19 @@ class Aligning:
             is_over_limit=self._is_over_limit(rotation_W) or self._has_changed(shape),
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
+
+    def advise(self, observation: Observation) -> str | None:
+        """Return a new prompt for the wearer, to turn the hand back or no more; None if none."""
+        hand, rotation_rad = observation.hand, observation.rotation_rad
+        if hand is None or rotation_rad is None:
+            return None
+        least_rad = self._limits.advice_rad * (_STILL_TURNED if self._advice else 1.0)
+        is_turned = float(np.linalg.norm(rotation_rad)) > least_rad
+        advice = turn_advice(rotation_rad).text if is_turned else ""
+        if advice == self._advice or hand.t_host_ns - self._advised_ns < ADVISE_EVERY_NS:
+            return None
+        self._advice, self._advised_ns = advice, hand.t_host_ns
+        return f"{advice}, then confirm." if advice else align_prompt(self.eyes)
 
     def judge(
         self,
@@ -209,5 +230,5 @@ def align_prompt(eyes: Sequence[Eye]) -> str:
     """Return what the wearer is asked to do with a cursor."""
     if len(eyes) == 1:
         other = "right" if eyes[0] == "left" else "left"
-        return f"Close your {other} eye. Move your hand under the cursor, then confirm."
-    return "Keep both eyes open. Move your hand under the cursor, then confirm."
+        return f"Close your {other} eye. {_MOVE}"
+    return f"Keep both eyes open. {_MOVE}"

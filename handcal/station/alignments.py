@@ -289,6 +289,8 @@ class AlignmentSteps:
         """Show the live hand with its rotation, and handle a confirmation."""
         if observation.hand is not None:
             observation = aligning.follow(observation, observation.hand)
+            if (prompt := aligning.advise(observation)) is not None:
+                self._link.send_prompt(prompt, self.eyes)
         if observation.hand is not None:
             self._link.send_live_hand(observation.hand.points_W_m, observation.is_over_limit)
         for confirmation in self._link.confirmations():

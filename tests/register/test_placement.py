@@ -111,13 +111,13 @@ def test_the_plan_ends_when_nothing_more_is_needed_or_the_most_were_made() -> No
     refused = _all_named(many, "repeat")
     assert _next(eyes, refused, PlacementSettings(most=10)) is None
     check = many.fused.observed[0]
-    once, twice = (
+    once, often = (
         replace(refused, fused=replace(many.fused, verified=dict.fromkeys(EYES, (check,) * count)))
-        for count in (1, 2)
+        for count in (1, PlacementSettings().checks)
     )
     assert _next(eyes, once, PlacementSettings(most=10)) is None
-    assert _next(eyes, twice, PlacementSettings(most=10)) is not None
-    assert _next(eyes, twice, PlacementSettings(most=6)) is None
+    assert _next(eyes, often, PlacementSettings(most=10)) is not None
+    assert _next(eyes, often, PlacementSettings(most=6)) is None
 
 
 def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:
@@ -134,7 +134,8 @@ def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:
     assert next_check(unsure, both) == "left"
     again: dict[Eye, Verification] = both | {"left": check.after(check)}
     assert next_check(unsure, again) == "right"
-    assert next_check(unsure, dict.fromkeys(EYES, check.after(check))) is None
+    thrice = check.after(check.after(check))
+    assert next_check(unsure, dict.fromkeys(EYES, thrice)) is None
 
 
 def _all_named(results: Results, name: VerdictName) -> Results:

@@ -22,6 +22,7 @@ from handcal.link.server import HeadsetServer
 from handcal.register.guard import RotationGuard
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
+from handcal.station.aligning import ADVISE_EVERY_NS, align_prompt
 from handcal.station.evidence import FROZEN_FRAMES
 from handcal.station.procedure import (
     Calibration,
@@ -150,6 +151,20 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
     age_s = record.alignment_facts[1].match_age_s
     assert age_s is not None
     assert 0.0 <= age_s <= CalibrationSettings().match_tolerance_s
+
+
+def test_a_hand_turned_by_more_than_three_degrees_is_advised_until_it_is_turned_back(
+    stage: Stage,
+) -> None:
+    stage.make_cursor()
+    stage.see(T_D_HAND @ rigid([0.0, 0.0, np.radians(2.2)]))
+    assert stage.shown().prompt == align_prompt(EYES)
+    turned = stage.see(T_D_HAND @ rigid([0.0, 0.0, np.radians(6.0)]))
+    assert not turned.is_over_limit
+    eventually(lambda: stage.shown().prompt == "Tilt your hand anticlockwise, then confirm.")
+    stage.t_ns += ADVISE_EVERY_NS
+    stage.see(T_D_HAND)
+    eventually(lambda: stage.shown().prompt == align_prompt(EYES))
 
 
 def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
