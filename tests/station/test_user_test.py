@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handcal.display import reprojection_error_px
-from handcal.errors import FileError, HandcalError
+from handcal.errors import CameraEndError, FileError, HandcalError
 from handcal.geometry import transform
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
@@ -57,14 +57,20 @@ def test_the_tracked_cube_is_drawn_where_it_is(
 ) -> None:
     server, client, room = bench
     cube, drawn = tracker(session, server, room), list[Shape | None]()
+    seen: list[TrackedCube] = []
     step = cube.step
 
     def look_and_step() -> TrackedCube | None:
         drawn.append(client.state().shape)
-        return step()
+        if len(seen) >= 12 and seen[-1].frames >= 30 and drawn[-1] is not None:
+            raise CameraEndError("enough")
+        tracked = step()
+        if tracked is not None:
+            seen.append(tracked)
+        return tracked
 
     monkeypatch.setattr(cube, "step", look_and_step)
-    found = run_cube_tracking(cube, server, 1.5)
+    found = run_cube_tracking(cube, server, 120.0)
     assert len(found.tracked) > 5
     error_m = np.linalg.norm(found.tracked[-1].T_W_T[:3, 3] - room.T_W_T[:3, 3])
     assert error_m < 0.0015
@@ -106,11 +112,14 @@ def test_the_trials_measure_the_true_error(
 
 
 def test_a_cube_elsewhere_and_an_unsolved_session_are_refused(
-    session: Session, bench: tuple[HeadsetServer, HeadsetClient, CubeBench]
+    session: Session,
+    bench: tuple[HeadsetServer, HeadsetClient, CubeBench],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     server, _, room = bench
     impatient = TrialSettings(depths_m=(0.6,), patience_s=0.5)
     cube = tracker(session, server, room)
+    monkeypatch.setattr(cube, "step", lambda: TrackedCube(0, room.T_W_T, True, 9))
     with pytest.raises(HandcalError, match=r"0\.\d+ m from the eyes; put it down there"):
         run_user_trials(session, server, cube, room.adjust, lambda _: room.place(0.45), impatient)
     rig = Session.open(session.path).rig
