@@ -15,7 +15,7 @@ from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.panels.camera.panel import Mode
 from handcal_gui.program import Program
 
-_LOOK_MS = 400
+_LOOK_MS = 600
 """Time until a change is visible, on a busy computer, too."""
 _TURN_MS = 50
 _PATIENCE_MS = 20_000
