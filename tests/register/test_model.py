@@ -86,7 +86,7 @@ def test_a_turned_outline_is_balanced_wherever_it_is_turned_about(turned_rad: np
 
     def balanced_m(about_m: np.ndarray) -> np.ndarray:
         turned_m = about_m + (HAND_M - about_m) @ R
-        return turned_m + balanced_turn(HAND_M, R, about_m)
+        return np.asarray(turned_m + balanced_turn(HAND_M, R, about_m))
 
     placed_m = balanced_m(HAND_M.mean(axis=0))
     np.testing.assert_allclose(balanced_m(HAND_M[0]), placed_m, atol=5e-5)
