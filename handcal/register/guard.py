@@ -47,7 +47,7 @@ class GuardSettings:
     """Limits beyond which an alignment is refused."""
 
     advice_rad: float = float(np.radians(3.0))
-    """Rotation from which on the headset tells the wearer how to turn the hand back."""
+    """Rotation from which on the headset advises the wearer to turn the hand back."""
     limit_rad: float = float(np.radians(9.0))
     """Largest rotation; 9° in the paper, for its 4 mm line."""
     shape_limit_m: float = 0.0025

@@ -23,7 +23,7 @@ from handcal.types import EYES, Alignment, Eye, Float64, Rig
 
 KEEP_PROMPT = "Keep your hand up."
 """Shown while the next cursor or verification follows at once."""
-# What a wearer balances when the hand is turned is known only if told.
+# The prompt says what to balance when the hand is turned.
 _MOVE = "Move your hand under the cursor, finger tips and wrist alike, then confirm."
 ADVISE_EVERY_NS = 1_000_000_000
 """Least time between two pieces of advice, to be read."""
