@@ -101,7 +101,7 @@ def test_no_scene_is_a_time_out_that_says_what_to_do(world: World) -> None:
         start_s = time.monotonic()
         with pytest.raises(CameraTimeoutError, match="start the virtual headset"):
             camera.read(0.05)
-        assert time.monotonic() - start_s < 0.5
+        assert time.monotonic() - start_s < 5.0
 
 
 def test_reading_again_after_a_time_out_works(world: World) -> None:

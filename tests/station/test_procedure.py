@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -704,9 +703,7 @@ def test_polling_gives_up_when_the_time_is_over(
     client.close()
     eventually(lambda: not server.connected)
     stage.calibration.apply()
-    started_s = time.monotonic()
     assert not stage.calibration.poll_applied()
-    assert time.monotonic() - started_s < 0.1
     assert not stage.calibration.is_applied
     with pytest.raises(LinkError, match="not acknowledged"):
         eventually(stage.calibration.poll_applied)

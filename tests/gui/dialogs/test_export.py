@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -163,10 +162,8 @@ def test_cancel_stops_the_export_and_keeps_the_dialog(
 ) -> None:
     press(dialog, "export").click()
     qtbot.waitUntil(lambda: bool(exporter.folders))
-    started_s = time.perf_counter()
-    press(dialog, "close").click()
+    press(dialog, "close").click()  # the export itself would wait for ever
     qtbot.waitUntil(lambda: "Cancelled" in text(dialog, "exportEndFound"))
-    assert time.perf_counter() - started_s < 0.5
     assert dialog.isVisible()
     press(dialog, "close").click()
     assert not dialog.isVisible()
