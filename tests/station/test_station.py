@@ -21,6 +21,7 @@ from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.station.delay import DelaySettings
 from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings
 from handcal.station.procedure import CalibrationSettings, ProcedureError, State
@@ -35,7 +36,10 @@ NAIVE_SEED = 3
 PATIENCE_S = 50.0
 pytestmark = pytest.mark.process
 # A busy computer gives few frames a second, and the wearer's answer lies between two.
-CALIBRATION = CalibrationSettings(apply_timeout_s=0.5, match_tolerance_s=2.0)
+# A busy machine's camera is late, which would be reported instead of what is tested.
+CALIBRATION = CalibrationSettings(
+    apply_timeout_s=0.5, match_tolerance_s=2.0, delay=DelaySettings(limit_s=5.0)
+)
 
 
 @pytest.fixture
