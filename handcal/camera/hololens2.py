@@ -25,7 +25,7 @@ from handcal.io.closable import Closable
 from handcal.types import CameraIdentity, Float32, Float64, Frame, UInt8
 
 PREFIX = "hololens2:"
-_LONG_THROW, _WITH_COLOR = ",longthrow", ",color"
+_LONG_THROW, _WITH_COLOR, _REALSENSE = ",longthrow", ",color", ",realsense"
 _CALIBRATION_S = 4.0
 _FADING = 0.99
 """Of what is known of white, from one image to the next: a mirror must not count for long."""
@@ -37,19 +37,24 @@ _SHOWN_M = 0.3
 def hololens2_settings(source: str) -> HoloLens2Settings | None:
     """Return the settings that a source's name stands for; None if it is another camera's.
 
-    The name is ``hololens2:HOST``; ``hololens2:HOST,color`` with the front colour camera; or
-    ``hololens2:HOST,longthrow`` for the other depth camera.
+    The name is ``hololens2:HOST``; ``hololens2:HOST,color`` with the front colour camera;
+    ``hololens2:HOST,longthrow`` for the other depth camera; or ``hololens2:HOST,realsense=RIG`` for
+    a RealSense on the headset's USB port, whose lens is in the rig file RIG.
     """
     if not source.startswith(PREFIX):
         return None
-    host = source.removeprefix(PREFIX)
+    host, has_realsense, rig = source.removeprefix(PREFIX).partition(_REALSENSE)
+    if has_realsense:
+        return HoloLens2Settings(host, realsense_rig=rig.removeprefix("="))
     if host.endswith(_LONG_THROW):
         return HoloLens2Settings(host.removesuffix(_LONG_THROW), "longthrow")
     return HoloLens2Settings(host.removesuffix(_WITH_COLOR), has_color=host.endswith(_WITH_COLOR))
 
 
 def identity_of(settings: HoloLens2Settings) -> CameraIdentity:
-    """Return the camera's identity; hl2ss does not tell the headset's serial number."""
+    """Return the camera's identity, without serial number; empty for a RealSense not yet open."""
+    if settings.realsense_rig is not None:
+        return CameraIdentity()
     return CameraIdentity(f"HoloLens 2 {STREAMS[settings.stream].name}")
 
 

@@ -56,8 +56,8 @@ def test_a_folder_plays_back_exactly_what_was_recorded(
 
 
 def test_a_pose_is_played_back_exactly(tmp_path: Path, make_frames: MakeFrames) -> None:
-    poses = [rigid([0.1, -2.0, 0.3], [0.1, -1 / 3, 99.0]), None, rigid([0.1, 0.2, 3.0])]
-    poses[2] = np.float64(np.float32(poses[2]))  # as it comes from a device
+    from_device = rigid([0.1, 0.2, 3.0]).astype(np.float32).astype(np.float64)
+    poses = [rigid([0.1, -2.0, 0.3], [0.1, -1 / 3, 99.0]), None, from_device]
     frames = [
         replace(frame, T_W_D=T) for frame, T in zip(make_frames(3, False), poses, strict=True)
     ]
