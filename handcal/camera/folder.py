@@ -39,6 +39,7 @@ _VERSION = 1
 _COLUMNS = "index,t_camera_ns,has_color"
 _POSED_COLUMNS = f"{_COLUMNS},T_W_D"
 _MAX_LIST_BYTES = 64 * 2**20
+_MOST_FRAMES = 1_000_000
 _REACH_M = 1.0
 _WORLD_M = 1000.0
 _POSE_TOLERANCE = 1e-4  # a product of transforms, each of the accuracy of float32
@@ -221,6 +222,8 @@ def _read_list(path: Path) -> list[_Listed]:
     columns, *lines = text.split("\n")[:-1] or [""]
     if columns not in (_COLUMNS, _POSED_COLUMNS):
         raise FileError(f"{path} must begin with the line {_COLUMNS} or {_POSED_COLUMNS}")
+    if len(lines) > _MOST_FRAMES:
+        raise FileError(f"{path} lists more than {_MOST_FRAMES:,} frames")
     is_posed = columns == _POSED_COLUMNS
     what = "three 64-bit whole numbers" + ", and 12 numbers of a rigid transform" * is_posed
     frames = []

@@ -1,6 +1,6 @@
 """Frames of a RealSense on the USB port of a HoloLens 2, as hl2ss sends its depth unencoded.
 
-hl2ss calls the streams Extended Video and Extended Depth. On the port of the first the client sends
+Written from hl2ss's own sources (https://github.com/jdibenes/hl2ss), server and client. It calls the streams Extended Video and Extended Depth. On the port of the first the client sends
 u8 = 2, and is sent a u32 and so many bytes of UTF-16: the list of cameras, in JSON. On the port of
 the second it selects a group, a source and a profile of that list, as the front colour camera is
 started with options of mixed reality capture (`handcal.camera.hl2ss_color`): opacity, width and
@@ -35,7 +35,7 @@ _LIST_REQUEST = struct.pack("<B", 2)
 _STOP = struct.pack("<B", 11)
 _MEDIA_INDEX, _STRIDE_MASK = 2**64 - 5, 2**64 - 4
 _MAX_LIST_BYTES = 4 * 2**20
-_MOST_LISTED = 10_000
+_MOST_LISTED, _MOST_NAMED, _LONGEST_NAME = 10_000, 8, 100
 _LIST_S = 4.0
 _RATE_HZ = 15
 _MOST_PADDING_PX = 256
@@ -127,7 +127,7 @@ def find_depth(listed: bytes, lens: Intrinsics) -> DepthFormat:
     try:
         groups = json.loads(listed.decode("utf-16-le"))
         cameras = [
-            (str(group["DisplayName"]).strip(), _number(key), group["SourceInfos"]["0"])
+            (_name(group["DisplayName"]), _number(key), group["SourceInfos"]["0"])
             for key, group in groups.items()
         ]
         depth = [one for one in cameras if "RealSense" in one[0] and one[0].endswith("Depth")]
@@ -142,7 +142,7 @@ def find_depth(listed: bytes, lens: Intrinsics) -> DepthFormat:
         ) from error
     size = f"{lens.width}x{lens.height}"
     if not depth:
-        names = ", ".join(name for name, _, _ in cameras) or "none"
+        names = ", ".join(name for name, _, _ in cameras[:_MOST_NAMED]) or "none"
         raise CameraError(
             f"no depth camera of a RealSense is on the HoloLens's USB port (found: {names}); plug "
             "one in, with a powered hub if it fails to start"
@@ -177,6 +177,12 @@ def _identity_of(name: str) -> CameraIdentity:
     """Return librealsense's name of the model, as far as that of Windows tells it."""
     model = _WINDOWS_NAME.search(name)
     return CameraIdentity(f"Intel RealSense D{model[1].upper()}" if model else "")
+
+
+def _name(value: object) -> str:
+    """Return a name of one line that can be printed anywhere."""
+    plain = str(value)[:_LONGEST_NAME].encode("ascii", "replace").decode()
+    return " ".join(re.sub(r"[^ -~]", " ", plain).split())
 
 
 def _number(key: str) -> int:
