@@ -1,12 +1,13 @@
 """Frames of a RealSense on the USB port of a HoloLens 2, as hl2ss sends its depth unencoded.
 
-Written from hl2ss's own sources (https://github.com/jdibenes/hl2ss), server and client. It calls the streams Extended Video and Extended Depth. On the port of the first the client sends
-u8 = 2, and is sent a u32 and so many bytes of UTF-16: the list of cameras, in JSON. On the port of
-the second it selects a group, a source and a profile of that list, as the front colour camera is
-started with options of mixed reality capture (`handcal.camera.hl2ss_color`): opacity, width and
-height, three f32, are the three numbers. The request is mode u8 = 0 (without pose), divisor u8,
-depth profile u8 = 0 (as it is), number of options u8, and each option as two u64: the number of the
-image format in the list, and the mask by which widths are rounded up, 0.
+Written from hl2ss's own sources (https://github.com/jdibenes/hl2ss), server and client, which call
+the streams Extended Video and Extended Depth. On the port of the first the client sends u8 = 2, and
+is sent a u32 and so many bytes of UTF-16: the list of cameras, in JSON. On the port of the second
+it selects a group, a source and a profile of that list, as the front colour camera is started with
+options of mixed reality capture (`handcal.camera.hl2ss_color`): opacity, width and height, three
+f32, are the three numbers. The request is mode u8 = 0 (without pose), divisor u8, depth profile
+u8 = 0 (as it is), number of options u8, and each option as two u64: the number of the image format
+in the list, and the mask by which widths are rounded up, 0.
 
 A packet is as in `handcal.camera.hl2ss`, without a pose. Its payload is the driver's buffer of u16
 by rows, and width u16 and height u16. The rows may be longer than the image is wide.
