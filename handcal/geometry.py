@@ -32,18 +32,18 @@ def invert(T_dst_src: Float64) -> Float64:
     return rigid(R.T, -R.T @ T_dst_src[:3, 3])
 
 
-def is_rigid(T: Float64, reach_m: float) -> bool:
+def is_rigid(T: Float64, reach_m: float, tolerance: float = _ROTATION_TOLERANCE) -> bool:
     """Return whether an untrusted (4, 4) matrix, which may hold NaN, is a rigid transform.
 
-    Its rotation must be right-handed and orthonormal to 1e-5, the accuracy of float32, and each
-    component of its translation below `reach_m`.
+    Its rotation must be right-handed and orthonormal to `tolerance`, by default the accuracy of
+    float32, and each component of its translation below `reach_m`.
     """
     R = T[:3, :3]
     return bool(
         (np.abs(R) < 2.0).all()
         and (np.abs(T[:3, 3]) < reach_m).all()
         and (T[3] == [0.0, 0.0, 0.0, 1.0]).all()
-        and np.abs(R @ R.T - np.eye(3)).max() < _ROTATION_TOLERANCE
+        and np.abs(R @ R.T - np.eye(3)).max() < tolerance
         and np.linalg.det(R) > 0.0
     )
 

@@ -37,8 +37,12 @@ LIST = "frames.csv"
 
 _VERSION = 1
 _COLUMNS = "index,t_camera_ns,has_color"
-_MAX_LIST_BYTES = 8 * 2**20
+_POSED_COLUMNS = f"{_COLUMNS},T_W_D"
+_MAX_LIST_BYTES = 64 * 2**20
+_MOST_FRAMES = 1_000_000
 _REACH_M = 1.0
+_WORLD_M = 1000.0
+_POSE_TOLERANCE = 1e-4  # a product of transforms, each of the accuracy of float32
 _WRITERS = min(4, os.cpu_count() or 1)
 _MOST_WAITING = 8
 # Low compression, as compressing takes most of the time.
@@ -50,6 +54,7 @@ class _Listed:
     index: int
     t_camera_ns: int
     has_color: bool
+    T_W_D: Float64 | None
 
 
 class FolderCamera(PlayedCamera):
@@ -113,6 +118,7 @@ class FolderCamera(PlayedCamera):
                 color=None if color_camera is None else read_color(color_path, color_camera),
                 color_intrinsics=color_camera,
                 T_C_D=np.eye(4) if color_camera is None else self._T_C_D,
+                T_W_D=listed.T_W_D,
             )
         except FileError as error:
             raise CameraError(str(error)) from error
@@ -133,7 +139,7 @@ def record_folder(
         Created if needed; it must be empty.
     frames : iterable of Frame
         Frames of one camera, with the same intrinsics, depth scale and extrinsics. If the first has
-        colour, later ones may lack it.
+        colour or a pose, later ones may lack it.
     identity : CameraIdentity
         Of that camera, where it is known.
 
@@ -165,12 +171,12 @@ def record_folder(
         },
     )
     try:
-        return _write_frames(folder, frames)
+        return _write_frames(folder, frames, first.T_W_D is not None)
     except OSError as error:
         raise FileError(f"cannot write {folder}: {error.strerror or error}") from error
 
 
-def _write_frames(folder: Path, frames: Iterable[Frame]) -> int:
+def _write_frames(folder: Path, frames: Iterable[Frame], is_posed: bool) -> int:
     """Write images in several threads, as compression takes longer than a frame lasts."""
     number = 0
     waiting: deque[tuple[Frame, Future[None]]] = deque()
@@ -179,10 +185,11 @@ def _write_frames(folder: Path, frames: Iterable[Frame]) -> int:
         def list_oldest() -> None:
             frame, written = waiting.popleft()
             written.result()
-            file.write(f"{frame.index},{frame.t_camera_ns},{int(frame.color is not None)}\n")
+            line = f"{frame.index},{frame.t_camera_ns},{int(frame.color is not None)}"
+            file.write(f"{line},{_pose_text(frame.T_W_D)}\n" if is_posed else f"{line}\n")
             file.flush()
 
-        file.write(f"{_COLUMNS}\n")
+        file.write(f"{_POSED_COLUMNS if is_posed else _COLUMNS}\n")
         for number, frame in enumerate(frames, start=1):
             waiting.append((frame, pool.submit(_write_images, folder, number, frame)))
             if len(waiting) > _MOST_WAITING:
@@ -213,18 +220,46 @@ def _read_list(path: Path) -> list[_Listed]:
     """Read the list of frames; an incomplete last line, as after a crash, is ignored."""
     text = read_limited(path, _MAX_LIST_BYTES).decode("ascii", errors="replace")
     columns, *lines = text.split("\n")[:-1] or [""]
-    if columns != _COLUMNS:
-        raise FileError(f"{path} must begin with the line {_COLUMNS}")
-    try:
-        return [_listed(*map(int, line.split(","))) for line in lines]
-    except (TypeError, ValueError) as error:
-        raise FileError(f"{path} must hold three 64-bit whole numbers on each line") from error
+    if columns not in (_COLUMNS, _POSED_COLUMNS):
+        raise FileError(f"{path} must begin with the line {_COLUMNS} or {_POSED_COLUMNS}")
+    if len(lines) > _MOST_FRAMES:
+        raise FileError(f"{path} lists more than {_MOST_FRAMES:,} frames")
+    is_posed = columns == _POSED_COLUMNS
+    what = "three 64-bit whole numbers" + ", and 12 numbers of a rigid transform" * is_posed
+    frames = []
+    for number, line in enumerate(lines, start=2):
+        fields = line.split(",")
+        try:
+            if len(fields) != 3 + is_posed:
+                raise ValueError("another number of fields")
+            frames.append(_listed(*fields))
+        except ValueError as error:
+            raise FileError(
+                f"{path} must hold {what} on each line; line {number} does not"
+            ) from error
+    return frames
 
 
-def _listed(index: int, t_camera_ns: int, has_color: int) -> _Listed:
-    if max(abs(index), abs(t_camera_ns)) >= 2**63:
+def _listed(index: str, t_camera_ns: str, has_color: str, pose: str = "") -> _Listed:
+    listed = _Listed(int(index), int(t_camera_ns), bool(int(has_color)), _pose_from(pose))
+    if max(abs(listed.index), abs(listed.t_camera_ns)) >= 2**63:
         raise ValueError("more than 64 bits")
-    return _Listed(index, t_camera_ns, bool(has_color))
+    return listed
+
+
+def _pose_text(T: Float64 | None) -> str:
+    """Return the first 3 rows, so that they are read back exactly."""
+    return "" if T is None else " ".join(map(repr, T[:3].ravel().tolist()))
+
+
+def _pose_from(text: str) -> Float64 | None:
+    if not text:
+        return None
+    T = np.eye(4)
+    T[:3] = np.array([float(number) for number in text.split(" ")]).reshape(3, 4)
+    if not is_rigid(T, _WORLD_M, _POSE_TOLERANCE):
+        raise ValueError("no rigid transform")
+    return T
 
 
 def _rigid_from(value: object, path: Path) -> Float64:

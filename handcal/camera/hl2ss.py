@@ -70,6 +70,8 @@ class Stream:
     """True for AHAT, whose distances begin again at its alias."""
     packet_bytes: tuple[int, int]
     """Least and largest size of a payload."""
+    has_pose: bool = True
+    """True if a pose follows each payload."""
 
     @property
     def pixels(self) -> int:
@@ -178,7 +180,7 @@ class Hl2ssConnection(Closable):
         least, most = stream.packet_bytes
         if not least <= size <= most:
             raise foreign(stream, f"a payload of {size} bytes")
-        return self.receive(_HEADER.size + size + _POSE_BYTES, timeout_s)
+        return self.receive(_HEADER.size + size + _POSE_BYTES * stream.has_pose, timeout_s)
 
     def close(self) -> None:
         """End the connection; safe to call twice, and while another thread receives."""

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
-from collections import deque
 from contextlib import suppress
 from dataclasses import replace
 
@@ -14,12 +11,12 @@ from handcal.camera.hl2ss import (
     CALIBRATION_REQUEST,
     STREAMS,
     Hl2ssConnection,
-    Stream,
     parse_calibration,
     parse_packet,
     time_of,
 )
 from handcal.camera.hl2ss_color import COLOR, parse_color, start_color, stop_color
+from handcal.camera.hl2ss_newest import NewestPackets
 from handcal.camera.radial import DEPTH_SCALE_M, PinholeView, is_not_wrapped, white_brightness
 from handcal.camera.settings import HoloLens2Settings
 from handcal.errors import CameraError, CameraTimeoutError
@@ -28,13 +25,11 @@ from handcal.io.closable import Closable
 from handcal.types import CameraIdentity, Float32, Float64, Frame, UInt8
 
 PREFIX = "hololens2:"
-_LONG_THROW, _WITH_COLOR = ",longthrow", ",color"
+_LONG_THROW, _WITH_COLOR, _REALSENSE = ",longthrow", ",color", ",realsense"
 _CALIBRATION_S = 4.0
-_POLL_S = 0.2
 _FADING = 0.99
 """Of what is known of white, from one image to the next: a mirror must not count for long."""
 _APART_NS = 50_000_000
-_KEPT = 4
 _SHOWN_M = 0.3
 """Distance at which a white surface is white in the grey image."""
 
@@ -42,19 +37,24 @@ _SHOWN_M = 0.3
 def hololens2_settings(source: str) -> HoloLens2Settings | None:
     """Return the settings that a source's name stands for; None if it is another camera's.
 
-    The name is ``hololens2:HOST``; ``hololens2:HOST,color`` with the front colour camera; or
-    ``hololens2:HOST,longthrow`` for the other depth camera.
+    The name is ``hololens2:HOST``; ``hololens2:HOST,color`` with the front colour camera;
+    ``hololens2:HOST,longthrow`` for the other depth camera; or ``hololens2:HOST,realsense=RIG`` for
+    a RealSense on the headset's USB port, whose lens is in the rig file RIG.
     """
     if not source.startswith(PREFIX):
         return None
-    host = source.removeprefix(PREFIX)
+    host, has_realsense, rig = source.removeprefix(PREFIX).partition(_REALSENSE)
+    if has_realsense:
+        return HoloLens2Settings(host, realsense_rig=rig.removeprefix("="))
     if host.endswith(_LONG_THROW):
         return HoloLens2Settings(host.removesuffix(_LONG_THROW), "longthrow")
     return HoloLens2Settings(host.removesuffix(_WITH_COLOR), has_color=host.endswith(_WITH_COLOR))
 
 
 def identity_of(settings: HoloLens2Settings) -> CameraIdentity:
-    """Return the camera's identity; hl2ss does not tell the headset's serial number."""
+    """Return the camera's identity, without serial number; empty for a RealSense not yet open."""
+    if settings.realsense_rig is not None:
+        return CameraIdentity()
     return CameraIdentity(f"HoloLens 2 {STREAMS[settings.stream].name}")
 
 
@@ -97,12 +97,12 @@ class HoloLens2Camera(Closable):
         self._white = 0.0
         self._keeps_wrapped = settings.keeps_wrapped
         request = self._stream.request(settings.divisor)
-        self._color: tuple[_Newest, tuple[str, int]] | None = None
-        self._newest = _Newest(Hl2ssConnection(settings.host, port, request), self._stream)
+        self._color: tuple[NewestPackets, tuple[str, int]] | None = None
+        self._newest = NewestPackets(Hl2ssConnection(settings.host, port, request), self._stream)
         if settings.has_color:
             where = settings.host, settings.color_port or COLOR.port
             try:
-                self._color = _Newest(start_color(*where), COLOR), where
+                self._color = NewestPackets(start_color(*where), COLOR), where
             except CameraError:
                 self._newest.close()
                 raise
@@ -175,75 +175,3 @@ def _with_picture(frame: Frame, packets: list[bytes], name: str) -> Frame:
         color_intrinsics=picture.intrinsics,
         T_C_D=invert(picture.T_W_C) @ frame.T_W_D,
     )
-
-
-class _Newest(Closable):
-    """The newest packets of a stream, received by a thread of its own: older ones are dropped."""
-
-    def __init__(self, connection: Hl2ssConnection, stream: Stream) -> None:
-        self._connection = connection
-        self._stream = stream
-        self._packet: tuple[int, int, bytes] | None = None
-        self._recent: deque[bytes] = deque(maxlen=_KEPT)
-        self._error: CameraError | None = None
-        self._is_closed = False
-        self._changed = threading.Condition()
-        self._thread = threading.Thread(target=self._receive, name="hl2ss", daemon=True)
-        self._thread.start()
-
-    def take(self, name: str, timeout_s: float) -> tuple[int, int, bytes]:
-        """Return number, time of arrival on the host's clock, and data of the newest packet.
-
-        Raises
-        ------
-        CameraTimeoutError
-            If there is no new one in time.
-        CameraError
-            If the stream has ended.
-        """
-        with self._changed:
-            self._changed.wait_for(
-                lambda: self._packet or self._error or self._is_closed, timeout_s
-            )
-            if self._is_closed:
-                raise CameraError(f"{name} is closed; open it again")
-            if self._packet is not None:
-                packet, self._packet = self._packet, None
-                return packet
-            if self._error is not None:
-                raise self._error
-        raise CameraTimeoutError(
-            f"{name} sent no image for {timeout_s:g} s; put the headset on, and keep hl2ss running"
-        )
-
-    def recent(self) -> list[bytes]:
-        """Return the last few packets; CameraError if the stream has ended."""
-        with self._changed:
-            if self._error is not None:
-                raise self._error
-            return list(self._recent)
-
-    def close(self) -> None:
-        with self._changed:
-            self._is_closed = True
-            self._changed.notify_all()
-        self._connection.close()
-        self._thread.join()
-
-    def _receive(self) -> None:
-        number = 0
-        while not self._is_closed:
-            try:
-                data = self._connection.receive_packet(self._stream, _POLL_S)
-            except CameraTimeoutError:
-                continue
-            except CameraError as error:
-                with self._changed:
-                    self._error = error
-                    self._changed.notify_all()
-                return
-            number += 1
-            with self._changed:
-                self._packet = number, time.monotonic_ns(), data
-                self._recent.append(data)
-                self._changed.notify_all()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from handcal.camera.camera import Camera
+from handcal.camera.hl2ss_realsense import HoloLens2RealSense
 from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
 from handcal.camera.oak import OakCamera
 from handcal.camera.orbbec import OrbbecCamera
+from handcal.camera.settings import HoloLens2Settings
 
 
 def is_live(source: str) -> bool:
@@ -28,6 +30,12 @@ def open_live(source: str) -> Camera:
         If it is not there, or its package is not installed.
     """
     if (hololens2 := hololens2_settings(source)) is not None:
-        return HoloLens2Camera(hololens2)
+        return open_hololens2(hololens2)
     kind, _, serial = source.partition(":")
     return OakCamera(serial) if kind == "oak" else OrbbecCamera(serial)
+
+
+def open_hololens2(settings: HoloLens2Settings) -> Camera:
+    """Open a depth camera of a HoloLens 2, or a RealSense on its USB port; raises `CameraError`."""
+    own = settings.realsense_rig is None
+    return HoloLens2Camera(settings) if own else HoloLens2RealSense(settings)

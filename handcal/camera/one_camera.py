@@ -13,7 +13,7 @@ from handcal.types import Frame
 def of_one_camera(frames: Iterable[Frame]) -> tuple[Frame, Iterator[Frame]]:
     """Return the first frame, and an iterator over all frames that checks each.
 
-    Later frames may lack colour.
+    Later frames may lack colour or the pose.
 
     Raises
     ------
@@ -36,6 +36,7 @@ def _checked(frame: Frame, first: Frame) -> Frame:
         frame.color_intrinsics == first.color_intrinsics
         and np.array_equal(frame.T_C_D, first.T_C_D)
     )
-    if not has_same_depth or not has_same_color:
+    gains_pose = frame.T_W_D is not None and first.T_W_D is None
+    if not has_same_depth or not has_same_color or gains_pose:
         raise ValueError(f"frame {frame.index} is not from the camera of the first frame")
     return frame

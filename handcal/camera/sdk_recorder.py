@@ -48,7 +48,8 @@ def record_db3(
     CameraError
         If librealsense is not installed or cannot write the file.
     ValueError
-        If there is no frame, frames differ in camera, or `path` does not end in ``.db3``.
+        If there is no frame, frames differ in camera or tell its pose, or `path` does not end in
+        ``.db3``.
     """
     if path.suffix != ".db3":
         raise ValueError(f"librealsense records only .db3 files, not {path.name}")
@@ -68,6 +69,8 @@ def record_db3(
 def _record(path: Path, frames: Iterable[Frame], identity: CameraIdentity) -> int:
     rs = librealsense()
     first, frames = of_one_camera(frames)
+    if first.T_W_D is not None:
+        raise ValueError("a .db3 file holds no poses; record this camera into a folder")
     device = rs.software_device()
     for what, text in zip(_IDENTITY, astuple(identity), strict=True):
         if text:

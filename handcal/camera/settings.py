@@ -36,7 +36,7 @@ class RealSenseSettings:
 
 @dataclass(frozen=True, slots=True)
 class HoloLens2Settings:
-    """Settings of a HoloLens 2's own depth camera, streamed by hl2ss."""
+    """Settings of a depth camera of a HoloLens 2, streamed by hl2ss."""
 
     host: str = ""
     """Address of the headset."""
@@ -45,11 +45,15 @@ class HoloLens2Settings:
     port: int | None = None
     """Port of the stream; None for hl2ss's own."""
     divisor: int = 3
-    """Every so many images of the camera are sent: AHAT makes 45 a second, too many for Wi-Fi."""
+    """Every so many images of the headset's own camera are sent: AHAT makes 45 a second, too many
+    for Wi-Fi."""
     has_color: bool = False
     """Send the pictures of the front colour camera, too, in place of the depth camera's grey."""
     color_port: int | None = None
-    """Port of these; None for hl2ss's own."""
+    """Port of these, and of the list of connected cameras; None for hl2ss's own."""
+    realsense_rig: str | None = None
+    """Rig file with the lens of a RealSense on the headset's USB port, which is then streamed; None
+    for the headset's own depth cameras."""
     keeps_wrapped: bool = False
     """Keep distances that may be of a surface one alias farther away. A depth check needs it: the
     ink of its board is as dark as a far wall."""

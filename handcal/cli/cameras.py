@@ -197,8 +197,8 @@ def open_source(
     source: str, realsense: RealSenseSettings, seed: int = 1, *, keeps_wrapped: bool = False
 ) -> Camera:
     """Open the camera that an option names: of a kind, or the path of a recording."""
-    from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
-    from handcal.camera.live import is_live, open_live
+    from handcal.camera.hololens2 import hololens2_settings
+    from handcal.camera.live import is_live, open_hololens2, open_live
     from handcal.camera.realsense import RealSenseCamera
     from handcal.camera.recordings import open_recording
     from handcal.sim.camera import SyntheticCamera
@@ -215,7 +215,7 @@ def open_source(
             return RealSenseCamera(realsense)
         case other:
             if (hololens2 := hololens2_settings(other)) is not None:
-                return HoloLens2Camera(replace(hololens2, keeps_wrapped=keeps_wrapped))
+                return open_hololens2(replace(hololens2, keeps_wrapped=keeps_wrapped))
             return open_live(other) if is_live(other) else open_recording(Path(other))
 
 

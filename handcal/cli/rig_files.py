@@ -288,7 +288,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     from handcal.station.camera_pose import run_camera_pose
 
     settings = hololens2_settings(arguments.factory)
-    if settings is None:
+    if settings is None or settings.realsense_rig is not None:
         raise HandcalError(f"--factory: a headset is hololens2:HOST, not {arguments.factory}")
     with ExitStack() as stack:
         camera = stack.enter_context(HoloLens2Camera(settings))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import os
 import platform
 import shutil
@@ -46,6 +47,8 @@ _PACKAGES = (
     "PySide6-Essentials",
     "pyqtgraph",
 )
+_CAMERA_EXTRAS = (("oak", "depthai", "OAK-D"), ("orbbec", "pyorbbecsdk", "Orbbec"))
+"""Extra, its module, and the cameras that need it."""
 _CAMERA_LATENCY_S = CalibrationSettings().camera_latency_s
 _SETTLE_S = 2.0
 _POLL_S = 0.05
@@ -91,6 +94,7 @@ def examine(rig: Path | None = None) -> list[Finding]:
         _pairing(),
         *_rig(rig),
         *_cameras(rig),
+        *_camera_extras(),
         _screen(),
         _disk(),
     ]
@@ -226,6 +230,19 @@ def _cameras(rig: Path | None) -> list[Finding]:
             advice += "; a plugged-in camera needs Settings, Privacy, Camera, desktop apps: on"
         return [Finding("Camera", Health.LIMITED, explain_absence(), advice)]
     return [with_rig(examine_camera(device), rig, device.identity) for device in devices]
+
+
+def _camera_extras() -> list[Finding]:
+    """Look for the libraries of the other cameras without importing them."""
+    findings = []
+    for extra, module, camera in _CAMERA_EXTRAS:
+        what = f"{camera} library"
+        if importlib.util.find_spec(module) is None:
+            advice = f"needed for {camera} cameras: pip install 'handcal[{extra}]'"
+            findings.append(Finding(what, Health.LIMITED, f"{module} is not installed", advice))
+        else:
+            findings.append(Finding(what, Health.GOOD, f"{module} is installed"))
+    return findings
 
 
 def with_rig(

@@ -106,8 +106,9 @@ def _hololens2(settings: StationSettings) -> Finding:
     if not settings.hololens2.host:
         return _broken("no HoloLens 2 is chosen", "enter its address, as its settings show it")
     identity = identity_of(settings.hololens2)
+    name = identity.model or "RealSense on the HoloLens 2"
     found = _limited(
-        f"{identity.model} at {settings.hololens2.host}, not tried yet",
+        f"{name} at {settings.hololens2.host}, not tried yet",
         "start hl2ss on it; it is opened at the start",
     )
     return with_rig(found, _chosen_rig(settings), identity)

@@ -15,8 +15,7 @@ import numpy as np
 
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
-from handcal.camera.hololens2 import HoloLens2Camera
-from handcal.camera.live import open_live
+from handcal.camera.live import open_hololens2, open_live
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording
 from handcal.display import target_corners_m, view_of_eye
@@ -448,7 +447,7 @@ class Station(Closable):
         if settings.source == "realsense":
             return RealSenseCamera(settings.realsense)
         if settings.source == "hololens2":
-            return HoloLens2Camera(settings.hololens2)
+            return open_hololens2(settings.hololens2)
         if settings.source in ("oak", "orbbec"):
             return open_live(f"{settings.source}:{settings.serial}")
         if settings.source == "recording":

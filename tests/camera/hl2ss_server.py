@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import struct
 import threading
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.camera.settings import HoloLens2Settings
 from handcal.geometry import invert
 from handcal.io.closable import Closable
-from handcal.types import Float32, Float64
+from handcal.rig.example import example_rig
+from handcal.rig.rig_file import write_rig
+from handcal.types import Float32, Float64, Intrinsics
 
 AHAT_REQUEST = b"\x01\x03\x00\xff\xff\x00\x00\x00\x00\x00"
 LONG_THROW_REQUEST = b"\x01\x03\x00\x00\x00\x00"
@@ -62,8 +69,55 @@ def color_payload(image: NDArray[np.uint8], fx: float, fy: float, cx: float, cy:
     return padded.tobytes() + about
 
 
+def one_format(rate_hz: float, subtype: str = "Unknown", width: int = 48) -> dict[str, Any]:
+    """Return an image format in the list of cameras; "Unknown" is 16-bit depth."""
+    return {"Width": width, "Height": 32, "FrameRate": rate_hz, "Subtype": subtype}
+
+
+def group(name: str, *formats: dict[str, Any]) -> dict[str, Any]:
+    """Return a camera in the list of cameras."""
+    numbered = {str(number): one for number, one in enumerate(formats)}
+    return {"DisplayName": name, "SourceInfos": {"0": {"VideoProfileMediaDescription": numbered}}}
+
+
+LENS = Intrinsics(48, 32, 40.0, 40.0, 23.5, 15.5)
+NAME = "Intel(R) RealSense(TM) Depth Camera 415 Depth"
+FORMATS = (one_format(6.0), one_format(90.0), one_format(30.0), one_format(15.0, "MPEG"))
+GROUPS = {
+    "0": group("QC Back Camera", *FORMATS),
+    "1": group(NAME, *FORMATS, one_format(30.0), one_format(30.0, width=64)),
+    "2": group("Intel(R) RealSense(TM) Depth Camera 415 RGB", *FORMATS),
+}
+
+
+def as_sent(groups: object) -> bytes:
+    """Return the text of a list of cameras."""
+    return json.dumps(groups).encode("utf-16-le")
+
+
+def camera_list_of(groups: object) -> bytes:
+    """Return the answer that lists the cameras."""
+    text = as_sent(groups)
+    return struct.pack("<I", len(text)) + text
+
+
+def depth_packet_of(
+    ticks: int, depth: NDArray[Any], size_px: tuple[int, int] = (LENS.width, LENS.height)
+) -> bytes:
+    """Return a packet of a RealSense on the USB port."""
+    payload = depth.astype("<u2").tobytes() + struct.pack("<2H", *size_px)
+    return struct.pack("<QI", ticks, len(payload)) + payload
+
+
+def realsense_settings(server: Hl2ssServer, folder: Path) -> HoloLens2Settings:
+    """Return settings for a server whose RealSense has the lens, in a rig file in `folder`."""
+    rig, port = folder / "rig.yaml", server.port
+    write_rig(rig, replace(example_rig(), depth_intrinsics=LENS))
+    return HoloLens2Settings("127.0.0.1", port=port, color_port=port, realsense_rig=str(rig))
+
+
 class Hl2ssServer(Closable):
-    """Serves one client after another: the calibration, or packets until the client leaves.
+    """Serves one client after another: its first answer, or packets until the client leaves.
 
     Parameters
     ----------
@@ -105,7 +159,7 @@ class Hl2ssServer(Closable):
         self.requests.append(request)
         if request == b"\x02":
             client.sendall(self._calibration)
-        if request[0] != 1:
+        if request[0] not in (0, 1):
             return
         while not self._is_over.wait(0.005):
             packet = self._next_packet()

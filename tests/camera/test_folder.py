@@ -13,6 +13,7 @@ import pytest
 
 from handcal.camera.folder import DESCRIPTION, LIST, FolderCamera, record_folder
 from handcal.errors import CameraEndError, CameraError, FileError
+from handcal.geometry import rigid
 from handcal.types import Frame
 
 MakeFrames = Callable[..., Iterator[Frame]]
@@ -52,6 +53,40 @@ def test_a_folder_plays_back_exactly_what_was_recorded(
                 assert got.color is None
             else:
                 np.testing.assert_array_equal(got.color, want.color)
+
+
+def test_a_pose_is_played_back_exactly(tmp_path: Path, make_frames: MakeFrames) -> None:
+    from_device = rigid([0.1, 0.2, 3.0]).astype(np.float32).astype(np.float64)
+    poses = [rigid([0.1, -2.0, 0.3], [0.1, -1 / 3, 99.0]), None, from_device]
+    frames = [
+        replace(frame, T_W_D=T) for frame, T in zip(make_frames(3, False), poses, strict=True)
+    ]
+    record_folder(tmp_path / "hand", frames)
+    with FolderCamera(tmp_path / "hand") as camera:
+        for frame, T_W_D in zip(read_all(camera), poses, strict=True):
+            np.testing.assert_array_equal(frame.T_W_D, T_W_D)
+    with pytest.raises(ValueError, match="frame 1 is not from the camera"):
+        record_folder(tmp_path / "late", [frames[1], frames[0]])
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        ",1 0 0 0 0 1 0 0 0 0 1 0,",
+        "",
+        ",1 0 0 0 0 1 0 0 0 0 1",
+        ",1 0 0 0 0 1 0 0 0 0 1 x",
+        ",1 0 0 0 0 1 0 0 0 0 1 nan",
+        ",1 0 0 0 0 1 0 0 0 0 1 5e3",
+        ",2 0 0 0 0 1 0 0 0 0 1 0",
+        ",1 0 0 0 0 1 0 0 0 0 -1 0",
+    ],
+)
+def test_a_damaged_pose_is_refused(folder: Path, pose: str) -> None:
+    good = "1,2,0,1 0 0 0 0 1 0 0 0 0 1 0"
+    (folder / LIST).write_text(f"index,t_camera_ns,has_color,T_W_D\n{good}\n2,3,0{pose}\n")
+    with pytest.raises(CameraError, match=r"frames\.csv must .* rigid transform .*; line 3 does"):
+        FolderCamera(folder)
 
 
 def test_frames_before_a_failure_are_kept(tmp_path: Path, make_frames: MakeFrames) -> None:

@@ -6,12 +6,14 @@ import struct
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 import pytest
 
 from handcal.camera.feed import CameraFeed, FeedSettings
+from handcal.camera.folder import FolderCamera, record_folder
 from handcal.camera.hl2ss import STREAMS, parse_calibration
 from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
 from handcal.camera.radial import is_not_wrapped, white_brightness
@@ -104,6 +106,16 @@ def test_depth_is_that_of_a_pinhole_camera(
     assert np.count_nonzero(frame.depth[~is_hand]) < 0.03 * is_hand.sum()
     assert frame.color is not None
     assert frame.color[seen].mean() > 3.0 * frame.color[~is_hand].mean()
+
+
+def test_a_recording_plays_with_the_poses(serve: Serve, tmp_path: Path) -> None:
+    with HoloLens2Camera(serve()) as camera:
+        frames = [camera.read(5.0), camera.read(5.0)]
+    record_folder(tmp_path / "taken", frames, camera.identity)
+    with FolderCamera(tmp_path / "taken") as played:
+        for frame in frames:
+            assert frame.T_W_D is not None
+            np.testing.assert_array_equal(played.read().T_W_D, frame.T_W_D)
 
 
 def test_a_small_hand_tells_a_large_far_wall_apart() -> None:

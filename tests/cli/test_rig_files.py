@@ -237,5 +237,7 @@ def test_a_headset_tells_the_pose_of_its_own_camera(
     assert "T_H_D" not in made.origins
     with pytest.raises(HandcalError, match="not realsense"):
         run(*make, "--factory", "realsense")
+    with pytest.raises(HandcalError, match="a headset is hololens2:HOST, not"):
+        run(*make, "--factory", "hololens2:127.0.0.1,realsense=rig.yaml")
     with pytest.raises(HandcalError, match="either --stereo or --factory"):
         run(*make)

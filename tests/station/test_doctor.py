@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import shutil
 import sys
 import time
@@ -178,6 +179,22 @@ def test_a_missing_camera_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "connected_devices", fail_with(CameraError("no SDK")))
     assert of("RealSense SDK").found == "no SDK"
     assert of("RealSense SDK").health is Health.LIMITED
+
+
+@pytest.mark.parametrize(
+    ("what", "module", "extra"),
+    [("OAK-D library", "depthai", "oak"), ("Orbbec library", "pyorbbecsdk", "orbbec")],
+)
+def test_the_libraries_of_other_cameras(
+    what: str, module: str, extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = {module}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name in here or None)
+    assert of(what) == Finding(what, Health.GOOD, f"{module} is installed")
+    here.clear()
+    assert of(what).health is Health.LIMITED
+    assert of(what).found == f"{module} is not installed"
+    assert f"'handcal[{extra}]'" in of(what).advice
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have always a screen")

@@ -116,6 +116,8 @@ def test_a_hololens_needs_its_address(settings: StationSettings) -> None:
     finding = find("camera", there)
     assert finding.found == "HoloLens 2 AHAT at 192.168.1.7, not tried yet"
     assert finding.health is Health.LIMITED
+    plugged_in = replace(live, hololens2=HoloLens2Settings("hl", realsense_rig="rig.yaml"))
+    assert find("camera", plugged_in).found == "RealSense on the HoloLens 2 at hl, not tried yet"
 
 
 @pytest.mark.parametrize("source", ["realsense", "recording"])
