@@ -23,7 +23,7 @@ _BEGINNINGS = (b"SQLite format 3\0", b"#ROSBAG V")  # .db3, .bag
 _POLL_MS = 100
 _COLOR_TIMEOUT_S = 1.0
 _SKIP_TIMEOUT_S = 10.0
-_SETTLE_S = 0.2
+_SETTLE_S = 0.2  # of a thread of librealsense
 _ROUNDING_MS = 1e-3  # of the SDK's times, which are floating-point numbers
 
 
@@ -98,9 +98,8 @@ class RecordingCamera(PlayedCamera):
         if not playing:
             return
         # A reading thread that has met the end stops by itself, and librealsense aborts the program
-        # if it is stopped at that moment. After that, it runs on and must not outlive its objects.
-        for playback in playing:
-            playback.pause()
+        # if it is stopped at that moment. One that has not runs on after the stop, and must not
+        # outlive its objects. (Pausing it takes 10 s where nobody takes its frames.)
         time.sleep(_SETTLE_S)
         for playback in playing:
             playback.close()
@@ -171,13 +170,8 @@ class _Playback:
                 frames = self.read(_SKIP_TIMEOUT_S)
                 self._waiting = frames if frames.get_timestamp() >= t_ms else None
 
-    def pause(self) -> None:
-        """Let its thread read no more, if it has not met the end."""
-        if self._playback.current_status() != self._stopped:
-            self._playback.pause()
-
     def close(self) -> None:
-        """Stop the pipeline; only some time after `pause`."""
+        """Stop the pipeline."""
         self._pipeline.stop()
 
 
