@@ -74,7 +74,8 @@ def link_problem(link: LinkStatistics, address: tuple[str, int] | None) -> str:
     ----------
     link : LinkStatistics
     address : tuple of str and int or None
-        Host and port that a network headset connects to; None for the virtual headset.
+        Host and port that a network headset connects to, while none is connected; None for the
+        virtual headset.
     """
     if link.notice:
         return link.notice
