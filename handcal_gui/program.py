@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices, QGuiApplication
-from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QWidget
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
 
 from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.many import export_sessions
-from handcal.io.resources import resource_path
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
@@ -34,7 +32,7 @@ from handcal_gui.dialogs.export import Export, ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.dialogs.support import SupportDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
-from handcal_gui.keys import keys_html
+from handcal_gui.help_menu import add_help_menu
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
 from handcal_gui.pages.start.start_page import StartPage
@@ -364,15 +362,7 @@ class Program(QObject):
         add("File", tr("&Preferences…"), "Ctrl+,", self._edit_preferences)
         add("File", tr("&Quit"), "Ctrl+Q", self.window.close)
         add("View", tr("&Reset layout"), "", self.window.reset_layout)
-        add("Help", tr("&Guide"), "Shift+F1", lambda: self._read("docs/guide.md"))
-        add("Help", tr("&Manual"), "", lambda: self._read("docs/index.md"))
-        add("Help", tr("Headset &protocol"), "", lambda: self._read("docs/protocol.md"))
-        add("Help", tr("&Examples in Python"), "", lambda: self._show_folder("examples"))
-        add("Help", tr("&Unity package"), "", lambda: self._show_folder("unity"))
-        add("Help", tr("&Support bundle…"), "", self.make_support_bundle)
-        add("Help", tr("&Keys"), "F1", self._show_keys)
-        add("Help", tr("&Licences"), "", lambda: self._read("THIRD-PARTY.md"))
-        add("Help", tr("&About handcal"), "", self._show_about)
+        add_help_menu(self.window, self.manual, self.make_support_bundle)
 
     def _restore(self) -> None:
         preferences = self._preferences
@@ -480,34 +470,3 @@ class Program(QObject):
             self.window.banner.show_message(
                 tr("The preferences could not be saved: {}").format(error)
             )
-
-    def _show_keys(self) -> None:
-        QMessageBox.information(self.window, tr("Keys"), keys_html(self.window))
-
-    def _read(self, page: str) -> None:
-        try:
-            self.manual.open(page)
-        except FileError as error:
-            self.window.banner.show_message(str(error))
-
-    def _show_folder(self, name: str) -> None:
-        try:
-            folder = resource_path(name)
-        except FileError as error:
-            self.window.banner.show_message(str(error))
-            return
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.window.banner.show_message(
-                tr("No file manager was found; the folder is {}").format(folder)
-            )
-
-    def _show_about(self) -> None:
-        QMessageBox.about(
-            self.window,
-            tr("About handcal"),
-            tr(
-                "<b>handcal {}</b><p>Calibrates an optical see-through headset with the "
-                "wearer's bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR "
-                "2021.<p>Apache-2.0"
-            ).format(version("handcal")),
-        )

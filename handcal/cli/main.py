@@ -87,14 +87,16 @@ _RIG: Mapping[str, Entry] = {
         "Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal.", "rig"
     ),
     "grid": Entry(
-        "Make the grid that a display shows to the viewpoint camera, pixel for pixel.", "rig_files"
+        "Make the grid that a display shows to the viewpoint camera, pixel for pixel.",
+        "rig_displays",
     ),
     "gray": Entry(
         "Make the Gray-code patterns that a display shows one after the other, in place of a grid.",
-        "rig_files",
+        "rig_displays",
     ),
     "display": Entry(
-        "Calibrate one eye's display from the viewpoint camera's images of its grid.", "rig_files"
+        "Calibrate one eye's display from the viewpoint camera's images of its grid.",
+        "rig_displays",
     ),
     "make": Entry(
         "Write the depth camera's pose, by stereo calibration or the factory, into a rig file.",

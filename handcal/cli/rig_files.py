@@ -1,4 +1,4 @@
-"""``handcal rig grid, display, make, depth, check, compare, migrate``: displays and rig files."""
+"""``handcal rig make, depth, check, compare, migrate``: rig files and the depth camera in them."""
 
 from __future__ import annotations
 
@@ -10,29 +10,17 @@ from typing import TYPE_CHECKING
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.rig import (
-    BOARD_OPTIONS,
-    GRID_OPTION,
-    board_of,
-    grid_of,
-    show_verdict,
-    show_views,
-    views_of,
-)
+from handcal.cli.rig import BOARD_OPTIONS, board_of, show_verdict
 from handcal.cli.run import KEYS, LISTEN
-from handcal.cli.terminal import arg, command, number, one_of
+from handcal.cli.terminal import arg, command, number
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
-from handcal.types import EYES
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
-    from handcal.rig.viewpoint import ViewpointPose
-    from handcal.types import Intrinsics, Rig
+    from handcal.types import Rig
 
-
-_METRES = number(float, 0.1, 100.0)
-_RIG_AND_OUTPUT = (
+RIG_AND_OUTPUT = (
     arg(
         "--rig",
         type=Path,
@@ -41,176 +29,6 @@ _RIG_AND_OUTPUT = (
     ),
     arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
 )
-
-
-@command(
-    arg(
-        "--display",
-        type=number(int, 60, 16384),
-        nargs=2,
-        metavar=("WIDTH", "HEIGHT"),
-        default=(1268, 720),
-        help="size of the display in pixels",
-    ),
-    arg("--png", type=Path, metavar="FILE", required=True, help="image to write"),
-    GRID_OPTION,
-)
-def grid(arguments: argparse.Namespace) -> None:
-    """Make the grid that a display shows to the viewpoint camera, pixel for pixel."""
-    from handcal.io.images import write_png
-    from handcal.rig.grid import draw_grid
-
-    made = grid_of(arguments, *arguments.display)
-    make_folder(arguments.png.parent)
-    write_png(arguments.png, draw_grid(made))
-    columns, rows = made.squares
-    console.print(
-        f"{arguments.png}: {columns}×{rows} squares of {made.square_px} px; show it unscaled"
-    )
-
-
-@command(
-    arg(
-        "--display",
-        type=number(int, 60, 16384),
-        nargs=2,
-        metavar=("WIDTH", "HEIGHT"),
-        default=(1268, 720),
-        help="size of the display in pixels",
-    ),
-    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the patterns"),
-)
-def gray(arguments: argparse.Namespace) -> None:
-    """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
-    from handcal.io.images import write_png
-    from handcal.rig.gray_code import gray_patterns
-
-    made = dict(gray_patterns(*arguments.display))
-    make_folder(arguments.output)
-    for name, pattern in made.items():
-        write_png(arguments.output / f"{name}.png", pattern)
-    console.print(
-        f"{arguments.output}: {len(made)} patterns; show each unscaled, and name the camera's "
-        "image of it alike",
-        markup=False,
-    )
-
-
-@command(
-    arg("images", type=Path, nargs="+", help="images of the grid, or folders of images"),
-    arg(
-        "--gray-code",
-        action="store_true",
-        help="the images are one folder with those of the Gray-code patterns, named alike (handcal "
-        "rig gray)",
-    ),
-    arg("--eye", choices=EYES, required=True, help="eye whose display is calibrated"),
-    arg(
-        "--camera-intrinsics",
-        type=Path,
-        metavar="FILE",
-        required=True,
-        help="intrinsics of the viewpoint camera",
-    ),
-    one_of(
-        arg(
-            "--stereo",
-            type=Path,
-            metavar="FILE",
-            help="pose of the viewpoint camera: JSON from 'handcal rig stereo' with the viewpoint "
-            "camera as its depth camera",
-        ),
-        arg(
-            "--tracked",
-            type=Path,
-            metavar="FILE",
-            help="poses of the board in --board-images, as tracked by the headset: JSON",
-        ),
-    ),
-    arg(
-        "--board-images",
-        type=Path,
-        nargs="+",
-        metavar="IMAGE",
-        default=(),
-        help="images of the tracked board, or folders of images",
-    ),
-    one_of(
-        arg(
-            "--distance-m",
-            type=_METRES,
-            metavar="M",
-            help="measured distance z(C0→S) of the virtual image",
-        ),
-        arg(
-            "--square-arcmin",
-            type=number(float, 1.0, 10_000.0),
-            metavar="ARCMIN",
-            help="angle that a square of the grid subtends at --nominal-distance-m, to solve "
-            "z(C0→S)",
-        ),
-    ),
-    arg(
-        "--nominal-distance-m",
-        type=_METRES,
-        metavar="M",
-        default=2.0,
-        help="nominal distance of the virtual image",
-    ),
-    arg(
-        "--view",
-        type=Path,
-        metavar="FILE",
-        help="T_V_H, from the headset rig to this eye's rendering camera as the headset reports "
-        "it: 4 rows of 4 numbers, metres, x right, y down, z forward (default: as in --rig)",
-    ),
-    arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),
-    GRID_OPTION,
-    *BOARD_OPTIONS,
-    *_RIG_AND_OUTPUT,
-)
-def display(arguments: argparse.Namespace) -> None:
-    """Calibrate one eye's display from the viewpoint camera's images of its grid."""
-    import numpy as np
-
-    from handcal.rig.assemble import with_display
-    from handcal.rig.formats import read_intrinsics
-    from handcal.rig.gray_code import flatness_arcmin, read_gray_code
-    from handcal.rig.steps import DisplayInputs, calibrate_by_gray_code, calibrate_eye_display
-
-    rig, eye = _read_rig(arguments.rig), arguments.eye
-    camera = read_intrinsics(arguments.camera_intrinsics)
-    viewpoint = _viewpoint(arguments, camera)
-    inputs = DisplayInputs(
-        square_px=arguments.square_px,
-        distance_m=arguments.distance_m,
-        nominal_m=arguments.nominal_distance_m,
-        pose_V_H=arguments.view,
-    )
-    if arguments.square_arcmin is not None:
-        inputs = replace(inputs, square_arcmin=arguments.square_arcmin)
-    size = rig.eyes[eye].width_px, rig.eyes[eye].height_px
-    if arguments.gray_code:
-        if len(arguments.images) != 1:
-            raise HandcalError("--gray-code takes one folder with the images of all patterns")
-        seen = read_gray_code(arguments.images[0], *size)
-        result = calibrate_by_gray_code(rig, eye, seen, camera, viewpoint, inputs)
-        flat, bent = flatness_arcmin(seen, camera, *size)
-        console.print(
-            f"{len(seen.pixels)} points; a flat screen leaves {flat:.1f}′ between them, and with a "
-            f"distortion by the display's pixels {bent:.1f}′"
-        )
-    else:
-        views = views_of(arguments.images, grid_of(arguments, *size).board, arguments.drop)
-        result = calibrate_eye_display(rig, eye, views, camera, viewpoint, inputs)
-        show_views(views, result.homography.residuals_px)
-    place_mm = " ".join(f"{one:.2f}" for one in -1e3 * result.display.t_C0_V_m)
-    console.print(
-        f"z(C0→S) {result.display.z_C0_S_m:.3f} m; C0 at {place_mm} mm in V; display rotated by "
-        f"{np.degrees(result.turn_rad):.2f}° against V; RMS {result.homography.rms_px:.3f} px"
-    )
-    show_verdict(result.verdict)
-    _write(arguments.output, with_display(rig, eye, result))
 
 
 @command(
@@ -254,7 +72,7 @@ def display(arguments: argparse.Namespace) -> None:
         help="pose from the depth to the colour imager, in the same case",
     ),
     arg("--name", help="name of the rig (default: unchanged)"),
-    *_RIG_AND_OUTPUT,
+    *RIG_AND_OUTPUT,
 )
 def make(arguments: argparse.Namespace) -> None:
     """Write the depth camera's pose, by stereo calibration or the factory, into a rig file."""
@@ -264,10 +82,10 @@ def make(arguments: argparse.Namespace) -> None:
 
     if (arguments.stereo is None) == (arguments.factory is None):
         raise HandcalError("give either --stereo or --factory")
-    rig = _read_rig(arguments.rig)
+    rig = rig_or_example(arguments.rig)
     if arguments.factory is not None:
         rig = _with_factory_pose(rig, arguments)
-        _write(arguments.output, replace(rig, name=arguments.name or rig.name))
+        write_rig_file(arguments.output, replace(rig, name=arguments.name or rig.name))
         return
     stereo = read_stereo(arguments.stereo)
     show_verdict(stereo.verdict)
@@ -278,7 +96,7 @@ def make(arguments: argparse.Namespace) -> None:
         T_C_D=pose_in(arguments.depth_to_color),
         depth_camera=identity_in(arguments.depth_intrinsics),
     )
-    _write(arguments.output, replace(rig, name=arguments.name or rig.name))
+    write_rig_file(arguments.output, replace(rig, name=arguments.name or rig.name))
 
 
 def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
@@ -313,7 +131,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
         action="store_true",
         help="every frame of the recording is a still image: use all that show the board",
     ),
-    *_RIG_AND_OUTPUT,
+    *RIG_AND_OUTPUT,
     *BOARD_OPTIONS,
     *REALSENSE_OPTIONS,
 )
@@ -325,7 +143,7 @@ def depth(arguments: argparse.Namespace) -> None:
     from handcal.rig.depth import explain_depth
     from handcal.rig.report import depth_finding
 
-    rig, board = _read_rig(arguments.rig), board_of(arguments)
+    rig, board = rig_or_example(arguments.rig), board_of(arguments)
     with ExitStack() as stack:
         source = open_source(arguments.source, realsense_of(arguments), keeps_wrapped=True)
         camera = stack.enter_context(source)
@@ -349,7 +167,7 @@ def depth(arguments: argparse.Namespace) -> None:
     console.print(f"{'good' if finding.is_fine else 'doubtful'}: {finding.found}", markup=False)
     if not finding.is_fine:
         console.print(explain_depth(measured) or "add views, at more distances", markup=False)
-    _write(arguments.output, replace(rig, depth_check=measured))
+    write_rig_file(arguments.output, replace(rig, depth_check=measured))
 
 
 @command(arg("input", type=Path, help="rig file"), json=True)
@@ -357,7 +175,7 @@ def check(arguments: argparse.Namespace) -> None:
     """Check a rig file: every field, its plausibility, and how it was calibrated."""
     from handcal.rig.report import report_rig
 
-    rig = _read_rig(arguments.input)
+    rig = rig_or_example(arguments.input)
     findings = report_rig(rig)
     console.print(rig.name)
     for one in findings:
@@ -379,7 +197,7 @@ def compare(arguments: argparse.Namespace) -> None:
     """Compare two rig files, and show how far apart they draw a target."""
     from handcal.rig.compare import compare_rigs
 
-    differences = compare_rigs(_read_rig(arguments.a), _read_rig(arguments.b))
+    differences = compare_rigs(rig_or_example(arguments.a), rig_or_example(arguments.b))
     shown = table("what", "differs by")
     for one in differences:
         shown.add_row(one.name, f"{one.value:.3g} {one.unit}")
@@ -402,10 +220,10 @@ def migrate(arguments: argparse.Namespace) -> None:
     """Convert a rig file of any known version to the newest, and list what it does not say."""
     from handcal.rig.report import missing_parts
 
-    rig = _read_rig(arguments.input)
+    rig = rig_or_example(arguments.input)
     if arguments.camera is not None:
         rig = _with_identity(rig, arguments)
-    _write(arguments.output, rig)
+    write_rig_file(arguments.output, rig)
     for line in missing_parts(rig):
         console.print(f"missing: {line}", markup=False)
 
@@ -430,24 +248,16 @@ def _require_own(rig: Rig, camera: Camera) -> None:
         )
 
 
-def _viewpoint(arguments: argparse.Namespace, camera: Intrinsics) -> ViewpointPose:
-    from handcal.rig.steps import calibrate_viewpoint
-
-    views = () if arguments.stereo else views_of(arguments.board_images, board_of(arguments))
-    pose = calibrate_viewpoint(views, camera, arguments.stereo, arguments.tracked)
-    if views:
-        show_views(views, pose.residuals_px)
-    return pose
-
-
-def _read_rig(path: Path | None) -> Rig:
+def rig_or_example(path: Path | None) -> Rig:
+    """Read a rig file, by default the shipped example; FileError if it cannot be read."""
     from handcal.io.resources import resource_path
     from handcal.rig.rig_file import read_rig
 
     return read_rig(path or resource_path("example_rig.yaml"))
 
 
-def _write(path: Path, rig: Rig) -> None:
+def write_rig_file(path: Path, rig: Rig) -> None:
+    """Write a rig file and print its path; HandcalError if it is implausible or not written."""
     from handcal.rig.rig_file import write_rig
 
     make_folder(path.parent)

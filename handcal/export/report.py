@@ -14,19 +14,21 @@ from handcal.export.figure_rows import (
     convergence_rows,
     overlay_rows,
     residual_rows,
-    running_mean_rows,
 )
 from handcal.export.figures import ResidualCells
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
-from handcal.export.tables import corner_rows, parameter_rows
+from handcal.export.tables import parameter_rows
+from handcal.export.trial_sections import (
+    comparisons_section,
+    trials_section,
+    user_test_section,
+)
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
-from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
+from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
-from handcal.session.comparison import Comparison, count_comparisons, read_comparisons
-from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise_trials
-from handcal.statistics import mean_interval
+from handcal.session.comparison import read_comparisons
 from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName
 
 _ORIGINS: Mapping[ShiftOrigin, str] = {
@@ -65,11 +67,11 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
         yield _residuals(outcome, results)
         yield _overlays(outcome)
     if record.trials:
-        yield _user_test(outcome)
-        yield _trials(outcome)
+        yield user_test_section(outcome)
+        yield trials_section(outcome)
     comparisons = read_comparisons(record.events)
     if comparisons:
-        yield _comparisons(comparisons)
+        yield comparisons_section(comparisons)
     if record.notes.strip():
         yield Section("Notes", [record.notes])
     links = [event for event in record.events if event.name == "link"]
@@ -324,137 +326,18 @@ def _overlay(outcome: SessionOutcome, eye: Eye, number: int, alignment: Alignmen
     return Figure(f"overlay-{eye}", "", draw, rows, height_mm=58.0, columns=2)
 
 
-def _user_test(outcome: SessionOutcome) -> Section:
-    record = outcome.record
-    statistics = summarise_trials(record.trials.values())
-    groups = {"all": statistics.total} if statistics.total else {}
-    groups |= {f"{eye} eye": errors for eye, errors in statistics.by_eye.items()}
-    groups |= {f"at {depth_m:g} m": errors for depth_m, errors in statistics.by_depth_m.items()}
-    table = Table(
-        [
-            Column("trials", "left"),
-            Column("number"),
-            Column("corners"),
-            Column("mean ± SD, px"),
-            Column("mean ± SD, arcmin"),
-            Column("median (quartiles), arcmin"),
-            Column("min–max, arcmin"),
-        ],
-        [[name, *_error_cells(errors)] for name, errors in groups.items()],
-        "Reprojection error; each corner of the target counts once.",
-    )
-    boxes = Figure(
-        "trial-errors",
-        "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
-        lambda axes: figures.draw_trial_errors(axes, record.trials.values()),
-        list(corner_rows(record.trials)),
-        height_mm=62.0,
-        columns=2,
-    )
-    running = Figure(
-        "running-mean",
-        "Points: mean error of each trial; lines: mean of all so far.",
-        lambda axes: figures.draw_running_mean(axes[0], record.trials),
-        list(running_mean_rows(record.trials)),
-        height_mm=48.0,
-    )
-    return Section("User test", [table, _interval(outcome), boxes, running])
-
-
-def _interval(outcome: SessionOutcome) -> str:
-    """Return a sentence on the uncertainty of the mean error."""
-    trials = outcome.record.trials
-    calibrations = list(calibration_numbers(trials).values())
-    if len(set(calibrations)) < 2:
-        return (
-            "All trials judge one calibration, so how far another would differ is not known: no "
-            "interval is given for the mean."
-        )
-    errors = [float(trial.error_arcmin.mean()) for trial in trials.values()]
-    found = mean_interval(errors, calibrations)
-    return (
-        f"Mean over {found.clusters} calibrations of this wearer: {found.mean:.2f} arcmin "
-        f"({100 * found.level:g} % interval {interval_ends(found)})."
-    )
-
-
-def _trials(outcome: SessionOutcome) -> Section:
-    record = outcome.record
-    table = Table(
-        [
-            Column("no."),
-            Column("time, UTC"),
-            Column("eye", "left"),
-            Column("distance, m"),
-            Column("calibrated φ, mm"),
-            Column("adjusted φ, mm"),
-            Column("mean error, px"),
-            Column("mean error, arcmin"),
-        ],
-        [
-            [
-                str(number),
-                trial.time[11:19],
-                trial.eye,
-                f"{trial.target_depth_m:g}",
-                "\u00a0\u00a0".join(map(_mm, trial.calibrated_shift_m)),
-                "\u00a0\u00a0".join(map(_mm, trial.adjusted_shift_m)),
-                f"{trial.error_px.mean():.2f}",
-                f"{trial.error_arcmin.mean():.2f}",
-            ]
-            for number, trial in record.trials.items()
-        ],
-    )
-    return Section("Trials", [table])
-
-
-def _comparisons(comparisons: Sequence[Comparison]) -> Section:
-    counts = count_comparisons(comparisons)
-    table = Table(
-        [
-            Column("time, UTC"),
-            Column("shown first", "left"),
-            Column("answer", "left"),
-            Column("better", "left"),
-        ],
-        [[one.time[11:19], one.first, one.answer, one.better or "neither"] for one in comparisons],
-        "offline: without the calibration; applied: with it. The order was drawn by lot, and "
-        "neither wearer nor technician knew it.",
-    )
-    sentence = (
-        f"Better with the calibration: {counts.applied}; without it: {counts.offline}; neither: "
-        f"{counts.neither}. Two-sided sign test of this wearer's answers: p = {counts.p_value:.3f}."
-    )
-    return Section("Blinded comparison", [sentence, table])
-
-
-def _error_cells(errors: ErrorStatistics) -> list[str]:
-    return [
-        str(errors.trials),
-        str(errors.corners),
-        mean_sd(errors.px),
-        mean_sd(errors.arcmin),
-        median_quartiles(errors.arcmin),
-        extremes(errors.arcmin),
-    ]
-
-
 def _shift_cells(outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin) -> list[str]:
     if origin == "solved" and outcome.results is not None:
         return _with_sigma(outcome.results.eyes[eye])
-    return [_mm(value) for value in outcome.shifts_m[eye][origin]]
+    return [length_mm(value) for value in outcome.shifts_m[eye][origin]]
 
 
 def _with_sigma(shift: EyeShift) -> list[str]:
     sigma_m = np.sqrt(np.diag(shift.covariance_m2))
     return [
-        f"{_mm(value)}\u00a0±\u00a0{1e3 * sigma:.2f}"
+        f"{length_mm(value)}\u00a0±\u00a0{1e3 * sigma:.2f}"
         for value, sigma in zip(shift.shift_m, sigma_m, strict=True)
     ]
-
-
-def _mm(value_m: float) -> str:
-    return f"{1e3 * value_m:.2f}".replace("-", "−")
 
 
 def _yes(truth: bool) -> str:

@@ -1,10 +1,15 @@
-"""Statistics formatted for table cells, without line breaks."""
+"""Lengths and statistics formatted for table cells, without line breaks."""
 
 from __future__ import annotations
 
 from handcal.statistics import MeanInterval, Summary
 
 NOTHING = "–"
+
+
+def length_mm(length_m: float) -> str:
+    """Return a length in millimetres with two decimals and a true minus sign."""
+    return f"{1e3 * length_m:.2f}".replace("-", "−")
 
 
 def mean_sd(summary: Summary) -> str:

@@ -67,6 +67,34 @@ def headset_problem(
     return "" if rig is None else _other_than_rig(device, rig)
 
 
+def link_problem(link: LinkStatistics, address: tuple[str, int] | None) -> str:
+    """Return what a calibration lacks of its headset, and what to do; empty if nothing.
+
+    Parameters
+    ----------
+    link : LinkStatistics
+    address : tuple of str and int or None
+        Host and port that a network headset connects to, while none is connected; None for the
+        virtual headset.
+    """
+    if link.notice:
+        return link.notice
+    if link.missing:
+        missing = " and ".join(link.missing).replace("_", " ")
+        return (
+            f"the headset lacks the {missing}: it did not acknowledge it in time; improve the "
+            "network, or restart the headset's app"
+        )
+    if link.connected:
+        return ""
+    if address is None:
+        return "the virtual headset has not connected yet"
+    host, port = address
+    return (
+        f"no headset is connected; let it connect to {host}, UDP port {port}, with the pairing key"
+    )
+
+
 def _absence(link: LinkStatistics) -> str:
     if link.notice:
         return link.notice

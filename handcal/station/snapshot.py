@@ -13,7 +13,7 @@ from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
 from handcal.station.hands import PlacedHand
 from handcal.station.plan import NextStep
-from handcal.station.procedure import Observation, State
+from handcal.station.procedure import Calibration, Observation, State
 from handcal.station.verifying import VerifyingView
 from handcal.station.wearer_view import EyeView
 from handcal.types import Alignment, Eye, Float64, Frame, PlanName, Verification
@@ -50,6 +50,29 @@ class Procedure:
     """The newest verification of each eye."""
     former_shift_m: Mapping[Eye, Float64] = field(default_factory=dict)
     """each (3,); φ to which `Calibration.go_back` returns."""
+
+
+def read_procedure(
+    calibration: Calibration, guard_limit_rad: float, plan: PlanName, next_step: NextStep | None
+) -> Procedure:
+    """Return the present state of a calibration; the other arguments are as in `Procedure`."""
+    return Procedure(
+        state=calibration.state,
+        eyes=calibration.eyes,
+        cursor=calibration.cursor,
+        refusal=calibration.refusal,
+        refused=calibration.refused,
+        guard_limit_rad=guard_limit_rad,
+        alignments=calibration.alignments,
+        results=calibration.results,
+        applied_shift_m=calibration.applied_shift_m,
+        is_applied=calibration.is_applied,
+        plan=plan,
+        next_step=next_step,
+        verifying=None if calibration.verifying is None else calibration.verifying.view(),
+        verifications=dict(calibration.verifications),
+        former_shift_m=calibration.former_shift_m,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

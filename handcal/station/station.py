@@ -8,49 +8,44 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
-
-import numpy as np
 
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
-from handcal.camera.live import open_hololens2, open_live
-from handcal.camera.realsense import RealSenseCamera
-from handcal.camera.recordings import open_recording
-from handcal.display import target_corners_m, view_of_eye
-from handcal.errors import CameraError, FileError, LinkError
-from handcal.geometry import invert, transform
+from handcal.display import target_corners_m
+from handcal.errors import FileError, LinkError
+from handcal.geometry import transform
 from handcal.io.closable import Closable
-from handcal.io.settings import settings_json
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.transport import reachable_address
-from handcal.register.prior import PriorSettings
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
 from handcal.session.state import Kind
 from handcal.session.trial import make_trial
-from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
-from handcal.sim.eyes import TrueEyes
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
-from handcal.sim.wearer import WearerSettings
 from handcal.station.comparing import Comparing
+from handcal.station.eye_views import EyeViews
 from handcal.station.former import Former, read_former
 from handcal.station.hands import PlacedHand
-from handcal.station.lab_prior import run_learn_prior
+from handcal.station.headset import link_problem
+from handcal.station.opening import (
+    open_camera,
+    plan_of_session,
+    resume_or_create,
+    start_headset,
+    with_session_prior,
+)
 from handcal.station.plan import NextStep, Plan, StepName
 from handcal.station.procedure import Calibration, Observation, ProcedureError, State
 from handcal.station.settings import StationSettings
-from handcal.station.snapshot import Procedure, Snapshot
-from handcal.station.solve_again import stored_solve_settings
+from handcal.station.snapshot import Snapshot, read_procedure
 from handcal.station.verifying import skipped_eyes
-from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import EYES, Eye, Float64, Frame, HeadsetIdentity, PlanName, Target
+from handcal.types import Eye, Float64, Frame, HeadsetIdentity, Target
 
-_VIEW_PERIOD_S = 0.1
 _STORE_PERIOD_S = 1.0
 
 
@@ -98,14 +93,7 @@ class Station(Closable):
         begun = Former()
         if former is not None and resume is None:
             begun = read_former(former, read_rig(settings.rig_path))
-        # A session keeps the prior that it began with, so that it is solved alike when resumed.
-        if resume is not None:
-            prior = _stored_prior(resume)
-        elif begun.prior is not None:
-            prior = replace(settings.calibration.solve.fuse.prior, learned=begun.prior)
-        else:
-            prior = _lab_prior(settings)
-        settings = _with_prior(settings, prior)
+        settings = with_session_prior(settings, resume, begun)
         self.settings = settings
         is_virtual = settings.headset == "virtual"
         if is_virtual or isinstance(pairings, str):
@@ -119,9 +107,9 @@ class Station(Closable):
         self._observation: Observation | None = None
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
-            self.session = stack.enter_context(_open_session(settings, wearer, resume))
+            self.session = stack.enter_context(resume_or_create(settings, wearer, resume))
             self._record = Session.open(self.session.path)
-            self.rig = self._record.rig
+            self.rig = self.worn_rig = self._record.rig
             self._worn_rig_path = Path(settings.worn_rig or self.session.path / "rig.yaml")
             bind = LOOPBACK if is_virtual else (settings.host, settings.port)
             self._link = stack.enter_context(HeadsetServer(pairings, bind))
@@ -130,24 +118,9 @@ class Station(Closable):
                     Simulation(settings.seed, self._start_headset, settings.side)
                 )
                 self.worn_rig = read_rig(self._worn_rig_path)
-                self._true_eyes = TrueEyes(
-                    self._simulation.world,
-                    self.worn_rig,
-                    settings.seed,
-                    WearerSettings(slip_m=settings.slip_m),
-                )
             self._feed = stack.enter_context(CameraFeed(self._open_camera))
             facts = self._record.facts
-            plan = settings.plan
-            if resume is not None:
-                is_recommended = facts.plan == "recommended"
-                name: PlanName = "recommended" if is_recommended else "paper"
-                plan = replace(plan, name=name, usable_eyes=facts.usable_eyes)
-            else:
-                if plan.name != "paper":
-                    self.session.save_facts(plan=plan.name)
-                if plan.usable_eyes != EYES:
-                    self.session.save_facts(usable_eyes=plan.usable_eyes)
+            plan = plan_of_session(self.session, settings.plan, facts, resume is not None)
             if former is not None and resume is None:
                 self.session.save_facts(former=former.name)
                 self.session.save_fine_tuned(begun.shift_m)
@@ -168,6 +141,9 @@ class Station(Closable):
                 checks_first=bool(facts.former or former),
                 skipped=skipped_eyes(self._record.events),
             )
+            self._views = EyeViews(
+                self.calibration, self.rig, settings, self._simulation, self.worn_rig
+            )
             self._stack = stack.pop_all()
         self.comparing = Comparing(self.session, self.show_offline)
         self._number = 0
@@ -177,9 +153,6 @@ class Station(Closable):
         self._revision = self.session.revision
         self._is_offline = False
         self._target_E_m: dict[Eye, Float64] = {}  # only for the eye to which it is shown
-        self._views: dict[Eye, EyeView] = {}
-        self._viewed: Eye = "right"
-        self._next_view_s = 0.0
 
     @property
     def pairing_key(self) -> str:
@@ -263,10 +236,15 @@ class Station(Closable):
             link_problem=self._link_problem(),
             problem=self._not_stored or self._not_applied,
             contradiction=self._contradiction(observation),
-            procedure=self._procedure(),
+            procedure=read_procedure(
+                self.calibration,
+                self.settings.calibration.guard.limit_rad,
+                self.plan.settings.name,
+                self._next_step,
+            ),
             record=self._record,
             # A view of what the headset draws would tell which drawing is compared.
-            views={} if self.comparing.shown else dict(self._views),
+            views={} if self.comparing.shown else dict(self._views.shown),
             comparing=self.comparing.shown,
             has_compared_both=self.comparing.has_seen_both,
         )
@@ -426,41 +404,16 @@ class Station(Closable):
         self._stack.close()
 
     def _start_headset(self, scene_port: int) -> VirtualHeadset:
-        return VirtualHeadset(
+        return start_headset(
+            self.settings,
             self.session.path / "rig.yaml",
-            self._link.address[1],
-            scene_port,
+            self._worn_rig_path,
+            (self._link.address[1], scene_port),
             self._pairings.all[-1].key,
-            seed=self.settings.seed,
-            worn_rig_path=self._worn_rig_path,
-            loss=self.settings.loss,
-            reorder=self.settings.reorder,
-            is_stale=self.settings.fault == "stale-headset",
-            loses_start=self.settings.fault == "lost-start",
-            eye_distance_m=self.settings.eye_distance_m,
-            side=self.settings.side,
-            slip_m=self.settings.slip_m,
         )
 
     def _open_camera(self) -> Camera:
-        settings = self.settings
-        if settings.source == "realsense":
-            return RealSenseCamera(settings.realsense)
-        if settings.source == "hololens2":
-            return open_hololens2(settings.hololens2)
-        if settings.source in ("oak", "orbbec"):
-            return open_live(f"{settings.source}:{settings.serial}")
-        if settings.source == "recording":
-            return open_recording(Path(settings.recording), settings.playback)
-        if self._simulation is None:
-            raise CameraError("the simulated camera needs the virtual headset, with its wearer")
-        return SyntheticCamera(
-            self._simulation.world,
-            self._simulation.scene,
-            depth_intrinsics=self.worn_rig.depth_intrinsics,
-            seed=settings.seed,
-            settings=CAMERA_FAULTS.get(settings.fault),
-        )
+        return open_camera(self.settings, self._simulation, self.worn_rig)
 
     def _show(self, hand: PlacedHand) -> None:
         """Show the live hand in the headset, and render the wearer's views if requested."""
@@ -468,43 +421,8 @@ class Station(Closable):
             # The wearer judges the calibration by this outline on their own hand.
             outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
             self._link.send_live_hand(outline_W_m, False, is_outline=True)
-        started_s = time.monotonic()
-        if self.watch_views and not self.comparing.shown and started_s >= self._next_view_s:
-            eye: Eye = "left" if self._viewed == "right" else "right"
-            self._views[eye] = self._see(eye, hand)
-            self._viewed = eye
-            ended_s = time.monotonic()
-            # On a busy computer frames have priority.
-            self._next_view_s = ended_s + max(_VIEW_PERIOD_S, 3.0 * (ended_s - started_s))
-
-    def _see(self, eye: Eye, hand: PlacedHand) -> EyeView:
-        calibration, display = self.calibration, self.rig.eyes[eye]
-        drawn_shift_m = np.zeros(3) if self._is_offline else calibration.applied_shift_m[eye]
-        cursor = calibration.cursor
-        T_W_H = hand.T_W_D @ invert(self.rig.T_H_D)
-        image = None
-        if self._simulation is not None and self.settings.source == "simulator":
-            eye_shift_m = self._true_eyes.shift_m[eye]
-            scene = self._simulation.scene_at(hand.t_host_ns)
-            if scene is not None:
-                T_W_H = scene.T_W_D @ invert(self.worn_rig.T_H_D)
-                image = self._true_eyes.look(eye, T_W_H, scene.T_W_hand)
-        elif calibration.results is not None and eye in calibration.results.eyes:
-            eye_shift_m = calibration.results.eyes[eye].shift_m
-        else:
-            eye_shift_m = drawn_shift_m
-        T_E_W = view_of_eye(display, T_W_H)
-        return render_eye_view(
-            eye,
-            display,
-            eye_shift_m,
-            drawn_shift_m,
-            _outline_E(T_E_W, hand),
-            np.empty((0, 3)) if cursor is None else _outline_E(T_E_W, cursor),
-            self._target_E_m.get(eye, np.empty((0, 3))),
-            is_true=image is not None,
-            image=image,
-        )
+        if self.watch_views and not self.comparing.shown:
+            self._views.render_next(hand, self._target_E_m, self._is_offline)
 
     def _link_problem(self) -> str:
         try:
@@ -512,49 +430,14 @@ class Station(Closable):
         except LinkError as error:
             return str(error)
         link = self._link.statistics()
-        if link.notice:
-            return link.notice
-        if link.missing:
-            missing = " and ".join(link.missing).replace("_", " ")
-            return (
-                f"the headset lacks the {missing}: it did not acknowledge it in time; improve the "
-                "network, or restart the headset's app"
-            )
-        if link.connected:
-            return ""
-        if self._simulation is not None:
-            return "the virtual headset has not connected yet"
-        host, port = self.address
-        return (
-            f"no headset is connected; let it connect to {host}, UDP port {port}, with the "
-            "pairing key"
-        )
+        is_awaited = self._simulation is None and not link.connected
+        return link_problem(link, self.address if is_awaited else None)
 
     def _contradiction(self, observation: Observation | None) -> str:
         found = self.calibration.evidence.contradictions
         if observation is not None and observation.contradiction is not None:
             found = (observation.contradiction, *found)
         return found[0].text if found else ""
-
-    def _procedure(self) -> Procedure:
-        calibration = self.calibration
-        return Procedure(
-            state=calibration.state,
-            eyes=calibration.eyes,
-            cursor=calibration.cursor,
-            refusal=calibration.refusal,
-            refused=calibration.refused,
-            guard_limit_rad=self.settings.calibration.guard.limit_rad,
-            alignments=calibration.alignments,
-            results=calibration.results,
-            applied_shift_m=calibration.applied_shift_m,
-            is_applied=calibration.is_applied,
-            plan=self.plan.settings.name,
-            next_step=self._next_step,
-            verifying=None if calibration.verifying is None else calibration.verifying.view(),
-            verifications=dict(calibration.verifications),
-            former_shift_m=calibration.former_shift_m,
-        )
 
     def _store_waiting(self) -> None:
         """Retry writing pending data now and then; read the session if it has changed."""
@@ -572,35 +455,3 @@ class Station(Closable):
             self._not_stored = (
                 f"{error}. The data are kept in memory and written as soon as possible."
             )
-
-
-def _open_session(settings: StationSettings, wearer: str, resume: Path | None) -> Session:
-    if resume is not None:
-        return Session(resume)
-    rig = read_rig(settings.rig_path)
-    station = settings_json(settings)
-    stored = {"calibration": station.pop("calibration"), "station": station}
-    return Session.create(Path(settings.sessions), rig, stored, wearer=wearer)
-
-
-def _lab_prior(settings: StationSettings) -> PriorSettings:
-    """Return the prior for a new session, learned from the lab's earlier ones if wanted."""
-    prior = settings.calibration.solve.fuse.prior
-    if not settings.learn_prior or prior.learned is not None:
-        return prior
-    found = run_learn_prior(Path(settings.sessions), read_rig(settings.rig_path), prior)
-    return replace(prior, learned=found.learned)
-
-
-def _stored_prior(session: Path) -> PriorSettings:
-    return stored_solve_settings(Session.open(session)).fuse.prior
-
-
-def _with_prior(settings: StationSettings, prior: PriorSettings) -> StationSettings:
-    solve = settings.calibration.solve
-    solve = replace(solve, fuse=replace(solve.fuse, prior=prior))
-    return replace(settings, calibration=replace(settings.calibration, solve=solve))
-
-
-def _outline_E(T_E_W: Float64, hand: PlacedHand) -> Float64:
-    return transform(T_E_W @ hand.T_W_D, hand.cloud.contour_m)

@@ -49,8 +49,9 @@ FILES, SHORT_FILES, BATCH = 20_000, 80, 100
 SLOWEST_S, MOST_MB, ENDED_S = 5.0, 500, 20
 IMPORTED = (
     *(f"handcal.cli.{name}" for name in ("cameras", "evaluate", "rig", "rig_files", "sessions")),
-    "handcal.camera.playback", "handcal.cli.replay", "handcal.cli.simulate",
-    "handcal.export.export", "handcal.hand.shipped", "handcal.station.solve_again",
+    "handcal.camera.playback", "handcal.cli.replay", "handcal.cli.rig_displays",
+    "handcal.cli.simulate", "handcal.export.export", "handcal.hand.shipped",
+    "handcal.station.solve_again",
 )  # fmt: skip
 Words: TypeAlias = "list[str] | Callable[[], object]"
 Case: TypeAlias = Callable[[Path, random.Random], Words]

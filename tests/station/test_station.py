@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import handcal.station.station
+import handcal.station.opening
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.io.settings import settings_json
 from handcal.register.fuse import FuseSettings
@@ -238,7 +238,7 @@ class Unplugged(SyntheticCamera):
 def test_a_camera_that_comes_back_finds_the_session_as_it_was(
     settings: StationSettings, begun: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(handcal.station.station, "SyntheticCamera", Unplugged)
+    monkeypatch.setattr(handcal.station.opening, "SyntheticCamera", Unplugged)
     with Station(settings, resume=begun) as station:
         seen = step_until(station, "a frame", lambda s: s.frame is not None, PATIENCE_S)
         assert seen.camera.problem == ""

@@ -1,0 +1,170 @@
+"""The parts that a station opens: session with prior and plan, camera, and virtual headset."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from handcal.camera.camera import Camera
+from handcal.camera.live import open_hololens2, open_live
+from handcal.camera.realsense import RealSenseCamera
+from handcal.camera.recordings import open_recording
+from handcal.errors import CameraError
+from handcal.io.settings import settings_json
+from handcal.register.prior import PriorSettings
+from handcal.rig.rig_file import read_rig
+from handcal.session.facts import SessionFacts
+from handcal.session.session import Session
+from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
+from handcal.sim.process import VirtualHeadset
+from handcal.sim.simulation import Simulation
+from handcal.station.former import Former
+from handcal.station.lab_prior import run_learn_prior
+from handcal.station.plan import PlanSettings
+from handcal.station.settings import StationSettings
+from handcal.station.solve_again import stored_solve_settings
+from handcal.types import EYES, PlanName, Rig
+
+
+def resume_or_create(settings: StationSettings, wearer: str, resume: Path | None) -> Session:
+    """Resume a session, or create one; FileError if it cannot be read or created."""
+    if resume is not None:
+        return Session(resume)
+    rig = read_rig(settings.rig_path)
+    station = settings_json(settings)
+    stored = {"calibration": station.pop("calibration"), "station": station}
+    return Session.create(Path(settings.sessions), rig, stored, wearer=wearer)
+
+
+def with_session_prior(
+    settings: StationSettings, resume: Path | None, begun: Former
+) -> StationSettings:
+    """Return the settings with the prior of the session that is resumed or begun.
+
+    Raises
+    ------
+    FileError
+        If the session or the rig cannot be read.
+    """
+    # A session keeps the prior that it began with, so that it is solved alike when resumed.
+    if resume is not None:
+        prior = stored_solve_settings(Session.open(resume)).fuse.prior
+    elif begun.prior is not None:
+        prior = replace(settings.calibration.solve.fuse.prior, learned=begun.prior)
+    else:
+        prior = _lab_prior(settings)
+    solve = settings.calibration.solve
+    solve = replace(solve, fuse=replace(solve.fuse, prior=prior))
+    return replace(settings, calibration=replace(settings.calibration, solve=solve))
+
+
+def plan_of_session(
+    session: Session, plan: PlanSettings, facts: SessionFacts, is_resumed: bool
+) -> PlanSettings:
+    """Return the plan that a resumed session has, or record that of a new one and return it.
+
+    Parameters
+    ----------
+    session : Session
+    plan : PlanSettings
+        The plan of a new session; a resumed one keeps its name and eyes.
+    facts : SessionFacts
+        The session's facts, as stored.
+    is_resumed : bool
+
+    Raises
+    ------
+    FileError
+        If the session cannot be written.
+    """
+    if is_resumed:
+        is_recommended = facts.plan == "recommended"
+        name: PlanName = "recommended" if is_recommended else "paper"
+        return replace(plan, name=name, usable_eyes=facts.usable_eyes)
+    if plan.name != "paper":
+        session.save_facts(plan=plan.name)
+    if plan.usable_eyes != EYES:
+        session.save_facts(usable_eyes=plan.usable_eyes)
+    return plan
+
+
+def open_camera(settings: StationSettings, simulation: Simulation | None, worn_rig: Rig) -> Camera:
+    """Open a station's camera.
+
+    Parameters
+    ----------
+    settings : StationSettings
+    simulation : Simulation or None
+        What the simulated camera sees; None without the virtual headset.
+    worn_rig : Rig
+        Rig of the headset actually worn, with the simulated camera's intrinsics.
+
+    Raises
+    ------
+    CameraError
+        If it cannot be opened.
+    FileError
+        If the recording cannot be read.
+    """
+    if settings.source == "realsense":
+        return RealSenseCamera(settings.realsense)
+    if settings.source == "hololens2":
+        return open_hololens2(settings.hololens2)
+    if settings.source in ("oak", "orbbec"):
+        return open_live(f"{settings.source}:{settings.serial}")
+    if settings.source == "recording":
+        return open_recording(Path(settings.recording), settings.playback)
+    if simulation is None:
+        raise CameraError("the simulated camera needs the virtual headset, with its wearer")
+    return SyntheticCamera(
+        simulation.world,
+        simulation.scene,
+        depth_intrinsics=worn_rig.depth_intrinsics,
+        seed=settings.seed,
+        settings=CAMERA_FAULTS.get(settings.fault),
+    )
+
+
+def start_headset(
+    settings: StationSettings,
+    rig_path: Path,
+    worn_rig_path: Path,
+    ports: tuple[int, int],
+    pairing_key: str,
+) -> VirtualHeadset:
+    """Start the virtual headset's process.
+
+    Parameters
+    ----------
+    settings : StationSettings
+    rig_path, worn_rig_path : Path
+        The rig used by the headset, and the rig of the headset actually worn.
+    ports : tuple of int
+        Ports of the PC's end of the link and of the simulated camera, on this machine.
+    pairing_key : str
+    """
+    port, scene_port = ports
+    return VirtualHeadset(
+        rig_path,
+        port,
+        scene_port,
+        pairing_key,
+        seed=settings.seed,
+        worn_rig_path=worn_rig_path,
+        loss=settings.loss,
+        reorder=settings.reorder,
+        is_stale=settings.fault == "stale-headset",
+        loses_start=settings.fault == "lost-start",
+        eye_distance_m=settings.eye_distance_m,
+        side=settings.side,
+        slip_m=settings.slip_m,
+    )
+
+
+def _lab_prior(settings: StationSettings) -> PriorSettings:
+    """Return the prior for a new session, learned from the lab's earlier ones if wanted."""
+    prior = settings.calibration.solve.fuse.prior
+    if not settings.learn_prior or prior.learned is not None:
+        return prior
+    found = run_learn_prior(Path(settings.sessions), read_rig(settings.rig_path), prior)
+    return replace(prior, learned=found.learned)

@@ -1,0 +1,72 @@
+"""The menu Help: the manual, examples, keys, licences, and what the program is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.metadata import version
+
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QMessageBox
+
+from handcal.errors import FileError
+from handcal.io.resources import resource_path
+from handcal_gui.keys import keys_html
+from handcal_gui.translation import tr
+from handcal_gui.window import MainWindow
+from handcal_gui.windows.manual import Manual
+
+
+def add_help_menu(window: MainWindow, manual: Manual, support: Callable[[], object]) -> None:
+    """Fill the menu Help of a window.
+
+    Parameters
+    ----------
+    window : MainWindow
+    manual : Manual
+    support : callable
+        Opens the dialog that writes a support bundle.
+    """
+    add = window.add_action
+    add("Help", tr("&Guide"), "Shift+F1", lambda: _read(window, manual, "docs/guide.md"))
+    add("Help", tr("&Manual"), "", lambda: _read(window, manual, "docs/index.md"))
+    add("Help", tr("Headset &protocol"), "", lambda: _read(window, manual, "docs/protocol.md"))
+    add("Help", tr("&Examples in Python"), "", lambda: _show_folder(window, "examples"))
+    add("Help", tr("&Unity package"), "", lambda: _show_folder(window, "unity"))
+    add("Help", tr("&Support bundle…"), "", support)
+    add("Help", tr("&Keys"), "F1", lambda: _show_keys(window))
+    add("Help", tr("&Licences"), "", lambda: _read(window, manual, "THIRD-PARTY.md"))
+    add("Help", tr("&About handcal"), "", lambda: _show_about(window))
+
+
+def _show_keys(window: MainWindow) -> None:
+    QMessageBox.information(window, tr("Keys"), keys_html(window))
+
+
+def _read(window: MainWindow, manual: Manual, page: str) -> None:
+    try:
+        manual.open(page)
+    except FileError as error:
+        window.banner.show_message(str(error))
+
+
+def _show_folder(window: MainWindow, name: str) -> None:
+    try:
+        folder = resource_path(name)
+    except FileError as error:
+        window.banner.show_message(str(error))
+        return
+    if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+        window.banner.show_message(tr("No file manager was found; the folder is {}").format(folder))
+
+
+def _show_about(window: MainWindow) -> None:
+    QMessageBox.about(
+        window,
+        tr("About handcal"),
+        tr(
+            "<b>handcal {}</b><p>Calibrates an optical see-through headset with the "
+            "wearer's bare hand, after X. Hu, F. Rodriguez y Baena and F. Cutolo, ISMAR "
+            "2021.<p>Apache-2.0"
+        ).format(version("handcal")),
+    )
