@@ -16,7 +16,6 @@ from handcal.lab.study.studies import (
     run_method_comparison,
     run_noise_study,
 )
-from handcal.types import EYES
 from handcal_gui.evaluation_entries import CubeEntries, UserEntries
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -165,7 +164,7 @@ def _cube_form() -> EntriesForm:
             "rig": (tr("Rig file"), rig),
             "eye": (
                 tr("Display"),
-                choice("eye", tr("Display"), {eye: eye.capitalize() for eye in EYES}),
+                choice("eye", tr("Display"), {"left": tr("Left"), "right": tr("Right")}),
             ),
             "square_px": (tr("Grid squares"), square),
             "seed": (tr("Seed of the rendering"), _seed()),

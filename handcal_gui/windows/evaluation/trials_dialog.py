@@ -229,7 +229,7 @@ class TrialsDialog(PreparationDialog):
             ("px", "′"),
             [
                 Row(
-                    f"{trial.eye}, {trial.target_depth_m:g} m",
+                    f"{EYE_NAMES[trial.eye]}, {trial.target_depth_m:g} m",
                     (f"{trial.error_px.mean():.1f}", f"{trial.error_arcmin.mean():.1f}"),
                     tr("Mean over the four corners."),
                 )

@@ -137,7 +137,7 @@ class AcceptDialog(QDialog):
     def _show(self, found: Acceptance) -> None:
         self._page = found.files[-1]
         rows = [
-            Row(f"{eye}, {depth_m} m", tuple(numbers))
+            Row(f"{EYE_NAMES[eye]}, {depth_m} m", tuple(numbers))
             for eye, one in found.eyes.items()
             for depth_m, *numbers in view_rows(one)
         ]
@@ -145,9 +145,8 @@ class AcceptDialog(QDialog):
         if found.cause:
             finding = Finding("", Health.BROKEN, tr("the rig fails: {}").format(found.cause))
         else:
-            finding = Finding(
-                "", Health.GOOD, tr("the rig passes: {}").format(", ".join(found.eyes))
-            )
+            eyes = ", ".join(EYE_NAMES[eye].lower() for eye in found.eyes)
+            finding = Finding("", Health.GOOD, tr("the rig passes: {}").format(eyes))
         if found.left_out:
             name, why = next(iter(found.left_out.items()))
             words = tr("{} left out, such as {}: {}").format(len(found.left_out), name, why)
