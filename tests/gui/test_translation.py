@@ -27,14 +27,18 @@ SOURCES = [
     if not path.relative_to(ROOT / "handcal_gui").as_posix().startswith(NO_WINDOW)
 ]
 SETTERS = {
-    "addAction", "addButton", "addItem", "addMenu", "addRow", "addTab", "button", "main_button",
-    "paragraph", "QAction", "QCheckBox", "QGroupBox", "QLabel", "QPushButton", "QRadioButton",
+    "Finding", "ImageView", "NumberTable", "PathField", "QAction", "QCheckBox", "QGroupBox",
+    "QLabel", "QPushButton", "QRadioButton", "Row", "addAction", "addButton", "addItem", "addMenu",
+    "addRow", "addTab", "button", "choice", "main_button", "number", "paragraph",
     "setAccessibleDescription", "setAccessibleName", "setHeaderLabels", "setLabelText",
     "setPlaceholderText", "setStatusTip", "setTabText", "setText", "setTitle", "setToolTip",
-    "setWhatsThis", "setWindowTitle", "show_message", "with_name",
+    "setWhatsThis", "setWindowTitle", "show_message", "show_text", "whole_number", "with_name",
 }  # fmt: skip
 """Functions that show a text."""
-WITH_IDENTIFIER = {"addAction", "addItem", "button", "main_button", "paragraph", "with_name"}
+WITH_IDENTIFIER = {
+    "PathField", "addAction", "addItem", "button", "choice", "main_button", "number", "paragraph",
+    "whole_number", "with_name",
+}  # fmt: skip
 """Those that also take an identifier, such as an object name."""
 NAMES = {"handcal", "OpenIGTLink", "LSL", "mm", "pairing.key"}
 _WORD = re.compile(r"[^\W\d_]{2,}")
@@ -73,7 +77,7 @@ def untranslated(tree: ast.AST) -> Iterator[tuple[int, str]]:
 def is_shown(argument: ast.expr, *, allows_identifier: bool) -> bool:
     """Return whether an argument is a text that a person reads."""
     shown = argument.value if isinstance(argument, ast.Constant) else ""
-    if not isinstance(shown, str) or not _WORD.search(shown) or shown in NAMES:
+    if not isinstance(shown, str) or not _WORD.search(shown) or shown.strip() in NAMES:
         return False
     return not (allows_identifier and _IDENTIFIER.fullmatch(shown))
 
