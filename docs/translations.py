@@ -16,8 +16,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 CATALOGUE = ROOT / "resources" / "translations" / "handcal_en.ts"
-NOT_YET = ("windows/rig/", "windows/evaluation/")
-"""Rooms of the window whose texts are not in the catalogue yet."""
 _ACCENTS = str.maketrans("AEIOUYaeiouycns", "ÀÉÎÖÛÝàéîöûýçñš")
 _KEPT = re.compile(r"(\{[^}]*\}|<[^>]*>|&)")
 _PLAIN = re.compile(r"[A-Za-z]*[aeiou][A-Za-z]*")

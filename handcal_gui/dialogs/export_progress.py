@@ -78,5 +78,5 @@ class ExportProgress(QWidget):
     def show_cancelled(self) -> None:
         """Show that the export was cancelled."""
         self._doing.setText(tr("Nothing was exported."))
-        self._end.show_finding(Finding("", Health.LIMITED, "cancelled", _UNCHANGED))
+        self._end.show_finding(Finding("", Health.LIMITED, tr("cancelled"), _UNCHANGED))
         self._end.show()

@@ -416,6 +416,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>cancelled</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Paired headsets</source>
         <translation type="unfinished"></translation>
     </message>
@@ -796,6 +800,10 @@ local network can read them.</source>
     </message>
     <message>
         <source>Image size, preset, exposure, laser power and filters.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Address of the headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3465,7 +3473,23 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Images to take</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>State</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>missing</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>taken</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3481,7 +3505,227 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Noise study</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How much rotation and noise do the solvers tolerate before their error exceeds the paper&apos;s 4 mm? About ten minutes on two cores; half a minute for a quick run.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Method comparison</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which calibration method is most accurate for the same wearers, and how much effort does it require? 100 wearers take about eleven minutes on two cores.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cube test</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How far is a drawn cube from the real one, as seen by a camera at the eye position? About a minute with rendered captures.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Capture…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take the captures with a camera; enter their folder first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>User test</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How large are the errors that wearers see after calibration, over all trials of their sessions? A few seconds.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Record…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Record the trials of one session with a cube in the room; enter the session first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Segmentation</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How well does the segmented hand agree with true masks of your own camera&apos;s frames, and how stable is it? About a second a frame.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is no folder {} yet: press Capture… to create it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose a session, or a folder of sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose a folder of frames with true masks</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Full</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Quick</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A quick run uses few trials; do not report its numbers.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Simulated wearers; each uses every method.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Wearers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Captures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rendered by the simulator</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>POSITION/POSE/real.png and virtual.png, and POSITION/grid.png.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cube</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cubes (*.json)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>cube.json of the captures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>camera.json of the captures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Intrinsics of the camera at the eye position.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The example rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Side length of the squares of the display&apos;s grid.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses of the cube at each position, rendered or captured.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments at each position, if captures are rendered.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Grid squares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Seed of the rendering</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses at each position</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments at each</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Folder of one session, or a folder that contains sessions.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Frames</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>NAME_color.png, NAME_depth.png and NAME_handmask.png, and a meta.json.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where the detector sees one</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nearest object, by depth alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Number of processes on this computer; more than its cores is not faster.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One per core</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>None: this computer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Dask scheduler</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Address of a Dask cluster that does the work instead, such as tcp://HOST:PORT.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Seed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Processes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Random seed; the same seed gives the same numbers.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Results folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Report, figures and raw numbers; an unfinished study there is resumed.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3650,6 +3894,1190 @@ one turns out.</source>
     </message>
     <message>
         <source>QR code</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Turned to the display&apos;s axes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Along the camera&apos;s axes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take captures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Space bar</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A&amp;utomatically</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take each image once the cube or the grid is at rest. Between two images of the cube, cover it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Large view</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fill the screen with the live image, to align a hand by. Escape goes back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose the camera, and press Show</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Looking for cameras</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Checking the image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waiting: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: capture the display&apos;s grid first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>taken: {}, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not taken: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All captures have been taken.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Positions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Positions of the camera in the eye box: names of folders, separated by commas.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses of the cube at each position.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Renderings</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Names of the renderings to compare, such as: before, after.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>At &amp;each position</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Display&apos;s grid</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Without the grid, errors are measured along the camera&apos;s axes instead of the display&apos;s.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses at each</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Run</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Running</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} is running</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>only one can run at a time</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Done</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Figures and numbers will be shown here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbers {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open report</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Report as PDF, for reading and archiving</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open in browser</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The same report as HTML, with the numbers of each figure</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Folder with report, figures and raw numbers as CSV</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Figure {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>less than a minute left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>about {} h {} min left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>about {} min left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Down</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Larger</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Smaller</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the cube {:g} m from the eyes, two or three faces towards them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>It is there</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: move the drawn corners until they cover the cube&apos;s.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>They coincide</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Record trials</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Paired headset, RealSense</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The simulator needs a session of a simulated wearer, who adjusts φ.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>60 mm, as printed by default</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Start</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials recorded</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} ({:g} mm of φ)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>trials will be stored in {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Waiting for the headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean over the four corners.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>trials stored: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Moves of φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no headset is paired; pair one with Connect a headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Evaluations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} contains the complete study</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show results</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>completed trials are kept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} holds {:.0f} % of this study</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:,} of {:,} cases</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The report in {} will be replaced</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ready</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For each eye, put the viewpoint camera behind its display. Take the grid in a dark room. Do not move camera or headset; switch the display off, and take the board with both cameras at {} or more distances, 0.35 to 0.65 m.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Corners</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean, ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest, ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take grid</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Accept the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drawn against seen</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Accept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open page</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not accepted yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Looking for grid and board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Viewpoint camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the rig fails: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the rig passes: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} left out, such as {}: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} of the grid, {} of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Checkerboard</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Squares, not inner corners.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Kind of board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Side length of a square, measured on the print.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured side length of a marker.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Dictionary</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Dictionary of the markers.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Printed by OpenCV before 4.6</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Boards with an even number of rows started with a white square.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Paper</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save as PDF…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>To scale, with a ruler to check the print</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>PNG, to show on a screen</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use another initial rig…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Preview of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No such board exists</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} inner corners to find</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>PDF (*.pdf)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>PNG (*.png)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not saved: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>print it at 100 % and measure the ruler and the squares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>saved as {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose an initial rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use another initial rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Calibrated parts that have not been saved will be lost. Continue?</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>nothing</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} (calibrated: {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Squares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Square</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Marker</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The initial rig provides what the headset itself reports: the size of its displays and the poses of its rendering cameras.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Coverage, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Number of images with a corner of the board in each part of the view. Empty parts give no information about the lens there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>as measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>solved from the squares&apos; angle</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye position, focused on the display. Darken the room and take 3 or more images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do not move the viewpoint camera. Switch the display off and take 8 or more images of the board through it while the headset tracks the board. Save the poses in one JSON file.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the virtual screen</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured z(C0→S).</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle that a square of the grid subtends.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nominal distance for this angle, from the manufacturer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Side length of the grid&apos;s squares, in pixels.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracked poses</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracked poses (*.json)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses of the board as tracked by the headset, for each image: {}, in metres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Stereo calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Stereo calibrations (*.json)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not needed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Instead of images and poses of the board: the result of &apos;handcal rig stereo&apos; with the viewpoint camera as depth camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Matrices (*.txt *.json *.yaml *.yml)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rendering camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>As in the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>T_V_H, from the headset rig to this eye&apos;s rendering camera, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Images of the grid</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Grid images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Images of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Board images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Board poses</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>or a stereo calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rendering camera T_V_H</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance z(C0→S)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle of a square</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>at nominal distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Grid on the display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera pose</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save grid…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>PNG, to show on the display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the grid</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}×{} squares saved as {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>show it unscaled</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Item</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Found</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drawing of the arrangement</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Map</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Uncertainty</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Arrangement</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show how the devices are arranged</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Read the folders again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take images…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take images with cameras of this computer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Looking for the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} of {} used</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No images yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The one that fits best</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No distortion</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>k1 to k6, p1, p2</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fisheye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solved from the images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>OpenCV FileStorage, ROS camera_info or handcal JSON.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Lens</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distortion coefficients to solve for.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>it was not added to the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>it was not added to the rig: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>it was added to the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>this rig is not plausible: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The entries could not be saved: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The entries were reset: {}; {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The rig was reset: {}; {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the old file was kept as {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the old file could not be renamed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check of the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbers of the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rig file to compare with</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Differences</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save rig file…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Accept…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check what is drawn by a camera in the eye&apos;s place</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use for the next calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} of {} findings are doubtful: see Check</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no doubtful findings</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the rig file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the next calibration uses this rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose a rig file, such as the last calibration of this rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>compared with {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Value</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation vector of the depth camera in the headset camera: axis times angle.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Position of the depth camera in the headset camera: x right, y down, z forward.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>From the headset&apos;s rendering camera V to the offline viewpoint C0, in the axes of V.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the virtual screen S from the offline viewpoint C0.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In pixels; σ from the residuals.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distortion coefficient of OpenCV&apos;s model.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pixel</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle of a pixel at the image centre.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Each pair alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS difference from the pose by each pair alone.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>σ of the least certain corner of the display, in its pixels.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Focal length of K, on the display&apos;s axis.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle between the axes of the display and of the headset&apos;s V; included in H0.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Never negative; 0 if both agree.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth camera: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>From the depth camera&apos;s intrinsics.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>T_H_D rotation {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Root mean square distance between detected and expected corners.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Unticked images are excluded; tick them to include them again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Number of board corners found in each camera&apos;s image.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS, px</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Root mean square distance between detected and expected corners, after solving.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tilt</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle between the board&apos;s normal and the line of sight, after solving.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>worst: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The selected image will appear here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} corners; edges {:.1f} px wide</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Looking for the board in {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>headset camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the viewpoint camera&apos;s intrinsics are missing: solve its step first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} {:.3f} px (± {:.2f} px at the edge)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>lens {}, of {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solving</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not solved yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solved {}: {}; {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Worst: {}, {:.2f} px: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take 20 or more pairs of simultaneous images of the board: near and far, in all parts of both views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end in the same number, such as depth07.png and headset07.png.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth imager&apos;s intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Needed only if the images come from a colour imager beside the depth imager and the depth is not aligned to it. Take images… reads them from a RealSense.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pose from depth to colour</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses (*.yaml *.yml *.json)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth camera&apos;s images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>its intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset camera&apos;s images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Headset camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Automatically</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take an image whenever the board is at rest, sharp, and at a position not covered by earlier images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose the cameras, and press Show</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} taken: enough images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} taken; {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} taken</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>take another</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source> and </source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: {} corners</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Uncertainty, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Standard deviation of the pixel at which a distant point appears; dark from 1 px on. Take images with the board in the dark parts. Crossed: not known.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take 20 or more images of the board with the viewpoint camera, with the focus that it will have behind the display: in all parts of the view up to its edges, tilted by 20° to 45° in all directions.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Viewpoint camera&apos;s images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Viewpoint images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>or its intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the intrinsics are in {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>it is not used</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the displays will be calibrated with it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The calibration target and the initial rig.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth and headset camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pose of the depth camera on the headset: T_H_D.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The camera in the position of the wearer&apos;s eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Left display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Projection and position of the left eye&apos;s display.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Right display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Projection and position of the right eye&apos;s display.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The whole rig: check, compare and save it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Steps</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All entries are kept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not done yet</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

@@ -20,23 +20,25 @@ from handcal_gui.translation import tr, use_translator
 from tests.helpers import ROOT
 
 CATALOGUE = ROOT / "resources" / "translations" / "handcal_en.ts"
-NOT_YET = ("windows/rig", "windows/evaluation", "evaluation_entries.py")
-"""Parts of the window whose texts are not translated yet."""
 NO_WINDOW = ("autopilot", "benchmark.py", "bundle.py", "app.py", "launch.py", "theme.py")
 SOURCES = [
     path
     for path in sorted((ROOT / "handcal_gui").rglob("*.py"))
-    if not path.relative_to(ROOT / "handcal_gui").as_posix().startswith((*NOT_YET, *NO_WINDOW))
+    if not path.relative_to(ROOT / "handcal_gui").as_posix().startswith(NO_WINDOW)
 ]
 SETTERS = {
-    "addAction", "addButton", "addItem", "addMenu", "addRow", "addTab", "button", "main_button",
-    "paragraph", "QAction", "QCheckBox", "QGroupBox", "QLabel", "QPushButton", "QRadioButton",
+    "Finding", "ImageView", "NumberTable", "PathField", "QAction", "QCheckBox", "QGroupBox",
+    "QLabel", "QPushButton", "QRadioButton", "Row", "addAction", "addButton", "addItem", "addMenu",
+    "addRow", "addTab", "button", "choice", "main_button", "number", "paragraph",
     "setAccessibleDescription", "setAccessibleName", "setHeaderLabels", "setLabelText",
     "setPlaceholderText", "setStatusTip", "setTabText", "setText", "setTitle", "setToolTip",
-    "setWhatsThis", "setWindowTitle", "show_message", "with_name",
+    "setWhatsThis", "setWindowTitle", "show_message", "show_text", "whole_number", "with_name",
 }  # fmt: skip
 """Functions that show a text."""
-WITH_IDENTIFIER = {"addAction", "addItem", "button", "main_button", "paragraph", "with_name"}
+WITH_IDENTIFIER = {
+    "PathField", "addAction", "addItem", "button", "choice", "main_button", "number", "paragraph",
+    "whole_number", "with_name",
+}  # fmt: skip
 """Those that also take an identifier, such as an object name."""
 NAMES = {"handcal", "OpenIGTLink", "LSL", "mm", "pairing.key"}
 _WORD = re.compile(r"[^\W\d_]{2,}")
@@ -75,7 +77,7 @@ def untranslated(tree: ast.AST) -> Iterator[tuple[int, str]]:
 def is_shown(argument: ast.expr, *, allows_identifier: bool) -> bool:
     """Return whether an argument is a text that a person reads."""
     shown = argument.value if isinstance(argument, ast.Constant) else ""
-    if not isinstance(shown, str) or not _WORD.search(shown) or shown in NAMES:
+    if not isinstance(shown, str) or not _WORD.search(shown) or shown.strip() in NAMES:
         return False
     return not (allows_identifier and _IDENTIFIER.fullmatch(shown))
 

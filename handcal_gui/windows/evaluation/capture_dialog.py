@@ -28,6 +28,7 @@ from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
 from handcal_gui.widgets.finding_line import FindingLine
@@ -39,8 +40,8 @@ from handcal_gui.windows.evaluation.capture_list import CaptureList
 from handcal_gui.windows.evaluation.preparation import PreparationDialog
 
 _FIRST_SIZE = QSize(1120, 760)
-_TURNED = "Turned to the display's axes"
-_NOT_TURNED = "Along the camera's axes"
+_TURNED = tr("Turned to the display's axes")
+_NOT_TURNED = tr("Along the camera's axes")
 MOST_POSES = 100
 
 
@@ -71,7 +72,7 @@ class CaptureDialog(PreparationDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("captureDialog")
-        self.setWindowTitle("Take captures")
+        self.setWindowTitle(tr("Take captures"))
         self.entries = entries
         self._folder = Path(entries.captures).expanduser()
         self._plan: CapturePlan | None = None
@@ -80,27 +81,31 @@ class CaptureDialog(PreparationDialog):
         self._list_cameras = list_cameras
         self.form = _plan_form()
         self.form.show_entries(entries)
-        self._camera = LiveCameras(("Camera",), open_source=open_source)
+        self._camera = LiveCameras((tr("Camera"),), open_source=open_source)
         self._list = CaptureList()
         self._instruction = paragraph("instruction")
         self._found = FindingLine("capture")
         self._bar = JobBar()
-        self._start = button("startCamera", "Show")
-        self._take = main_button("takeCapture", "Take again")
+        self._start = button("startCamera", tr("Show"))
+        self._take = main_button("takeCapture", tr("Take again"))
         self._take.setMinimumWidth(self._take.sizeHint().width())
-        self._take.setToolTip("Space bar")
+        self._take.setToolTip(tr("Space bar"))
         self._by_itself = with_name(
-            QCheckBox("A&utomatically"),
+            QCheckBox(tr("A&utomatically")),
             "byItself",
-            help_text="Take each image once the cube or the grid is at rest. Between two images of "
-            "the cube, cover it.",
+            help_text=tr(
+                "Take each image once the cube or the grid is at rest. Between two images of the "
+                "cube, cover it."
+            ),
         )
         self._large = with_name(
-            QCheckBox("&Large view"),
+            QCheckBox(tr("&Large view")),
             "largeView",
-            help_text="Fill the screen with the live image, to align a hand by. Escape goes back.",
+            help_text=tr(
+                "Fill the screen with the live image, to align a hand by. Escape goes back."
+            ),
         )
-        self._close = button("close", "Close")
+        self._close = button("close", tr("Close"))
         self._watch: RestWatch | None = None
         self._is_watching = False
         self._warp: tuple[str, RotationWarp | None] = "", None
@@ -130,8 +135,10 @@ class CaptureDialog(PreparationDialog):
         self._bar.failed.connect(self._show_not_done)
         self._lay_out()
         self._ask()
-        self._found.show_finding(Finding("", Health.LIMITED, "choose the camera, and press Show"))
-        self._bar.run("Looking for cameras", lambda *_: self._prepare(), self._begin)
+        self._found.show_finding(
+            Finding("", Health.LIMITED, tr("choose the camera, and press Show"))
+        )
+        self._bar.run(tr("Looking for cameras"), lambda *_: self._prepare(), self._begin)
 
     def start(self) -> None:
         """Show images of the chosen camera."""
@@ -151,7 +158,9 @@ class CaptureDialog(PreparationDialog):
             return seen
 
         if not self._bar.is_busy:
-            self._bar.run("Checking the image", work, lambda seen: self._show_taken(chosen, seen))
+            self._bar.run(
+                tr("Checking the image"), work, lambda seen: self._show_taken(chosen, seen)
+            )
 
     def done(self, result: int) -> None:
         """Close camera and dialog."""
@@ -199,7 +208,7 @@ class CaptureDialog(PreparationDialog):
         if shown:
             self._show_taken(seen[1], shown)
         else:
-            self._found.show_finding(Finding("", Health.LIMITED, f"waiting: {why_not}"))
+            self._found.show_finding(Finding("", Health.LIMITED, tr("waiting: {}").format(why_not)))
 
     def _on_judging_failed(self, why: str) -> None:
         self._is_watching = False
@@ -218,7 +227,9 @@ class CaptureDialog(PreparationDialog):
     def _show_turned(self, position: str, warp: RotationWarp | None) -> None:
         self._warp = position, warp
         if warp is None:
-            self._camera.show_through(None, f"{_NOT_TURNED}: capture the display's grid first")
+            self._camera.show_through(
+                None, tr("{}: capture the display's grid first").format(_NOT_TURNED)
+            )
         else:
             self._camera.show_through(self._warped, _TURNED)
 
@@ -273,7 +284,9 @@ class CaptureDialog(PreparationDialog):
             self._list.show_captures(plan.captures, frozenset(missing))
 
     def _show_taken(self, taken: PlannedCapture, seen: str) -> None:
-        self._found.show_finding(Finding("", Health.GOOD, f"taken: {taken.file}, {seen}"))
+        self._found.show_finding(
+            Finding("", Health.GOOD, tr("taken: {}, {}").format(taken.file, seen))
+        )
         if taken.kind == GRID:
             self._warp = "", None
         self._ask()
@@ -283,7 +296,7 @@ class CaptureDialog(PreparationDialog):
         if self._looked_for is None:
             self._show_failure(why)
         else:
-            self._found.show_finding(Finding("", Health.LIMITED, f"not taken: {why}"))
+            self._found.show_finding(Finding("", Health.LIMITED, tr("not taken: {}").format(why)))
 
     def _show_failure(self, why: str) -> None:
         self._found.show_finding(Finding("", Health.BROKEN, why))
@@ -293,7 +306,7 @@ class CaptureDialog(PreparationDialog):
         is_seen = self._camera.images is not None and self._list.chosen is not None
         self._start.setEnabled(self._looked_for is not None)
         self._take.setEnabled(is_ready and is_seen)
-        self._take.setText("Take again" if self._list.chosen_is_taken else "Take")
+        self._take.setText(tr("Take again") if self._list.chosen_is_taken else tr("Take"))
         self._take.setShortcut(Qt.Key.Key_Space)  # setText removes the shortcut
         self._instruction.setText(self._next_instruction())
 
@@ -301,7 +314,7 @@ class CaptureDialog(PreparationDialog):
         if self._plan_problem:
             return f"{sentence(self._plan_problem)}."
         if self._list.is_complete and self._list.chosen is None:
-            return "All captures have been taken."
+            return tr("All captures have been taken.")
         if self._looked_for is None or self._list.chosen is None:
             return ""
         return f"{instruction(self._list.chosen)}."
@@ -336,27 +349,30 @@ def _plan_form() -> EntriesForm:
     positions = with_name(
         QLineEdit(),
         "positions",
-        "Positions",
-        "Positions of the camera in the eye box: names of folders, separated by commas.",
+        tr("Positions"),
+        tr("Positions of the camera in the eye box: names of folders, separated by commas."),
     )
-    poses = whole_number("poses", 1, MOST_POSES, "Poses of the cube at each position.")
+    poses = whole_number("poses", 1, MOST_POSES, tr("Poses of the cube at each position."))
     drawn = with_name(
-        QLineEdit(placeholderText="One", clearButtonEnabled=True),
+        QLineEdit(placeholderText=tr("One"), clearButtonEnabled=True),
         "drawn",
-        "Renderings",
-        "Names of the renderings to compare, such as: before, after.",
+        tr("Renderings"),
+        tr("Names of the renderings to compare, such as: before, after."),
     )
     with_grid = with_name(
-        QCheckBox("At &each position"),
+        QCheckBox(tr("At &each position")),
         "withGrid",
-        "Display's grid",
-        "Without the grid, errors are measured along the camera's axes instead of the display's.",
+        tr("Display's grid"),
+        tr(
+            "Without the grid, errors are measured along the camera's axes instead of the "
+            "display's."
+        ),
     )
     return EntriesForm(
         {
-            "positions": ("Positions", positions),
-            "poses": ("Poses at each", poses),
-            "drawn": ("Renderings", drawn),
-            "with_grid": ("Display's grid", with_grid),
+            "positions": (tr("Positions"), positions),
+            "poses": (tr("Poses at each"), poses),
+            "drawn": (tr("Renderings"), drawn),
+            "with_grid": (tr("Display's grid"), with_grid),
         }
     )

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTree
 
 from handcal.lab.evaluate.cube_folder import PlannedCapture
 from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
+from handcal_gui.translation import tr
 
 _IMAGE, _STATE = range(2)
 
@@ -27,12 +28,12 @@ class CaptureList(QTreeWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("captures")
-        self.setAccessibleName("Images to take")
+        self.setAccessibleName(tr("Images to take"))
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
         self.setUniformRowHeights(True)
         self.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
-        self.setHeaderLabels(["Image", "State"])
+        self.setHeaderLabels([tr("Image"), tr("State")])
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         flat_header(self.header())
         self.header().setStretchLastSection(False)
@@ -84,5 +85,5 @@ class CaptureList(QTreeWidget):
         icons = {True: QIcon(blank), False: icon("check", colors().good)}
         for item, capture in zip(self._items, self._captures, strict=True):
             is_missing = capture in self._missing
-            item.setText(_STATE, "missing" if is_missing else "taken")
+            item.setText(_STATE, tr("missing") if is_missing else tr("taken"))
             item.setIcon(_STATE, icons[is_missing])

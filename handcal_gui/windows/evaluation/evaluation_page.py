@@ -14,6 +14,7 @@ from handcal.errors import HandcalError
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
@@ -63,7 +64,7 @@ class EvaluationPage(QWidget):
         self._failure = self._waits_for = ""
         self.form = spec.form()
         self.form.show_entries(entries)
-        self._button = main_button("run", "Run")
+        self._button = main_button("run", tr("Run"))
         self._prepare = PreparationButton(spec.preparation) if spec.preparation else None
         self._bar = JobBar()
         self._found = FindingLine("readiness")
@@ -95,7 +96,7 @@ class EvaluationPage(QWidget):
         self._failure = ""
         self._results.show_outcome(None)
         self._bar.run(
-            "Starting",
+            tr("Starting"),
             lambda progress: self._evaluation.run(entries, progress),
             self._show_outcome,
         )
@@ -175,14 +176,14 @@ class EvaluationPage(QWidget):
     def _finding(self) -> Finding | None:
         """Return the message to show; None to keep the present one."""
         if self.is_busy:
-            return Finding("", Health.GOOD, "Running")
+            return Finding("", Health.GOOD, tr("Running"))
         if self._failure:
             return Finding("", Health.BROKEN, self._failure)
         if self._waits_for:
-            found = f"{self._waits_for} is running"
-            return Finding("", Health.LIMITED, found, "only one can run at a time")
+            found = tr("{} is running").format(self._waits_for)
+            return Finding("", Health.LIMITED, found, tr("only one can run at a time"))
         if not self._results.is_empty:
-            return Finding("", Health.GOOD, "Done")
+            return Finding("", Health.GOOD, tr("Done"))
         return self._readiness.finding if self._readiness else None
 
     def _lay_out(self, question: str) -> None:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 from handcal.report.document import Figure, Report, Table
 from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, fill_row, paragraph, with_name
 from handcal_gui.widgets.image_view import ImageView
@@ -28,12 +29,12 @@ class ResultsView(QWidget):
         self.setObjectName("results")
         self._folder = Path()
         self._pages: list[QWidget] = []
-        self._empty = with_name(QLabel("Figures and numbers will be shown here."), "noResults")
+        self._empty = with_name(QLabel(tr("Figures and numbers will be shown here.")), "noResults")
         self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._empty.setEnabled(False)
         self._lead = paragraph("lead")
         self._lead.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._tabs = with_name(QTabWidget(), "figures", "Results")
+        self._tabs = with_name(QTabWidget(), "figures", tr("Results"))
         self._tabs.setElideMode(Qt.TextElideMode.ElideNone)
         self._path = with_name(ElidedLabel(), "resultsFolder")
         self._lay_out()
@@ -57,7 +58,10 @@ class ResultsView(QWidget):
         self._lead.setText(outcome.report.lead)
         tables = _key_tables(outcome.report)
         for number, table in enumerate(tables, 1):
-            self._add(f"Numbers {number}" if len(tables) > 1 else "Numbers", _table_page(table))
+            self._add(
+                tr("Numbers {}").format(number) if len(tables) > 1 else tr("Numbers"),
+                _table_page(table),
+            )
         for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
             title = sentence(figure.name.replace("-", " "))
             self._add(title, _figure_page(title, figure, picture))
@@ -72,14 +76,24 @@ class ResultsView(QWidget):
     def _lay_out(self) -> None:
         foot, buttons = QWidget(), []
         for name, text, file, help_text in (
-            ("openPdf", "Open report", "report.pdf", "Report as PDF, for reading and archiving"),
+            (
+                "openPdf",
+                tr("Open report"),
+                "report.pdf",
+                tr("Report as PDF, for reading and archiving"),
+            ),
             (
                 "openHtml",
-                "Open in browser",
+                tr("Open in browser"),
                 "report.html",
-                "The same report as HTML, with the numbers of each figure",
+                tr("The same report as HTML, with the numbers of each figure"),
             ),
-            ("openFolder", "Open folder", "", "Folder with report, figures and raw numbers as CSV"),
+            (
+                "openFolder",
+                tr("Open folder"),
+                "",
+                tr("Folder with report, figures and raw numbers as CSV"),
+            ),
         ):
             buttons.append(button(name, text, help_text=help_text))
             buttons[-1].clicked.connect(lambda _checked=False, file=file: self._open(file))
@@ -101,14 +115,14 @@ def _key_tables(report: Report) -> list[Table]:
 
 
 def _table_page(table: Table) -> QWidget:
-    view = NumberTable("Numbers")
+    view = NumberTable(tr("Numbers"))
     titles = [column.title for column in table.columns[1:]]
     view.show_rows(titles, [Row(cells[0], tuple(cells[1:])) for cells in table.rows])
     return _page(view, table.caption)
 
 
 def _figure_page(title: str, figure: Figure, picture: UInt8) -> QWidget:
-    view = ImageView(f"Figure {title}")
+    view = ImageView(tr("Figure {}").format(title))
     view.setAccessibleDescription(figure.caption)
     paper = view.palette()
     paper.setColor(QPalette.ColorRole.Window, Qt.GlobalColor.white)

@@ -16,8 +16,8 @@ from handcal.lab.study.studies import (
     run_method_comparison,
     run_noise_study,
 )
-from handcal.types import EYES
 from handcal_gui.evaluation_entries import CubeEntries, UserEntries
+from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import choice, whole_number, with_name
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
@@ -35,53 +35,65 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
     """Return the specifications by field of `EvaluationEntries`."""
     return {
         "noise": EvaluationSpec(
-            "Noise study",
-            "How much rotation and noise do the solvers tolerate before their error exceeds the "
-            "paper's 4 mm? About ten minutes on two cores; half a minute for a quick run.",
+            tr("Noise study"),
+            tr(
+                "How much rotation and noise do the solvers tolerate before their error exceeds "
+                "the paper's 4 mm? About ten minutes on two cores; half a minute for a quick run."
+            ),
             StudyEvaluation(noise_cases, run_noise_study),
             _noise_form,
         ),
         "methods": EvaluationSpec(
-            "Method comparison",
-            "Which calibration method is most accurate for the same wearers, and how much effort "
-            "does it require? 100 wearers take about eleven minutes on two cores.",
+            tr("Method comparison"),
+            tr(
+                "Which calibration method is most accurate for the same wearers, and how much "
+                "effort does it require? 100 wearers take about eleven minutes on two cores."
+            ),
             StudyEvaluation(method_cases, run_method_comparison),
             _methods_form,
         ),
         "cube": EvaluationSpec(
-            "Cube test",
-            "How far is a drawn cube from the real one, as seen by a camera at the eye position? "
-            "About a minute with rendered captures.",
+            tr("Cube test"),
+            tr(
+                "How far is a drawn cube from the real one, as seen by a camera at the eye "
+                "position? About a minute with rendered captures."
+            ),
             FileEvaluation(_missing_captures, run_cube_test),
             _cube_form,
             Preparation(
-                "Capture…",
-                "Take the captures with a camera; enter their folder first.",
+                tr("Capture…"),
+                tr("Take the captures with a camera; enter their folder first."),
                 lambda entries: bool(entries.captures),
                 CaptureDialog,
             ),
         ),
         "users": EvaluationSpec(
-            "User test",
-            "How large are the errors that wearers see after calibration, over all trials of their "
-            "sessions? A few seconds.",
+            tr("User test"),
+            tr(
+                "How large are the errors that wearers see after calibration, over all trials of "
+                "their sessions? A few seconds."
+            ),
             FileEvaluation(
                 _missing_sessions,
                 lambda entries, progress: run_user_test(entries.settings, progress),
             ),
             _users_form,
             Preparation(
-                "Record…",
-                "Record the trials of one session with a cube in the room; enter the session "
-                "first.",
+                tr("Record…"),
+                tr(
+                    "Record the trials of one session with a cube in the room; enter the session "
+                    "first."
+                ),
                 lambda entries: bool(entries.sessions),
                 TrialsDialog,
             ),
         ),
         "segmentation": EvaluationSpec(
-            "Segmentation",
-            "How well does the segmented hand agree with true masks of your own camera's frames, "
-            "and how stable is it? About a second a frame.",
+            tr("Segmentation"),
+            tr(
+                "How well does the segmented hand agree with true masks of your own camera's "
+                "frames, and how stable is it? About a second a frame."
+            ),
             FileEvaluation(_missing_frames, run_segmentation_test),
             _segmentation_form,
         ),
@@ -93,84 +105,92 @@ def _missing_captures(entries: CubeEntries) -> str:
         return ""
     folder = Path(entries.captures).expanduser()
     if not folder.exists():
-        return f"there is no folder {folder} yet: press Capture… to create it"
+        return tr("there is no folder {} yet: press Capture… to create it").format(folder)
     find_captures(folder)  # raises an error if they are not usable
     return ""
 
 
 def _missing_sessions(entries: UserEntries) -> str:
-    return "" if entries.sessions else "choose a session, or a folder of sessions"
+    return "" if entries.sessions else tr("choose a session, or a folder of sessions")
 
 
 def _missing_frames(entries: SegmentationTestSettings) -> str:
-    return "" if entries.folder else "choose a folder of frames with true masks"
+    return "" if entries.folder else tr("choose a folder of frames with true masks")
 
 
 def _noise_form() -> EntriesForm:
     size = choice(
         "size",
-        "Size",
-        {"full": "Full", "quick": "Quick"},
-        "A quick run uses few trials; do not report its numbers.",
+        tr("Size"),
+        {"full": tr("Full"), "quick": tr("Quick")},
+        tr("A quick run uses few trials; do not report its numbers."),
     )
-    return EntriesForm({"size": ("Size", size), **_study_fields()})
+    return EntriesForm({"size": (tr("Size"), size), **_study_fields()})
 
 
 def _methods_form() -> EntriesForm:
     wearers = whole_number(
-        "wearers", 2, _MOST_WEARERS, "Simulated wearers; each uses every method."
+        "wearers", 2, _MOST_WEARERS, tr("Simulated wearers; each uses every method.")
     )
-    return EntriesForm({"wearers": ("Wearers", wearers), **_study_fields()})
+    return EntriesForm({"wearers": (tr("Wearers"), wearers), **_study_fields()})
 
 
 def _cube_form() -> EntriesForm:
-    captures = PathField("Captures", "folder", empty="Rendered by the simulator")
-    captures.setToolTip("POSITION/POSE/real.png and virtual.png, and POSITION/grid.png.")
-    cube = PathField("Cube", "file", "Cubes (*.json)", "cube.json of the captures")
-    camera = PathField("Camera", "file", INTRINSICS_FILES, "camera.json of the captures")
-    camera.setToolTip("Intrinsics of the camera at the eye position.")
-    rig = PathField("Rig file", "file", "Rig files (*.yaml *.yml)", "The example rig")
-    square = whole_number("square", 20, 2000, "Side length of the squares of the display's grid.")
+    captures = PathField(tr("Captures"), "folder", empty=tr("Rendered by the simulator"))
+    captures.setToolTip(tr("POSITION/POSE/real.png and virtual.png, and POSITION/grid.png."))
+    cube = PathField(tr("Cube"), "file", tr("Cubes (*.json)"), tr("cube.json of the captures"))
+    camera = PathField(tr("Camera"), "file", INTRINSICS_FILES, tr("camera.json of the captures"))
+    camera.setToolTip(tr("Intrinsics of the camera at the eye position."))
+    rig = PathField(tr("Rig file"), "file", tr("Rig files (*.yaml *.yml)"), tr("The example rig"))
+    square = whole_number(
+        "square", 20, 2000, tr("Side length of the squares of the display's grid.")
+    )
     square.setSuffix(" px")
     poses = whole_number(
-        "poses", 1, MOST_POSES, "Poses of the cube at each position, rendered or captured."
+        "poses", 1, MOST_POSES, tr("Poses of the cube at each position, rendered or captured.")
     )
     alignments = whole_number(
         "alignments",
         1,
         _MOST_ALIGNMENTS,
-        "Alignments at each position, if captures are rendered.",
+        tr("Alignments at each position, if captures are rendered."),
     )
     return EntriesForm(
         {
-            "captures": ("Captures", captures),
-            "cube": ("Cube", cube),
-            "camera": ("Camera intrinsics", camera),
+            "captures": (tr("Captures"), captures),
+            "cube": (tr("Cube"), cube),
+            "camera": (tr("Camera intrinsics"), camera),
             **_output(),
-            "rig": ("Rig file", rig),
-            "eye": ("Display", choice("eye", "Display", {eye: eye.capitalize() for eye in EYES})),
-            "square_px": ("Grid squares", square),
-            "seed": ("Seed of the rendering", _seed()),
-            "poses": ("Poses at each position", poses),
-            "alignments": ("Alignments at each", alignments),
+            "rig": (tr("Rig file"), rig),
+            "eye": (
+                tr("Display"),
+                choice("eye", tr("Display"), {"left": tr("Left"), "right": tr("Right")}),
+            ),
+            "square_px": (tr("Grid squares"), square),
+            "seed": (tr("Seed of the rendering"), _seed()),
+            "poses": (tr("Poses at each position"), poses),
+            "alignments": (tr("Alignments at each"), alignments),
         }
     )
 
 
 def _users_form() -> EntriesForm:
-    sessions = PathField("Sessions", "folder")
-    sessions.setToolTip("Folder of one session, or a folder that contains sessions.")
-    return EntriesForm({"sessions": ("Sessions", sessions), **_output()})
+    sessions = PathField(tr("Sessions"), "folder")
+    sessions.setToolTip(tr("Folder of one session, or a folder that contains sessions."))
+    return EntriesForm({"sessions": (tr("Sessions"), sessions), **_output()})
 
 
 def _segmentation_form() -> EntriesForm:
-    folder = PathField("Frames", "folder")
-    folder.setToolTip("NAME_color.png, NAME_depth.png and NAME_handmask.png, and a meta.json.")
-    ways = {"detector": "Where the detector sees one", "depth": "Nearest object, by depth alone"}
+    folder = PathField(tr("Frames"), "folder")
+    folder.setToolTip(tr("NAME_color.png, NAME_depth.png and NAME_handmask.png, and a meta.json."))
+    ways = {
+        "detector": tr("Where the detector sees one"),
+        "depth": tr("Nearest object, by depth alone"),
+    }
     return EntriesForm(
         {
-            "folder": ("Frames", folder),
-            "roi": ("Hand", choice("roi", "Hand", ways)),
+            "folder": (tr("Frames"), folder),
+            "roi": (tr("Hand"), choice("roi", tr("Hand"), ways)),
             **_output(),
         }
     )
@@ -181,28 +201,30 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
         "processes",
         0,
         _MOST_PROCESSES,
-        "Number of processes on this computer; more than its cores is not faster.",
+        tr("Number of processes on this computer; more than its cores is not faster."),
     )
-    processes.setSpecialValueText("One per core")
+    processes.setSpecialValueText(tr("One per core"))
     scheduler = with_name(
-        QLineEdit(placeholderText="None: this computer", clearButtonEnabled=True),
+        QLineEdit(placeholderText=tr("None: this computer"), clearButtonEnabled=True),
         "scheduler",
-        "Dask scheduler",
-        "Address of a Dask cluster that does the work instead, such as tcp://HOST:PORT.",
+        tr("Dask scheduler"),
+        tr("Address of a Dask cluster that does the work instead, such as tcp://HOST:PORT."),
     )
     return {
-        "seed": ("Seed", _seed()),
-        "processes": ("Processes", processes),
-        "scheduler": ("Dask scheduler", scheduler),
+        "seed": (tr("Seed"), _seed()),
+        "processes": (tr("Processes"), processes),
+        "scheduler": (tr("Dask scheduler"), scheduler),
         **_output(),
     }
 
 
 def _seed() -> QSpinBox:
-    return whole_number("seed", 0, _MOST_SEED, "Random seed; the same seed gives the same numbers.")
+    return whole_number(
+        "seed", 0, _MOST_SEED, tr("Random seed; the same seed gives the same numbers.")
+    )
 
 
 def _output() -> dict[str, tuple[str, QWidget]]:
-    output = PathField("Results folder", "folder")
-    output.setToolTip("Report, figures and raw numbers; an unfinished study there is resumed.")
-    return {"output": ("Results folder", output)}
+    output = PathField(tr("Results folder"), "folder")
+    output.setToolTip(tr("Report, figures and raw numbers; an unfinished study there is resumed."))
+    return {"output": (tr("Results folder"), output)}

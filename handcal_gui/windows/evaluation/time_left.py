@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from handcal_gui.translation import tr
+
 _MINUTE_S = 60.0
 
 
@@ -31,6 +33,8 @@ class TimeLeft:
         elapsed_s = self._clock() - self._start_s
         left_s = elapsed_s * (1.0 - share) / (share - self._begun)
         if left_s < _MINUTE_S:
-            return "less than a minute left"
+            return tr("less than a minute left")
         hours, minutes = divmod(round(left_s / _MINUTE_S), 60)
-        return f"about {f'{hours} h ' if hours else ''}{minutes} min left"
+        if hours:
+            return tr("about {} h {} min left").format(hours, minutes)
+        return tr("about {} min left").format(minutes)

@@ -25,6 +25,7 @@ from handcal.station.user_test import StudyLeader, TrialOrder, record_user_trial
 from handcal.types import Eye, Float64
 from handcal_gui.evaluation_entries import UserEntries
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
@@ -32,6 +33,7 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.windows.evaluation.preparation import PreparationDialog
 
 STEP_M = 0.00025
@@ -39,12 +41,12 @@ _POLL_S, _PATIENCE_S = 0.1, 120.0
 _MOVES: dict[str, tuple[str, int, int, int, Qt.Key]] = {
     # text; row and column; axis of φ, from 1, with its sign; key. The drawing of something nearer
     # than the virtual image moves against the eye.
-    "up": ("Up", 0, 1, 2, Qt.Key.Key_Up),
-    "left": ("Left", 1, 0, 1, Qt.Key.Key_Left),
-    "right": ("Right", 1, 2, -1, Qt.Key.Key_Right),
-    "down": ("Down", 2, 1, -2, Qt.Key.Key_Down),
-    "larger": ("Larger", 0, 3, 3, Qt.Key.Key_Plus),
-    "smaller": ("Smaller", 2, 3, -3, Qt.Key.Key_Minus),
+    "up": (tr("Up"), 0, 1, 2, Qt.Key.Key_Up),
+    "left": (tr("Left"), 1, 0, 1, Qt.Key.Key_Left),
+    "right": (tr("Right"), 1, 2, -1, Qt.Key.Key_Right),
+    "down": (tr("Down"), 2, 1, -2, Qt.Key.Key_Down),
+    "larger": (tr("Larger"), 0, 3, 3, Qt.Key.Key_Plus),
+    "smaller": (tr("Smaller"), 2, 3, -3, Qt.Key.Key_Minus),
 }
 Record: TypeAlias = Callable[..., tuple[Trial, ...]]
 
@@ -73,8 +75,10 @@ class _Desk:
     def _place(self, depth_m: float) -> None:
         self._tell(
             _Step(
-                f"Put the cube {depth_m:g} m from the eyes, two or three faces towards them.",
-                "It is there",
+                tr("Put the cube {:g} m from the eyes, two or three faces towards them.").format(
+                    depth_m
+                ),
+                tr("It is there"),
             )
         )
         while self._answer():
@@ -83,8 +87,10 @@ class _Desk:
     def _adjust(self, eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Float64:
         self._tell(
             _Step(
-                f"{eye.capitalize()} eye: move the drawn corners until they cover the cube's.",
-                "They coincide",
+                tr("{}: move the drawn corners until they cover the cube's.").format(
+                    EYE_NAMES[eye]
+                ),
+                tr("They coincide"),
                 is_adjusting=True,
             )
         )
@@ -130,7 +136,7 @@ class TrialsDialog(PreparationDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("trialsDialog")
-        self.setWindowTitle("Record trials")
+        self.setWindowTitle(tr("Record trials"))
         self.entries = entries
         self._record = record
         self._desk: _Desk | None = None
@@ -138,17 +144,19 @@ class TrialsDialog(PreparationDialog):
         self.form = EntriesForm(
             {
                 "headset": (
-                    "Headset",
+                    tr("Headset"),
                     choice(
                         "headset",
-                        "Headset",
-                        {"network": "Paired headset, RealSense", "virtual": "Simulator"},
-                        "The simulator needs a session of a simulated wearer, who adjusts φ.",
+                        tr("Headset"),
+                        {"network": tr("Paired headset, RealSense"), "virtual": tr("Simulator")},
+                        tr("The simulator needs a session of a simulated wearer, who adjusts φ."),
                     ),
                 ),
                 "cube": (
-                    "Cube",
-                    PathField("Cube", "file", "Cubes (*.json)", "60 mm, as printed by default"),
+                    tr("Cube"),
+                    PathField(
+                        tr("Cube"), "file", tr("Cubes (*.json)"), tr("60 mm, as printed by default")
+                    ),
                 ),
             }
         )
@@ -156,13 +164,13 @@ class TrialsDialog(PreparationDialog):
         self._instruction = paragraph("instruction")
         self._found = FindingLine("trials")
         self._bar = JobBar()
-        self._start = button("start", "Start")
-        self._next = main_button("next", "They coincide")
+        self._start = button("start", tr("Start"))
+        self._next = main_button("next", tr("They coincide"))
         self._next.setMinimumWidth(self._next.sizeHint().width())
-        self._close = button("close", "Close")
-        self._table = NumberTable("Trials recorded")
+        self._close = button("close", tr("Close"))
+        self._table = NumberTable(tr("Trials recorded"))
         self._moves = {
-            name: button(name, text, help_text=f"{text} ({1e3 * STEP_M:g} mm of φ)")
+            name: button(name, text, help_text=tr("{} ({:g} mm of φ)").format(text, 1e3 * STEP_M))
             for name, (text, *_) in _MOVES.items()
         }
         self.told.connect(self._show_step)
@@ -178,7 +186,7 @@ class TrialsDialog(PreparationDialog):
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
         self._found.show_finding(
-            Finding("", Health.LIMITED, f"trials will be stored in {entries.sessions}")
+            Finding("", Health.LIMITED, tr("trials will be stored in {}").format(entries.sessions))
         )
         self._refresh()
 
@@ -196,7 +204,7 @@ class TrialsDialog(PreparationDialog):
             return self._record(order, connect, _depth_camera, desk.leader, progress)
 
         self._table.show_rows(("px", "′"), ())
-        self._bar.run("Waiting for the headset", work, self._show_trials)
+        self._bar.run(tr("Waiting for the headset"), work, self._show_trials)
 
     def done(self, result: int) -> None:
         """Cancel the trials, and close."""
@@ -221,14 +229,16 @@ class TrialsDialog(PreparationDialog):
             ("px", "′"),
             [
                 Row(
-                    f"{trial.eye}, {trial.target_depth_m:g} m",
+                    f"{EYE_NAMES[trial.eye]}, {trial.target_depth_m:g} m",
                     (f"{trial.error_px.mean():.1f}", f"{trial.error_arcmin.mean():.1f}"),
-                    "Mean over the four corners.",
+                    tr("Mean over the four corners."),
                 )
                 for trial in trials
             ],
         )
-        self._found.show_finding(Finding("", Health.GOOD, f"trials stored: {len(trials)}"))
+        self._found.show_finding(
+            Finding("", Health.GOOD, tr("trials stored: {}").format(len(trials)))
+        )
         self._refresh()
 
     def _show_failure(self, why: str) -> None:
@@ -246,13 +256,13 @@ class TrialsDialog(PreparationDialog):
         self._next.setEnabled(step is not None)
         for move in self._moves.values():
             move.setEnabled(step is not None and step.is_adjusting)
-        self._next.setText("They coincide" if step is None else step.button)
+        self._next.setText(tr("They coincide") if step is None else step.button)
         self._instruction.setText("" if step is None else step.text)
 
     def _lay_out(self) -> None:
         scale_font(self._instruction, 1.6, is_bold=True)
         self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
-        pad = with_name(QWidget(), "moves", "Moves of φ")
+        pad = with_name(QWidget(), "moves", tr("Moves of φ"))
         grid = QGridLayout(pad)
         grid.setContentsMargins(0, 0, 0, 0)
         for name, move in self._moves.items():
@@ -276,7 +286,7 @@ class TrialsDialog(PreparationDialog):
 def _paired_headset() -> Iterator[HeadsetServer]:
     pairings = Pairings.read(pairing_file())
     if not pairings.all:
-        raise HandcalError("no headset is paired; pair one with Connect a headset")
+        raise HandcalError(tr("no headset is paired; pair one with Connect a headset"))
     with HeadsetServer(pairings, ("0.0.0.0", 47800)) as server:  # noqa: S104
         server.wait_connected(_PATIENCE_S)
         yield server

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
@@ -53,13 +54,13 @@ class EvaluationWindow(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("evaluationWindow")
-        self.setWindowTitle("Evaluate")
+        self.setWindowTitle(tr("Evaluate"))
         # A separate window with all window buttons.
         self.setWindowFlags(Qt.WindowType.Window)
         self._entries = entries
         self._specs = specs
         self._is_closing = False
-        self._rail = with_name(QListWidget(), "evaluationRail", "Evaluations")
+        self._rail = with_name(QListWidget(), "evaluationRail", tr("Evaluations"))
         self._title = QLabel()
         self._stack = QStackedWidget()
         self._pages: dict[str, EvaluationPage] = {}

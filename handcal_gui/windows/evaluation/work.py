@@ -19,6 +19,7 @@ from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
+from handcal_gui.translation import tr
 from handcal_gui.windows.evaluation.time_left import TimeLeft
 
 
@@ -27,7 +28,7 @@ class Readiness:
     """State of an evaluation for given entries, and the text of its button."""
 
     finding: Finding
-    button: str = "Run"
+    button: str = tr("Run")
 
     @property
     def can_run(self) -> bool:
@@ -78,11 +79,14 @@ class StudyEvaluation:
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
-            return Readiness(_note(f"{folder} contains the complete study"), "Show results")
-        if share:
-            advice = "completed trials are kept"
             return Readiness(
-                _note(f"{folder} holds {100 * share:.0f} % of this study", advice), "Resume"
+                _note(tr("{} contains the complete study").format(folder)), tr("Show results")
+            )
+        if share:
+            advice = tr("completed trials are kept")
+            return Readiness(
+                _note(tr("{} holds {:.0f} % of this study").format(folder, 100 * share), advice),
+                tr("Resume"),
             )
         return Readiness(_ready())
 
@@ -95,7 +99,7 @@ class StudyEvaluation:
         def report(doing: str, share: float) -> None:
             if doing == RUNNING:
                 done = share / STUDY_SHARE
-                parts = f"{round(done * count):,} of {count:,} cases", left.at(done)
+                parts = tr("{:,} of {:,} cases").format(round(done * count), count), left.at(done)
                 doing = ", ".join(filter(None, parts))
             progress.report(doing, share)
 
@@ -117,7 +121,7 @@ class FileEvaluation:
             return Readiness(Finding("", Health.BROKEN, missing))
         folder = free_of_studies(output_folder(entries.output))
         if (folder / "report.pdf").exists():
-            return Readiness(_note(f"The report in {folder} will be replaced"))
+            return Readiness(_note(tr("The report in {} will be replaced").format(folder)))
         return Readiness(_ready())
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
@@ -140,4 +144,4 @@ def _note(found: str, advice: str = "") -> Finding:
 
 
 def _ready() -> Finding:
-    return Finding("", Health.GOOD, "Ready")
+    return Finding("", Health.GOOD, tr("Ready"))

@@ -22,21 +22,24 @@ from handcal.rig.rig_file import write_rig
 from handcal.station.doctor import Finding, Health
 from handcal.types import EYES, Eye
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.windows.rig.images_panel import Drawing
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
-_HOW = (
+_HOW = tr(
     "For each eye, put the viewpoint camera behind its display. Take the grid in a dark room. Do "
     "not move camera or headset; switch the display off, and take the board with both cameras at "
-    f"{FEWEST_VIEWS} or more distances, 0.35 to 0.65 m."
-)
-_COLUMNS = ("Corners", "Mean, ′", "Largest, ′")
+    "{} or more distances, 0.35 to 0.65 m."
+).format(FEWEST_VIEWS)
+_COLUMNS = (tr("Corners"), tr("Mean, ′"), tr("Largest, ′"))
+_TAKE = {"grid": tr("Take grid"), "board": tr("Take board")}
 
 
 class AcceptDialog(QDialog):
@@ -51,17 +54,17 @@ class AcceptDialog(QDialog):
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("acceptDialog")
-        self.setWindowTitle("Accept the rig")
+        self.setWindowTitle(tr("Accept the rig"))
         self._project = project
         self._folder = project.folder.path / "accept"
         self._page: Path | None = None
         self._counts = {eye: QLabel() for eye in EYES}
         self._found = FindingLine("accepted")
-        self._table = NumberTable("Drawn against seen")
+        self._table = NumberTable(tr("Drawn against seen"))
         self._bar = JobBar()
-        self._run = main_button("runAcceptance", "Accept")
-        self._open = button("openPage", "Open page")
-        self._close = button("close", "Close")
+        self._run = main_button("runAcceptance", tr("Accept"))
+        self._open = button("openPage", tr("Open page"))
+        self._close = button("close", tr("Close"))
         self._run.clicked.connect(self.run)
         self._open.clicked.connect(self._open_page)
         self._close.clicked.connect(self.accept)
@@ -71,7 +74,7 @@ class AcceptDialog(QDialog):
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
         self._refresh()
-        self._found.show_finding(Finding("", Health.LIMITED, "not accepted yet"))
+        self._found.show_finding(Finding("", Health.LIMITED, tr("not accepted yet")))
 
     def run(self) -> None:
         """Evaluate the eyes that have images."""
@@ -91,7 +94,7 @@ class AcceptDialog(QDialog):
             write_rig(settings.rig, rig)
             return run_acceptance(settings, progress)
 
-        self._bar.run("Looking for grid and board", work, self._show)
+        self._bar.run(tr("Looking for grid and board"), work, self._show)
 
     def done(self, result: int) -> None:
         """Cancel the evaluation, and close."""
@@ -112,8 +115,8 @@ class AcceptDialog(QDialog):
         project = self._project
         board, choose = project.inputs.board, ChooseSettings()
         folders = {
-            "Viewpoint camera": self._folder / eye / "viewpoint",
-            "Depth camera": self._folder / eye / "depth",
+            tr("Viewpoint camera"): self._folder / eye / "viewpoint",
+            tr("Depth camera"): self._folder / eye / "depth",
         }
         if what == "grid":
             try:
@@ -121,7 +124,7 @@ class AcceptDialog(QDialog):
             except HandcalError as error:
                 self._found.show_finding(Finding("", Health.BROKEN, str(error)))
                 return
-            folders = {"Viewpoint camera": self._folder / eye / "grid"}
+            folders = {tr("Viewpoint camera"): self._folder / eye / "grid"}
         dialog = TakeDialog(folders, board, choose, project.realsense, self)
         dialog.finished.connect(self._refresh)
         dialog.open()
@@ -134,18 +137,19 @@ class AcceptDialog(QDialog):
     def _show(self, found: Acceptance) -> None:
         self._page = found.files[-1]
         rows = [
-            Row(f"{eye}, {depth_m} m", tuple(numbers))
+            Row(f"{EYE_NAMES[eye]}, {depth_m} m", tuple(numbers))
             for eye, one in found.eyes.items()
             for depth_m, *numbers in view_rows(one)
         ]
         self._table.show_rows(_COLUMNS, rows)
         if found.cause:
-            finding = Finding("", Health.BROKEN, f"the rig fails: {found.cause}")
+            finding = Finding("", Health.BROKEN, tr("the rig fails: {}").format(found.cause))
         else:
-            finding = Finding("", Health.GOOD, f"the rig passes: {', '.join(found.eyes)}")
+            eyes = ", ".join(EYE_NAMES[eye].lower() for eye in found.eyes)
+            finding = Finding("", Health.GOOD, tr("the rig passes: {}").format(eyes))
         if found.left_out:
             name, why = next(iter(found.left_out.items()))
-            words = f"{len(found.left_out)} left out, such as {name}: {why}"
+            words = tr("{} left out, such as {}: {}").format(len(found.left_out), name, why)
             finding = Finding("", finding.health, finding.found, words)
         self._found.show_finding(finding)
         self._refresh()
@@ -156,7 +160,7 @@ class AcceptDialog(QDialog):
     def _refresh(self) -> None:
         for eye, shown in self._counts.items():
             grids, pairs = self._count(eye, "grid"), self._count(eye, "viewpoint")
-            shown.setText(f"{grids} of the grid, {pairs} of the board")
+            shown.setText(tr("{} of the grid, {} of the board").format(grids, pairs))
         self._run.setEnabled(bool(self._eyes) and not self._bar.is_busy)
         self._open.setEnabled(self._page is not None)
 
@@ -164,9 +168,9 @@ class AcceptDialog(QDialog):
         images = QGridLayout()
         images.setHorizontalSpacing(2 * SPACING_PX)
         for row, eye in enumerate(EYES):
-            images.addWidget(QLabel(f"{eye.capitalize()} eye"), row, 0)
-            for column, what in enumerate(("grid", "board"), 1):
-                take = button(f"{eye}-{what}", f"Take {what}…", f"Take {what}, {eye} eye")
+            images.addWidget(QLabel(EYE_NAMES[eye]), row, 0)
+            for column, (what, text) in enumerate(_TAKE.items(), 1):
+                take = button(f"{eye}-{what}", f"{text}…", f"{text}, {EYE_NAMES[eye].lower()}")
                 take.clicked.connect(partial(self._take, eye, what))
                 images.addWidget(take, row, column)
             images.addWidget(self._counts[eye], row, 3)

@@ -24,6 +24,7 @@ from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (
     button,
@@ -39,7 +40,7 @@ from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.project import RigProject
 
-_KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": "Checkerboard"}
+_KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": tr("Checkerboard")}
 _PREVIEW_PX, _PICTURE_PX = 40, 100  # side of a square
 
 
@@ -50,38 +51,45 @@ class BoardPage(QWidget):
         super().__init__(parent)
         self.setObjectName("boardPage")
         self._project = project
-        squares_help = "Squares, not inner corners."
-        self._kind = choice("kind", "Kind of board", _KINDS)
+        squares_help = tr("Squares, not inner corners.")
+        self._kind = choice("kind", tr("Kind of board"), _KINDS)
         self._columns = whole_number("columns", 3, 40, squares_help)
         self._rows = whole_number("rows", 3, 40, squares_help)
         self._square = number(
-            "square", 1.0, 1000.0, 0.05, " mm", "Side length of a square, measured on the print."
+            "square",
+            1.0,
+            1000.0,
+            0.05,
+            " mm",
+            tr("Side length of a square, measured on the print."),
         )
         self._marker = number(
-            "marker", 0.3, 950.0, 0.05, " mm", "Measured side length of a marker."
+            "marker", 0.3, 950.0, 0.05, " mm", tr("Measured side length of a marker.")
         )
         self._dictionary = choice(
             "dictionary",
-            "Dictionary",
+            tr("Dictionary"),
             {name: name for name in DICTIONARIES},
-            "Dictionary of the markers.",
+            tr("Dictionary of the markers."),
         )
         self._legacy = with_name(
-            QCheckBox("Printed by OpenCV before 4.6"),
+            QCheckBox(tr("Printed by OpenCV before 4.6")),
             "legacy",
-            help_text="Boards with an even number of rows started with a white square.",
+            help_text=tr("Boards with an even number of rows started with a white square."),
         )
         self._paper = choice(
-            "paper", "Paper", {paper: paper.capitalize() for paper in get_args(Paper)}
+            "paper", tr("Paper"), {paper: paper.capitalize() for paper in get_args(Paper)}
         )
         self._pdf = button(
-            "savePdf", "Save as PDF…", help_text="To scale, with a ruler to check the print"
+            "savePdf", tr("Save as PDF…"), help_text=tr("To scale, with a ruler to check the print")
         )
-        self._picture = button("savePicture", "Save image…", help_text="PNG, to show on a screen")
-        self._begin = button("begin", "Use another initial rig…")
+        self._picture = button(
+            "savePicture", tr("Save image…"), help_text=tr("PNG, to show on a screen")
+        )
+        self._begin = button("begin", tr("Use another initial rig…"))
         self._rig = ElidedLabel()
         self._found = FindingLine("board")
-        self._preview = ImageView("Preview of the board")
+        self._preview = ImageView(tr("Preview of the board"))
         self._draw = LatestJob(_draw, self)
         self._draw.answered.connect(lambda _board, image: self._preview.show_image(image))
         self._show_board(project.inputs.board)
@@ -129,22 +137,28 @@ class BoardPage(QWidget):
                 legacy=self._legacy.isChecked(),
             )
         except ValueError as error:
-            self._preview.show_text(message="No such board exists")
+            self._preview.show_text(message=tr("No such board exists"))
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
             return
         self._preview.show_text()
         inner = " × ".join(map(str, board.inner))
-        self._found.show_finding(Finding("", Health.GOOD, f"{inner} inner corners to find"))
+        self._found.show_finding(
+            Finding("", Health.GOOD, tr("{} inner corners to find").format(inner))
+        )
         self._project.enter(board=board, paper=self._paper.currentData())
         self._draw.ask(board)
 
     def _save_pdf(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(self, "Save the board", "board.pdf", "PDF (*.pdf)")
+        path, _ = QFileDialog.getSaveFileName(
+            self, tr("Save the board"), "board.pdf", tr("PDF (*.pdf)")
+        )
         if path:
             self._save(lambda: write_board_pdf(Path(path), *self._printed()), path)
 
     def _save_picture(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(self, "Save the board", "board.png", "PNG (*.png)")
+        path, _ = QFileDialog.getSaveFileName(
+            self, tr("Save the board"), "board.png", tr("PNG (*.png)")
+        )
         if path:
             self._save(lambda: _write_picture(Path(path), self._project.inputs.board), path)
 
@@ -155,14 +169,14 @@ class BoardPage(QWidget):
         try:
             write()
         except (ValueError, FileError) as error:
-            self._found.show_finding(Finding("", Health.BROKEN, f"not saved: {error}"))
+            self._found.show_finding(Finding("", Health.BROKEN, tr("not saved: {}").format(error)))
             return
-        advice = "print it at 100 % and measure the ruler and the squares"
-        self._found.show_finding(Finding("", Health.GOOD, f"saved as {path}", advice))
+        advice = tr("print it at 100 % and measure the ruler and the squares")
+        self._found.show_finding(Finding("", Health.GOOD, tr("saved as {}").format(path), advice))
 
     def _ask_for_rig(self) -> None:
         path, _ = QFileDialog.getOpenFileName(
-            self, "Choose an initial rig", "", "Rig files (*.yaml *.yml)"
+            self, tr("Choose an initial rig"), "", tr("Rig files (*.yaml *.yml)")
         )
         if not path or not self._confirm_discard():
             return
@@ -177,14 +191,14 @@ class BoardPage(QWidget):
             return True
         answer = QMessageBox.question(
             self,
-            "Use another initial rig",
-            "Calibrated parts that have not been saved will be lost. Continue?",
+            tr("Use another initial rig"),
+            tr("Calibrated parts that have not been saved will be lost. Continue?"),
         )
         return answer == QMessageBox.StandardButton.Yes
 
     def _show_rig(self) -> None:
-        parts = ", ".join(self._project.rig.origins) or "nothing"
-        self._rig.setText(f"{self._project.rig.name} (calibrated: {parts})")
+        parts = ", ".join(self._project.rig.origins) or tr("nothing")
+        self._rig.setText(tr("{} (calibrated: {})").format(self._project.rig.name, parts))
 
     def _lay_out(self) -> None:
         squares, paper, rig = QWidget(), QWidget(), QWidget()
@@ -195,21 +209,23 @@ class BoardPage(QWidget):
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
         for label, field in (
-            ("Board", self._kind),
-            ("Squares", squares),
-            ("Square", self._square),
-            ("Marker", self._marker),
-            ("Dictionary", self._dictionary),
+            (tr("Board"), self._kind),
+            (tr("Squares"), squares),
+            (tr("Square"), self._square),
+            (tr("Marker"), self._marker),
+            (tr("Dictionary"), self._dictionary),
             ("", self._legacy),
-            ("Paper", paper),
+            (tr("Paper"), paper),
         ):
             form.addRow(label, field)
         left = vbox(form, self._found, spacing=SPACING_PX)
         left.addSpacing(2 * SPACING_PX)
         left.addWidget(
             paragraph(
-                text="The initial rig provides what the headset itself reports: the size of its "
-                "displays and the poses of its rendering cameras."
+                text=tr(
+                    "The initial rig provides what the headset itself reports: the size of its "
+                    "displays and the poses of its rendering cameras."
+                )
             )
         )
         left.addWidget(rig)

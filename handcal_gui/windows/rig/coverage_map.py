@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.rig.views import Coverage
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.translation import tr
 
 _PLENTY = 6
 """Number of views from which on a cell has its full colour."""
@@ -26,10 +27,12 @@ class CoverageMap(QWidget):
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("coverage")
-        self.setAccessibleName(f"Coverage, {title.lower()}")
+        self.setAccessibleName(tr("Coverage, {}").format(title.lower()))
         self.setToolTip(
-            "Number of images with a corner of the board in each part of the view. Empty parts "
-            "give no information about the lens there."
+            tr(
+                "Number of images with a corner of the board in each part of the view. Empty parts "
+                "give no information about the lens there."
+            )
         )
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._title = title

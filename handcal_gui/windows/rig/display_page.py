@@ -15,6 +15,7 @@ from handcal.rig.choose import ALIKE
 from handcal.rig.grid import Grid, draw_grid, grid_on
 from handcal.station.doctor import Finding, Health
 from handcal.types import Eye
+from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, number, whole_number
 from handcal_gui.widgets.path_field import PathField
@@ -25,14 +26,14 @@ from handcal_gui.windows.rig.solve import SolvedPart, solve_display
 from handcal_gui.windows.rig.step_page import StepPage
 
 _DISTANCES: dict[Distance, str] = {
-    "measured": "as measured",
-    "solved": "solved from the squares' angle",
+    "measured": tr("as measured"),
+    "solved": tr("solved from the squares' angle"),
 }
-_GRID_HINT = (
+_GRID_HINT = tr(
     "Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye "
     "position, focused on the display. Darken the room and take 3 or more images."
 )
-_BOARD_HINT = (
+_BOARD_HINT = tr(
     "Do not move the viewpoint camera. Switch the display off and take 8 or more images of the "
     "board through it while the headset tracks the board. Save the poses in one JSON file."
 )
@@ -50,14 +51,16 @@ class DisplayPage(StepPage):
     def __init__(self, project: RigProject, eye: Eye, parent: QWidget | None = None) -> None:
         distance = choice(
             "distance",
-            "Distance of the virtual screen",
+            tr("Distance of the virtual screen"),
             _DISTANCES,
-            "z(C0→S): measured, for example by the camera's focus, or solved from the angle that "
-            "a square subtends at the nominal distance.",
+            tr(
+                "z(C0→S): measured, for example by the camera's focus, or solved from the angle "
+                "that a square subtends at the nominal distance."
+            ),
         )
-        distance_m = number("distanceM", 0.1, 100.0, 0.01, " m", "Measured z(C0→S).")
+        distance_m = number("distanceM", 0.1, 100.0, 0.01, " m", tr("Measured z(C0→S)."))
         arcmin = number(
-            "arcmin", 1.0, 10_000.0, 0.1, "′", "Angle that a square of the grid subtends."
+            "arcmin", 1.0, 1e4, 0.1, "′", tr("Angle that a square of the grid subtends.")
         )
         nominal = number(
             "nominal",
@@ -65,54 +68,64 @@ class DisplayPage(StepPage):
             100.0,
             0.01,
             " m",
-            "Nominal distance for this angle, from the manufacturer.",
+            tr("Nominal distance for this angle, from the manufacturer."),
         )
         square = whole_number(
-            "gridSquare", 20, 2000, "Side length of the grid's squares, in pixels."
+            "gridSquare", 20, 2000, tr("Side length of the grid's squares, in pixels.")
         )
         square.setSuffix(" px")
-        tracked = PathField("Tracked poses", "file", "Tracked poses (*.json)")
+        tracked = PathField(tr("Tracked poses"), "file", tr("Tracked poses (*.json)"))
         tracked.setToolTip(
-            "Poses of the board as tracked by the headset, for each image: "
-            '{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}, in metres.'
+            tr(
+                "Poses of the board as tracked by the headset, for each image: {}, in metres."
+            ).format('{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}')
         )
         stereo = PathField(
-            "Stereo calibration", "file", "Stereo calibrations (*.json)", "Not needed"
+            tr("Stereo calibration"), "file", tr("Stereo calibrations (*.json)"), tr("Not needed")
         )
         stereo.setToolTip(
-            "Instead of images and poses of the board: the result of 'handcal rig stereo' with the "
-            "viewpoint camera as depth camera."
+            tr(
+                "Instead of images and poses of the board: the result of 'handcal rig stereo' with "
+                "the viewpoint camera as depth camera."
+            )
         )
-        files = "Matrices (*.txt *.json *.yaml *.yml)"
-        view = PathField("Rendering camera", "file", files, "As in the rig")
+        files = tr("Matrices (*.txt *.json *.yaml *.yml)")
+        view = PathField(tr("Rendering camera"), "file", files, tr("As in the rig"))
         view.setToolTip(
-            "T_V_H, from the headset rig to this eye's rendering camera, as the headset reports "
-            "it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the "
-            "initial rig is used."
+            tr(
+                "T_V_H, from the headset rig to this eye's rendering camera, as the headset "
+                "reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, "
+                "that of the initial rig is used."
+            )
         )
         form = EntriesForm(
             {
-                "grid_images": ("Images of the grid", PathField("Grid images", "folder")),
-                "square_px": ("Grid squares", square),
-                "board_images": ("Images of the board", PathField("Board images", "folder")),
-                "tracked": ("Board poses", tracked),
-                "stereo": ("or a stereo calibration", stereo),
-                "view": ("Rendering camera T_V_H", view),
-                "distance": ("Distance z(C0→S)", distance),
-                "distance_m": ("measured", distance_m),
-                "square_arcmin": ("Angle of a square", arcmin),
-                "nominal_m": ("at nominal distance", nominal),
+                "grid_images": (tr("Images of the grid"), PathField(tr("Grid images"), "folder")),
+                "square_px": (tr("Grid squares"), square),
+                "board_images": (
+                    tr("Images of the board"),
+                    PathField(tr("Board images"), "folder"),
+                ),
+                "tracked": (tr("Board poses"), tracked),
+                "stereo": (tr("or a stereo calibration"), stereo),
+                "view": (tr("Rendering camera T_V_H"), view),
+                "distance": (tr("Distance z(C0→S)"), distance),
+                "distance_m": (tr("measured"), distance_m),
+                "square_arcmin": (tr("Angle of a square"), arcmin),
+                "nominal_m": (tr("at nominal distance"), nominal),
             }
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
-        grid = ImagesPanel(("Viewpoint camera",), _GRID_HINT, "setup-display")
-        board = ImagesPanel(("Viewpoint camera",), _BOARD_HINT, "setup-board")
-        panels = {"Grid on the display": grid, "Camera pose": board}
+        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display")
+        board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board")
+        panels = {tr("Grid on the display"): grid, tr("Camera pose"): board}
         super().__init__(f"{eye}DisplayPage", project, form, panels, parent)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
-        self._save = button("saveGrid", "Save grid…", help_text="PNG, to show on the display")
+        self._save = button(
+            "saveGrid", tr("Save grid…"), help_text=tr("PNG, to show on the display")
+        )
         grid.add_button(self._save)
         self._save.clicked.connect(self._save_grid)
         self._grid.take_requested.connect(self._take_grid)
@@ -182,7 +195,7 @@ class DisplayPage(StepPage):
         if (grid := self._shown()) is None:
             return
         name = f"grid-{self._eye}.png"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the grid", name, "PNG (*.png)")
+        path, _ = QFileDialog.getSaveFileName(self, tr("Save the grid"), name, tr("PNG (*.png)"))
         if not path:
             return
         try:
@@ -191,15 +204,15 @@ class DisplayPage(StepPage):
             self._grid.show_trouble(str(error))
             return
         columns, rows = grid.squares
-        saved = f"{columns}×{rows} squares saved as {path}"
-        self.box.show_finding(Finding("", Health.GOOD, saved, "show it unscaled"))
+        saved = tr("{}×{} squares saved as {}").format(columns, rows, path)
+        self.box.show_finding(Finding("", Health.GOOD, saved, tr("show it unscaled")))
 
     def _take_grid(self) -> None:
         if (grid := self._shown()) is None:
             return
         folder = self.project.folder.path / f"grid-{self._eye}"
         self.take_images(
-            {"Viewpoint camera": folder},
+            {tr("Viewpoint camera"): folder},
             grid.board,
             self._grid,
             lambda: self.form.enter(grid_images=str(folder)),
@@ -209,7 +222,7 @@ class DisplayPage(StepPage):
     def _take_board(self) -> None:
         folder = self.project.folder.path / f"board-{self._eye}"
         self.take_images(
-            {"Viewpoint camera": folder},
+            {tr("Viewpoint camera"): folder},
             self.project.inputs.board,
             self._board,
             lambda: self.form.enter(board_images=str(folder)),

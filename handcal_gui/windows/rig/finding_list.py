@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.rig.report import RigFinding
 from handcal_gui.theme import colors, flat_header, follow_theme, icon
+from handcal_gui.translation import tr
 
 
 class FindingList(QTreeWidget):
@@ -25,7 +26,7 @@ class FindingList(QTreeWidget):
         self.setAccessibleName(name)
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
-        self.setHeaderLabels(["Item", "Found", "Expected"])
+        self.setHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
         flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.header().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)

@@ -16,6 +16,7 @@ from handcal.rig.board import Board
 from handcal.rig.views import coverage
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, choice, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
@@ -40,7 +41,7 @@ class Drawing(QWidget):
     def __init__(self, page: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("drawing")
-        self.setAccessibleName("Drawing of the arrangement")
+        self.setAccessibleName(tr("Drawing of the arrangement"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._renderer = QSvgRenderer(str(resource_path(page)), self)
         self._renderer.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
@@ -94,17 +95,19 @@ class ImagesPanel(QWidget):
         super().__init__(parent)
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
-        self._list = ShotList("Images")
+        self._list = ShotList(tr("Images"))
         self._view = ShotView(titles)
         self._maps = tuple(CoverageMap(title) for title in titles)
         self._sigmas = tuple(UncertaintyMap(title) for title in titles)
         self._shown_map = choice(
-            "map", "Map", {"coverage": "Images of the board", "uncertainty": "Uncertainty"}
+            "map",
+            tr("Map"),
+            {"coverage": tr("Images of the board"), "uncertainty": tr("Uncertainty")},
         )
         self._shown_map.currentIndexChanged.connect(self._show_map)
         self._drawing = Drawing(f"docs/pictures/{drawing}.svg")
         self._arrange = button(
-            "arrangement", "Arrangement", help_text="Show how the devices are arranged"
+            "arrangement", tr("Arrangement"), help_text=tr("Show how the devices are arranged")
         )
         self._arrange.setCheckable(True)
         self._arrange.toggled.connect(self._show_drawing)
@@ -113,9 +116,9 @@ class ImagesPanel(QWidget):
         self._hint = paragraph("hint", hint)
         self._trouble = FindingLine("images")
         self._trouble.hide()
-        self._again = button("again", "Search again", help_text="Read the folders again")
+        self._again = button("again", tr("Search again"), help_text=tr("Read the folders again"))
         self._take = button(
-            "take", "Take images…", help_text="Take images with cameras of this computer"
+            "take", tr("Take images…"), help_text=tr("Take images with cameras of this computer")
         )
         self._again.clicked.connect(self._search_again)
         self._take.clicked.connect(self.take_requested)
@@ -149,7 +152,9 @@ class ImagesPanel(QWidget):
         self._show((), ())
         if len(paths) == len(folders):
             work: Callable[..., object] = partial(look, paths, board)
-            self.bar.run("Looking for the board", work, lambda shots: self._show(shots, dropped))
+            self.bar.run(
+                tr("Looking for the board"), work, lambda shots: self._show(shots, dropped)
+            )
         else:
             self.bar.stop()
 
@@ -196,7 +201,9 @@ class ImagesPanel(QWidget):
             found = [one for shot in kept if (one := shot.views[number].found) is not None]
             shown.show_coverage(coverage(found) if found else None)
         good = sum(not shot.problem for shot in kept)
-        self._count.setText(f"{good} of {len(self.shots)} used" if self.shots else "No images yet")
+        self._count.setText(
+            tr("{} of {} used").format(good, len(self.shots)) if self.shots else tr("No images yet")
+        )
         self._hint.setVisible(not self.shots)
         self._show_drawing()
 

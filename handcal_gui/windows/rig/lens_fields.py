@@ -5,26 +5,27 @@ from __future__ import annotations
 from PySide6.QtWidgets import QComboBox
 
 from handcal.rig.camera import LensChoice
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
 _LENSES: dict[LensChoice, str] = {
-    "auto": "The one that fits best",
-    "none": "No distortion",
+    "auto": tr("The one that fits best"),
+    "none": tr("No distortion"),
     "radial": "k1, k2",
     "full": "k1, k2, p1, p2, k3",
-    "rational": "k1 to k6, p1, p2",
-    "fisheye": "Fisheye",
+    "rational": tr("k1 to k6, p1, p2"),
+    "fisheye": tr("Fisheye"),
 }
 
 
 def intrinsics_field(name: str) -> PathField:
     """Return a field for a file of intrinsics, which are solved if it is empty."""
-    field = PathField(name, "file", INTRINSICS_FILES, "Solved from the images")
-    field.setToolTip("OpenCV FileStorage, ROS camera_info or handcal JSON.")
+    field = PathField(name, "file", INTRINSICS_FILES, tr("Solved from the images"))
+    field.setToolTip(tr("OpenCV FileStorage, ROS camera_info or handcal JSON."))
     return field
 
 
 def lens_field() -> QComboBox:
     """Return a choice of lens models."""
-    return choice("lens", "Lens", _LENSES, "Distortion coefficients to solve for.")
+    return choice("lens", tr("Lens"), _LENSES, tr("Distortion coefficients to solve for."))

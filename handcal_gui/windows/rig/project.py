@@ -14,6 +14,7 @@ from handcal.errors import FileError, HandcalError
 from handcal.io.files import read_json
 from handcal.rig.rig_file import read_rig
 from handcal.types import Rig
+from handcal_gui.translation import tr
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.solve import SolvedPart
 
@@ -93,12 +94,12 @@ class RigProject(QObject):
     def add_part(self, solved: SolvedPart) -> str:
         """Add a calibrated part to the rig; return the outcome as a message."""
         if solved.add_to is None:
-            return "it was not added to the rig"
+            return tr("it was not added to the rig")
         try:
             self.use_rig(solved.add_to(self.rig))
         except HandcalError as error:
-            return f"it was not added to the rig: {error}"
-        return "it was added to the rig"
+            return tr("it was not added to the rig: {}").format(error)
+        return tr("it was added to the rig")
 
     def camera_solved(self) -> None:
         """Announce that the viewpoint camera's intrinsics may have changed."""
@@ -109,7 +110,7 @@ class RigProject(QObject):
         try:
             self.folder.save_rig(rig)
         except ValueError as error:
-            raise HandcalError(f"this rig is not plausible: {error}") from error
+            raise HandcalError(tr("this rig is not plausible: {}").format(error)) from error
         self.rig = rig
         self.rig_changed.emit()
 
@@ -119,4 +120,4 @@ class RigProject(QObject):
         try:
             self.folder.save(self.inputs)
         except FileError as error:
-            self.failed.emit(f"The entries could not be saved: {error}")
+            self.failed.emit(tr("The entries could not be saved: {}").format(error))

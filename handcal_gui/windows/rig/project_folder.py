@@ -17,6 +17,7 @@ from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.steps import DisplayInputs
 from handcal.types import Rig
+from handcal_gui.translation import tr
 
 Distance: TypeAlias = Literal["measured", "solved"]
 
@@ -136,7 +137,9 @@ class ProjectFolder:
         try:
             return read_settings(RigInputs, read_json(self._entries), "work"), ""
         except FileError as error:
-            return RigInputs(), f"The entries were reset: {error}; {_set_aside(self._entries)}"
+            return RigInputs(), tr("The entries were reset: {}; {}").format(
+                error, _set_aside(self._entries)
+            )
 
     def save(self, inputs: RigInputs) -> None:
         """Write the entries, or raise FileError."""
@@ -150,7 +153,9 @@ class ProjectFolder:
         try:
             return read_rig(self._rig), ""
         except FileError as error:
-            return read_rig(example), f"The rig was reset: {error}; {_set_aside(self._rig)}"
+            return read_rig(example), tr("The rig was reset: {}; {}").format(
+                error, _set_aside(self._rig)
+            )
 
     def save_rig(self, rig: Rig) -> None:
         """Write the partly calibrated rig.
@@ -174,5 +179,5 @@ def _set_aside(path: Path) -> str:
     bad = path.with_name(f"{path.name}.bad")
     with suppress(OSError):
         path.replace(bad)
-        return f"the old file was kept as {bad}"
-    return "the old file could not be renamed"
+        return tr("the old file was kept as {}").format(bad)
+    return tr("the old file could not be renamed")

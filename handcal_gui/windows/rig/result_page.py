@@ -23,6 +23,7 @@ from handcal.rig.report import report_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
@@ -33,7 +34,7 @@ from handcal_gui.windows.rig.finding_list import FindingList
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
 
-_RIG_FILES = "Rig files (*.yaml *.yml)"
+_RIG_FILES = tr("Rig files (*.yaml *.yml)")
 
 
 class ResultPage(QWidget):
@@ -53,18 +54,20 @@ class ResultPage(QWidget):
         self._project = project
         self._saved: Path | None = None
         self._acceptance: AcceptDialog | None = None
-        self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", "Name of the rig")
-        self._findings = FindingList("Check of the rig")
-        self._numbers = NumberTable("Numbers of the rig")
-        self._other = PathField("Rig file to compare with", "file", _RIG_FILES)
-        self._differences = NumberTable("Differences")
+        self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", tr("Name of the rig"))
+        self._findings = FindingList(tr("Check of the rig"))
+        self._numbers = NumberTable(tr("Numbers of the rig"))
+        self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
+        self._differences = NumberTable(tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
-        self._save = main_button("saveRig", "Save rig file…")
+        self._save = main_button("saveRig", tr("Save rig file…"))
         self._accept = button(
-            "acceptRig", "Accept…", help_text="Check what is drawn by a camera in the eye's place"
+            "acceptRig",
+            tr("Accept…"),
+            help_text=tr("Check what is drawn by a camera in the eye's place"),
         )
-        self._use = button("useRig", "Use for the next calibration")
+        self._use = button("useRig", tr("Use for the next calibration"))
         self._lay_out()
         self.enter()
         self._other.changed.connect(self._compare)
@@ -82,9 +85,11 @@ class ResultPage(QWidget):
         self._findings.show_findings(findings)
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         doubtful = sum(not one.is_fine for one in findings)
-        text = f"{doubtful} of {len(findings)} findings are doubtful: see Check"
+        text = tr("{} of {} findings are doubtful: see Check").format(doubtful, len(findings))
         health = Health.LIMITED if doubtful else Health.GOOD
-        self._end.show_finding(Finding("", health, text if doubtful else "no doubtful findings"))
+        self._end.show_finding(
+            Finding("", health, text if doubtful else tr("no doubtful findings"))
+        )
         self._saved = None
         self._use.setEnabled(False)
         self._compare()
@@ -98,7 +103,7 @@ class ResultPage(QWidget):
         """Choose a path and save the rig file."""
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
         proposed = f"{plain or 'rig'}.yaml"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the rig file", proposed, _RIG_FILES)
+        path, _ = QFileDialog.getSaveFileName(self, tr("Save the rig file"), proposed, _RIG_FILES)
         if path:
             self.save_as(Path(path))
 
@@ -108,11 +113,11 @@ class ResultPage(QWidget):
         try:
             write_rig(path, self._project.rig)
         except FileError as error:
-            self._end.show_finding(Finding("", Health.BROKEN, f"not saved: {error}"))
+            self._end.show_finding(Finding("", Health.BROKEN, tr("not saved: {}").format(error)))
             return
         self._saved = path.absolute()
         self._use.setEnabled(True)
-        self._end.show_finding(Finding("", Health.GOOD, f"saved as {path}"))
+        self._end.show_finding(Finding("", Health.GOOD, tr("saved as {}").format(path)))
 
     def stop(self) -> None:
         """Close the acceptance, if it is open."""
@@ -136,7 +141,7 @@ class ResultPage(QWidget):
     def _ask_to_use(self) -> None:
         if self._saved is not None:
             self.rig_saved.emit(self._saved)
-            text = "the next calibration uses this rig"
+            text = tr("the next calibration uses this rig")
             self._end.show_finding(Finding("", Health.GOOD, text))
 
     def _compare(self) -> None:
@@ -146,7 +151,7 @@ class ResultPage(QWidget):
                 Finding(
                     "",
                     Health.LIMITED,
-                    "choose a rig file, such as the last calibration of this rig",
+                    tr("choose a rig file, such as the last calibration of this rig"),
                 )
             )
             return
@@ -155,20 +160,22 @@ class ResultPage(QWidget):
         except FileError as error:
             self._compared.show_finding(Finding("", Health.BROKEN, str(error)))
             return
-        self._compared.show_finding(Finding("", Health.GOOD, f"compared with {other.name}"))
-        self._differences.show_rows(("Difference",), difference_rows(other, self._project.rig))
+        self._compared.show_finding(
+            Finding("", Health.GOOD, tr("compared with {}").format(other.name))
+        )
+        self._differences.show_rows((tr("Difference"),), difference_rows(other, self._project.rig))
         self._differences.show()
 
     def _lay_out(self) -> None:
         compare = QWidget()
         vbox(self._other, self._compared, (self._differences, 1), 0, on=compare, spacing=SPACING_PX)
         tabs = QTabWidget(documentMode=True)
-        tabs.addTab(self._findings, "Check")
-        tabs.addTab(self._numbers, "Numbers")
-        tabs.addTab(compare, "Compare")
+        tabs.addTab(self._findings, tr("Check"))
+        tabs.addTab(self._numbers, tr("Numbers"))
+        tabs.addTab(compare, tr("Compare"))
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
-        form.addRow("Name", self._name)
+        form.addRow(tr("Name"), self._name)
         foot = QHBoxLayout()
         foot.setSpacing(2 * SPACING_PX)
         foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)

@@ -12,16 +12,18 @@ from handcal.rig.camera import CameraCalibration
 from handcal.rig.compare import compare_rigs
 from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration
 from handcal.rig.stereo import StereoCalibration
-from handcal.types import EYES, Float64, Rig
+from handcal.types import EYES, Eye, Float64, Rig
+from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.number_table import Row
 
-COLUMNS = ("Value", "± σ")
+COLUMNS = (tr("Value"), "± σ")
 _LENSES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-_TURN = "Rotation vector of the depth camera in the headset camera: axis times angle."
-_SHIFT = "Position of the depth camera in the headset camera: x right, y down, z forward."
-_T_C0_V = "From the headset's rendering camera V to the offline viewpoint C0, in the axes of V."
-_Z_C0_S = "Distance of the virtual screen S from the offline viewpoint C0."
+_SIDES: dict[Eye, str] = {"left": tr("Left"), "right": tr("Right")}
+_TURN = tr("Rotation vector of the depth camera in the headset camera: axis times angle.")
+_SHIFT = tr("Position of the depth camera in the headset camera: x right, y down, z forward.")
+_T_C0_V = tr("From the headset's rendering camera V to the offline viewpoint C0, in the axes of V.")
+_Z_C0_S = tr("Distance of the virtual screen S from the offline viewpoint C0.")
 
 
 def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
@@ -30,15 +32,19 @@ def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
     sigmas = [*result.sigma, *[np.inf] * len(solved.distortion)]
     values = (solved.fx, solved.fy, solved.cx, solved.cy)
     rows = [
-        _row(name, value, sigma, "px", 2, "In pixels; σ from the residuals.")
+        _row(name, value, sigma, "px", 2, tr("In pixels; σ from the residuals."))
         for name, value, sigma in zip(("fx", "fy", "cx", "cy"), values, sigmas, strict=False)
     ]
     rows += [
-        _row(name, value, sigma, "", 5, "Distortion coefficient of OpenCV's model.")
+        _row(name, value, sigma, "", 5, tr("Distortion coefficient of OpenCV's model."))
         for name, value, sigma in zip(_LENSES, solved.distortion, sigmas[4:], strict=False)
     ]
     rows.append(
-        Row("Pixel", (f"{result.arcmin_per_px:.2f}′", ""), "Angle of a pixel at the image centre.")
+        Row(
+            tr("Pixel"),
+            (f"{result.arcmin_per_px:.2f}′", ""),
+            tr("Angle of a pixel at the image centre."),
+        )
     )
     return (_rms(result.rms_px), *rows)
 
@@ -49,7 +55,11 @@ def stereo_rows(result: StereoCalibration) -> tuple[Row, ...]:
     return (
         _rms(result.rms_px),
         *_place_rows(result.T_H_D, _sigmas(result.covariance, len(STEREO_PARAMETERS))),
-        Row("Each pair alone", (spread, ""), "RMS difference from the pose by each pair alone."),
+        Row(
+            tr("Each pair alone"),
+            (spread, ""),
+            tr("RMS difference from the pose by each pair alone."),
+        ),
     )
 
 
@@ -59,16 +69,18 @@ def display_rows(result: DisplayCalibration) -> tuple[Row, ...]:
     return (
         _rms(result.homography.rms_px),
         Row(
-            "Corners",
+            tr("Corners"),
             (f"{result.homography.sigma_px:.2f} px", ""),
-            "σ of the least certain corner of the display, in its pixels.",
+            tr("σ of the least certain corner of the display, in its pixels."),
         ),
         *_display_rows(display.t_C0_V_m, display.z_C0_S_m, sigmas),
-        Row("f", (f"{display.K[0, 0]:.1f} px", ""), "Focal length of K, on the display's axis."),
         Row(
-            "Rotation",
+            "f", (f"{display.K[0, 0]:.1f} px", ""), tr("Focal length of K, on the display's axis.")
+        ),
+        Row(
+            tr("Rotation"),
             (f"{np.degrees(result.turn_rad):.2f}°", ""),
-            "Angle between the axes of the display and of the headset's V; included in H0.",
+            tr("Angle between the axes of the display and of the headset's V; included in H0."),
         ),
     )
 
@@ -81,7 +93,7 @@ def rig_rows(rig: Rig) -> tuple[Row, ...]:
 def difference_rows(a: Rig, b: Rig) -> tuple[Row, ...]:
     """Return the differences between two rigs."""
     return tuple(
-        Row(one.name, (_with_unit(one.value, one.unit, 3),), "Never negative; 0 if both agree.")
+        Row(one.name, (_with_unit(one.value, one.unit, 3),), tr("Never negative; 0 if both agree."))
         for one in compare_rigs(a, b)
     )
 
@@ -91,11 +103,11 @@ def _rig_rows(rig: Rig) -> Iterator[Row]:
         display, origin = rig.eyes[eye], rig.origins.get(eye)
         sigmas = _sigmas(origin.covariance if origin else None, len(DISPLAY_PARAMETERS))
         for row in _display_rows(display.t_C0_V_m, display.z_C0_S_m, sigmas):
-            yield Row(f"{eye.capitalize()}: {row.label}", row.cells, row.tooltip)
+            yield Row(f"{_SIDES[eye]}: {row.label}", row.cells, row.tooltip)
         yield Row(
-            f"{eye.capitalize()}: f",
+            f"{_SIDES[eye]}: f",
             (f"{display.K[0, 0]:.1f} px", UNKNOWN),
-            "Focal length of K, on the display's axis.",
+            tr("Focal length of K, on the display's axis."),
         )
     origin = rig.origins.get("T_H_D")
     sigmas = _sigmas(origin.covariance if origin else None, len(STEREO_PARAMETERS))
@@ -103,7 +115,11 @@ def _rig_rows(rig: Rig) -> Iterator[Row]:
     camera = rig.depth_intrinsics
     for name in ("fx", "fy", "cx", "cy"):
         value = f"{getattr(camera, name):.2f} px"
-        yield Row(f"Depth camera: {name}", (value, UNKNOWN), "From the depth camera's intrinsics.")
+        yield Row(
+            tr("Depth camera: {}").format(name),
+            (value, UNKNOWN),
+            tr("From the depth camera's intrinsics."),
+        )
 
 
 def _display_rows(t_C0_V_m: Float64, z_C0_S_m: float, sigmas: Sequence[float]) -> Iterator[Row]:
@@ -115,7 +131,7 @@ def _display_rows(t_C0_V_m: Float64, z_C0_S_m: float, sigmas: Sequence[float]) -
 def _place_rows(T_H_D: Float64, sigmas: Sequence[float]) -> Iterator[Row]:
     turn_deg = np.degrees(Rotation.from_matrix(T_H_D[:3, :3]).as_rotvec())
     for axis, value, sigma in zip("xyz", turn_deg, np.degrees(sigmas[:3]), strict=True):
-        yield _row(f"T_H_D rotation {axis}", value, sigma, "°", 3, _TURN)
+        yield _row(tr("T_H_D rotation {}").format(axis), value, sigma, "°", 3, _TURN)
     for axis, value, sigma in zip("xyz", T_H_D[:3, 3], sigmas[3:], strict=True):
         yield _row(f"T_H_D {axis}", 1e3 * value, 1e3 * sigma, "mm", 2, _SHIFT)
 
@@ -126,9 +142,9 @@ def _sigmas(covariance: Float64 | None, count: int) -> list[float]:
 
 def _rms(rms_px: float) -> Row:
     return Row(
-        "RMS",
+        tr("RMS"),
         (f"{rms_px:.3f} px", ""),
-        "Root mean square distance between detected and expected corners.",
+        tr("Root mean square distance between detected and expected corners."),
     )
 
 

@@ -11,15 +11,18 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTree
 
 from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX, flat_header, follow_theme, icon, number_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.rig.shots import Shot
 
 _COLUMNS = {
-    "Image": "Unticked images are excluded; tick them to include them again.",
-    "Corners": "Number of board corners found in each camera's image.",
-    "RMS, px": "Root mean square distance between detected and expected corners, after solving.",
-    "Tilt": "Angle between the board's normal and the line of sight, after solving.",
+    tr("Image"): tr("Unticked images are excluded; tick them to include them again."),
+    tr("Corners"): tr("Number of board corners found in each camera's image."),
+    tr("RMS, px"): tr(
+        "Root mean square distance between detected and expected corners, after solving."
+    ),
+    tr("Tilt"): tr("Angle between the board's normal and the line of sight, after solving."),
 }
 _IMAGE, _CORNERS, _OFF, _TILT = range(4)
 _NAME, _PROBLEM = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
@@ -97,7 +100,7 @@ class ShotList(QTreeWidget):
             item.setText(_OFF, UNKNOWN if off is None else f"{off:.2f}")
             item.setText(_TILT, UNKNOWN if tilt is None else f"{np.degrees(tilt):.0f}°")
             # Of a pair, the worst is named after one image: "headset camera's of NAME".
-            note = f"worst: {worst[1]}" if worst[0].endswith(name) else ""
+            note = tr("worst: {}").format(worst[1]) if worst[0].endswith(name) else ""
             _note(item, item.data(_IMAGE, _PROBLEM) or note)
         self.blockSignals(False)
 

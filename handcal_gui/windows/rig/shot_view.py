@@ -14,6 +14,7 @@ from handcal.rig.views import BoardImage
 from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.translation import tr
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.shots import Shot, read_color
 
@@ -51,7 +52,7 @@ class ShotView(QWidget):
             for image in self._images:
                 image.show_image(None)
                 image.show_overlay(None)
-                image.show_text(message="The selected image will appear here")
+                image.show_text(message=tr("The selected image will appear here"))
         else:
             self._read.ask(shot.files)
 
@@ -84,7 +85,7 @@ def _caption(view: BoardImage) -> str:
     if view.found is None:
         return view.problem
     blur_px = view.found.blur_px
-    return f"{len(view.found.ids)} corners; edges {blur_px:.1f} px wide"
+    return tr("{} corners; edges {:.1f} px wide").format(len(view.found.ids), blur_px)
 
 
 def _draw_corners(found: BoardView, painter: QPainter) -> None:

@@ -15,6 +15,7 @@ from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.views import BoardImage, image_files, pair_views, read_views
 from handcal.types import UInt8
+from handcal_gui.translation import tr
 
 _SMALL_PX = 96
 _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
@@ -57,7 +58,9 @@ def look(
     for number, folder in enumerate(folders):
 
         def report(name: str, share: float, number: int = number) -> None:
-            progress.at((number + share) / len(folders), f"Looking for the board in {name}")
+            progress.at(
+                (number + share) / len(folders), tr("Looking for the board in {}").format(name)
+            )
 
         paths = image_files([folder])
         views = read_views(paths, board, Progress(report))

@@ -25,6 +25,7 @@ from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import BoardImage, WorstView
 from handcal.types import Eye, Rig
+from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
@@ -80,7 +81,9 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
         tuple(None if one is None else one.uncertainty for one in result.solved),
         "; ".join(
             f"{which}: {_compared(one)}"
-            for which, one in zip(("Depth camera", "headset camera"), result.solved, strict=True)
+            for which, one in zip(
+                (tr("Depth camera"), tr("headset camera")), result.solved, strict=True
+            )
             if one is not None and one.compared
         ),
         None if result.verdict.name == "bad" else add_to,
@@ -114,7 +117,9 @@ def solve_display(
 ) -> tuple[SolvedPart, SolvedPart]:
     """Calibrate an eye's display; return its result and the viewpoint camera's pose."""
     if not camera_file.exists():
-        raise HandcalError("the viewpoint camera's intrinsics are missing: solve its step first")
+        raise HandcalError(
+            tr("the viewpoint camera's intrinsics are missing: solve its step first")
+        )
     camera = read_intrinsics(camera_file)
     stereo, tracked = entered_path(entries.stereo), entered_path(entries.tracked)
     boards = [] if stereo else [view for (view,) in excluding(board_shots, entries.dropped_board)]
@@ -135,10 +140,10 @@ def solve_display(
 def _compared(result: CameraCalibration) -> str:
     """Return the lens models compared with their errors on images not used to solve them."""
     listed = ", ".join(
-        f"{one.lens} {one.held_out_px:.3f} px (± {one.edge_px:.2f} px at the edge)"
+        tr("{} {:.3f} px (± {:.2f} px at the edge)").format(one.lens, one.held_out_px, one.edge_px)
         for one in result.compared
     )
-    return f"lens {result.lens}, of {listed}"
+    return tr("lens {}, of {}").format(result.lens, listed)
 
 
 def _tilts(views: Sequence[BoardImage], camera: Camera) -> dict[str, float]:

@@ -11,6 +11,7 @@ from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal.types import Origin
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
@@ -37,13 +38,13 @@ class SolveBox(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("solveBox")
-        self.button = main_button("solve", "Solve")
+        self.button = main_button("solve", tr("Solve"))
         self.bar = JobBar()
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
         self._lenses = paragraph("lenses")
-        self._table = NumberTable("Numbers")
+        self._table = NumberTable(tr("Numbers"))
         self._table.setMinimumWidth(40 * SPACING_PX)
         self._lay_out()
         self.show_origin(None)
@@ -56,7 +57,7 @@ class SolveBox(QWidget):
             progress.check()
             return solved
 
-        self.bar.run("Solving", solve, then)
+        self.bar.run(tr("Solving"), solve, then)
 
     def show_origin(self, origin: Origin | None) -> None:
         """Show an earlier result; None if there is none."""
@@ -64,9 +65,11 @@ class SolveBox(QWidget):
         self._lenses.hide()
         self._table.hide()
         if origin is None:
-            self.show_finding(Finding("", Health.LIMITED, "Not solved yet"))
+            self.show_finding(Finding("", Health.LIMITED, tr("Not solved yet")))
             return
-        text = f"Solved {local_time(origin.made)}: {origin.verdict}; {origin.reason}"
+        text = tr("Solved {}: {}; {}").format(
+            local_time(origin.made), origin.verdict, origin.reason
+        )
         self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
 
     def show_finding(self, finding: Finding) -> None:
@@ -80,7 +83,9 @@ class SolveBox(QWidget):
         self.show_finding(Finding("", HEALTHS[verdict.name], text, kept))
         self._worst.setVisible(solved.worst is not None)
         if solved.worst is not None:
-            worst = f"Worst: {solved.worst.name}, {solved.worst.rms_px:.2f} px: {solved.worst.why}"
+            worst = tr("Worst: {}, {:.2f} px: {}").format(
+                solved.worst.name, solved.worst.rms_px, solved.worst.why
+            )
             self._worst.show_finding(Finding("", Health.LIMITED, worst))
         self._lenses.setText(f"{sentence(solved.lenses)}.")
         self._lenses.setVisible(bool(solved.lenses))

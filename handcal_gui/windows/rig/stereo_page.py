@@ -8,6 +8,7 @@ from functools import partial
 from PySide6.QtWidgets import QWidget
 
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
+from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
@@ -16,7 +17,7 @@ from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve import SolvedPart, solve_stereo
 from handcal_gui.windows.rig.step_page import StepPage
 
-_HINT = (
+_HINT = tr(
     "Take 20 or more pairs of simultaneous images of the board: near and far, in all parts of both "
     "views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end "
     "in the same number, such as depth07.png and headset07.png."
@@ -27,32 +28,48 @@ class StereoPage(StepPage):
     """Pairs of images of the board, and the pose solved from them."""
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
-        imager = PathField("Depth imager's intrinsics", "file", INTRINSICS_FILES, "Not needed")
+        imager = PathField(
+            tr("Depth imager's intrinsics"), "file", INTRINSICS_FILES, tr("Not needed")
+        )
         imager.setToolTip(
-            "Needed only if the images come from a colour imager beside the depth imager and the "
-            "depth is not aligned to it. Take images… reads them from a RealSense."
+            tr(
+                "Needed only if the images come from a colour imager beside the depth imager and "
+                "the depth is not aligned to it. Take images… reads them from a RealSense."
+            )
         )
         pose = PathField(
-            "Pose from depth to colour", "file", "Poses (*.yaml *.yml *.json)", "Not needed"
+            tr("Pose from depth to colour"),
+            "file",
+            tr("Poses (*.yaml *.yml *.json)"),
+            tr("Not needed"),
         )
         pose.setToolTip(imager.toolTip())
         form = EntriesForm(
             {
-                "depth_images": ("Depth camera's images", PathField("Depth images", "folder")),
-                "depth_intrinsics": ("its intrinsics", intrinsics_field("Depth intrinsics")),
-                "imager_intrinsics": ("Depth imager's intrinsics", imager),
-                "lens": ("Lens", lens_field()),
-                "headset_images": (
-                    "Headset camera's images",
-                    PathField("Headset images", "folder"),
+                "depth_images": (
+                    tr("Depth camera's images"),
+                    PathField(tr("Depth images"), "folder"),
                 ),
-                "headset_intrinsics": ("its intrinsics", intrinsics_field("Headset intrinsics")),
-                "depth_to_color": ("Pose from depth to colour", pose),
+                "depth_intrinsics": (
+                    tr("its intrinsics"),
+                    intrinsics_field(tr("Depth intrinsics")),
+                ),
+                "imager_intrinsics": (tr("Depth imager's intrinsics"), imager),
+                "lens": (tr("Lens"), lens_field()),
+                "headset_images": (
+                    tr("Headset camera's images"),
+                    PathField(tr("Headset images"), "folder"),
+                ),
+                "headset_intrinsics": (
+                    tr("its intrinsics"),
+                    intrinsics_field(tr("Headset intrinsics")),
+                ),
+                "depth_to_color": (tr("Pose from depth to colour"), pose),
             }
         )
         form.show_entries(project.inputs.stereo)
-        panel = ImagesPanel(("Depth camera", "Headset camera"), _HINT, "setup-stereo")
-        super().__init__("stereoPage", project, form, {"Pairs": panel}, parent)
+        panel = ImagesPanel((tr("Depth camera"), tr("Headset camera")), _HINT, "setup-stereo")
+        super().__init__("stereoPage", project, form, {tr("Pairs"): panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
@@ -84,7 +101,7 @@ class StereoPage(StepPage):
 
     def _take(self) -> None:
         path = self.project.folder.path
-        folders = {"Depth camera": path / "depth", "Headset camera": path / "headset"}
+        folders = {tr("Depth camera"): path / "depth", tr("Headset camera"): path / "headset"}
 
         def then() -> None:
             self.form.enter(**{f"{path.name}_images": str(path) for path in folders.values()})

@@ -19,6 +19,7 @@ from handcal.rig.views import BoardImage, board_image
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
@@ -57,7 +58,7 @@ class TakeDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("takeDialog")
-        self.setWindowTitle("Take images")
+        self.setWindowTitle(tr("Take images"))
         self._folders, self._board, self._choose = dict(folders), board, choose
         self._selector = ViewSelector(choose)
         self._kept = 0
@@ -70,17 +71,19 @@ class TakeDialog(QDialog):
         )
         self._found = FindingLine("taken")
         self._bar = JobBar()
-        self._start = button("startCameras", "Show")
-        self._take = main_button("takeImage", "Take")
+        self._start = button("startCameras", tr("Show"))
+        self._take = main_button("takeImage", tr("Take"))
         self._take.setShortcut(Qt.Key.Key_Space)
-        self._take.setToolTip("Space bar")
+        self._take.setToolTip(tr("Space bar"))
         self._by_itself = with_name(
-            QCheckBox("Automatically"),
+            QCheckBox(tr("Automatically")),
             "byItself",
-            help_text="Take an image whenever the board is at rest, sharp, and at a position not "
-            "covered by earlier images.",
+            help_text=tr(
+                "Take an image whenever the board is at rest, sharp, and at a position not covered "
+                "by earlier images."
+            ),
         )
-        self._close = button("close", "Close")
+        self._close = button("close", tr("Close"))
         self._search = LatestJob(self._keep_if_new, self)
         self._search.answered.connect(self._on_searched)
         self._search.failed.connect(self._show_failure)
@@ -94,8 +97,12 @@ class TakeDialog(QDialog):
         self._bar.failed.connect(self._show_failure)
         self._lay_out()
         self._refresh()
-        self._found.show_finding(Finding("", Health.LIMITED, "choose the cameras, and press Show"))
-        self._bar.run("Looking for cameras", lambda *_: list_cameras(), self._cameras.add_cameras)
+        self._found.show_finding(
+            Finding("", Health.LIMITED, tr("choose the cameras, and press Show"))
+        )
+        self._bar.run(
+            tr("Looking for cameras"), lambda *_: list_cameras(), self._cameras.add_cameras
+        )
 
     @property
     def shown_images(self) -> Images | None:
@@ -119,7 +126,7 @@ class TakeDialog(QDialog):
                 board_image(name, one, self._board) for name, one in zip(names, images, strict=True)
             ]
 
-        self._bar.run("Looking for the board", work, self._show_taken)
+        self._bar.run(tr("Looking for the board"), work, self._show_taken)
 
     def done(self, result: int) -> None:
         """Close the cameras and the dialog."""
@@ -148,11 +155,13 @@ class TakeDialog(QDialog):
         self._kept += not why_not
         if self._selector.is_done:
             self._by_itself.setChecked(False)
-            finding = Finding("", Health.GOOD, f"{self._choose.most} taken: enough images")
+            finding = Finding(
+                "", Health.GOOD, tr("{} taken: enough images").format(self._choose.most)
+            )
         elif why_not:
-            finding = Finding("", Health.LIMITED, f"{self._kept} taken; {why_not}")
+            finding = Finding("", Health.LIMITED, tr("{} taken; {}").format(self._kept, why_not))
         else:
-            finding = Finding("", Health.GOOD, f"{self._kept} taken")
+            finding = Finding("", Health.GOOD, tr("{} taken").format(self._kept))
         self._found.show_finding(finding)
 
     def _follow(self) -> None:
@@ -170,10 +179,10 @@ class TakeDialog(QDialog):
     def _show_taken(self, views: list[BoardImage]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)
         if problem:
-            found = Finding("", Health.LIMITED, problem, "take another")
+            found = Finding("", Health.LIMITED, problem, tr("take another"))
         else:
-            counts = " and ".join(str(len(view.found.ids)) for view in views if view.found)
-            found = Finding("", Health.GOOD, f"{views[0].name}: {counts} corners")
+            counts = tr(" and ").join(str(len(view.found.ids)) for view in views if view.found)
+            found = Finding("", Health.GOOD, tr("{}: {} corners").format(views[0].name, counts))
         self._found.show_finding(found)
 
     def _refresh(self) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.rig.uncertainty import GRID, ProjectionUncertainty
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.translation import tr
 
 _WIDTH_PX, _HEIGHT_PX = 160, 120
 _LARGE_PX = 1.0
@@ -27,10 +28,12 @@ class UncertaintyMap(QWidget):
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("uncertainty")
-        self.setAccessibleName(f"Uncertainty, {title.lower()}")
+        self.setAccessibleName(tr("Uncertainty, {}").format(title.lower()))
         self.setToolTip(
-            "Standard deviation of the pixel at which a distant point appears; dark from 1 px on. "
-            "Take images with the board in the dark parts. Crossed: not known."
+            tr(
+                "Standard deviation of the pixel at which a distant point appears; dark from 1 px "
+                "on. Take images with the board in the dark parts. Crossed: not known."
+            )
         )
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._title = title

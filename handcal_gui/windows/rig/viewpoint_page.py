@@ -8,6 +8,7 @@ from functools import partial
 from PySide6.QtWidgets import QWidget
 
 from handcal.station.doctor import Finding, Health
+from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
@@ -16,7 +17,7 @@ from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve import SolvedPart, solve_viewpoint
 from handcal_gui.windows.rig.step_page import StepPage
 
-_HINT = (
+_HINT = tr(
     "Take 20 or more images of the board with the viewpoint camera, with the focus that it will "
     "have behind the display: in all parts of the view up to its edges, tilted by 20° to 45° in "
     "all directions."
@@ -27,17 +28,20 @@ class ViewpointPage(StepPage):
     """Images of the board and the intrinsics solved from them, or a file of intrinsics."""
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
-        given = PathField("Intrinsics", "file", INTRINSICS_FILES, "Solved from the images")
+        given = PathField(tr("Intrinsics"), "file", INTRINSICS_FILES, tr("Solved from the images"))
         form = EntriesForm(
             {
-                "images": ("Viewpoint camera's images", PathField("Viewpoint images", "folder")),
-                "lens": ("Lens", lens_field()),
-                "intrinsics": ("or its intrinsics", given),
+                "images": (
+                    tr("Viewpoint camera's images"),
+                    PathField(tr("Viewpoint images"), "folder"),
+                ),
+                "lens": (tr("Lens"), lens_field()),
+                "intrinsics": (tr("or its intrinsics"), given),
             }
         )
         form.show_entries(project.inputs.viewpoint)
-        panel = ImagesPanel(("Viewpoint camera",), _HINT, "setup-viewpoint")
-        super().__init__("viewpointPage", project, form, {"Images": panel}, parent)
+        panel = ImagesPanel((tr("Viewpoint camera"),), _HINT, "setup-viewpoint")
+        super().__init__("viewpointPage", project, form, {tr("Images"): panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
@@ -65,11 +69,13 @@ class ViewpointPage(StepPage):
         self.box.show_origin(None)
         file = self.project.camera_file
         if file.exists():
-            self.box.show_finding(Finding("", Health.GOOD, f"the intrinsics are in {file}"))
+            self.box.show_finding(
+                Finding("", Health.GOOD, tr("the intrinsics are in {}").format(file))
+            )
 
     def _show_solved(self, solved: SolvedPart) -> None:
         is_bad = solved.verdict.name == "bad"
-        kept = "it is not used" if is_bad else "the displays will be calibrated with it"
+        kept = tr("it is not used") if is_bad else tr("the displays will be calibrated with it")
         self.project.camera_solved()
         self.box.show_solved(solved, kept)
         self.panel.show_solved(solved)
@@ -77,7 +83,7 @@ class ViewpointPage(StepPage):
     def _take(self) -> None:
         folder = self.project.folder.path / "viewpoint"
         self.take_images(
-            {"Viewpoint camera": folder},
+            {tr("Viewpoint camera"): folder},
             self.project.inputs.board,
             self.panel,
             lambda: self.form.enter(images=str(folder)),

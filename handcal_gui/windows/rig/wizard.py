@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from handcal.camera.settings import RealSenseSettings
 from handcal.types import RIG_PARTS, RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
+from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -33,13 +34,17 @@ from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
 _FIRST_SIZE = QSize(1240, 760)
 _RAIL_PX = 29 * SPACING_PX
 _SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
+_BOARD, _VIEWPOINT = tr("Board"), tr("Viewpoint camera")
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
-    "Board": ("The calibration target and the initial rig.", None),
-    "Depth and headset camera": ("Pose of the depth camera on the headset: T_H_D.", "T_H_D"),
-    "Viewpoint camera": ("The camera in the position of the wearer's eye.", None),
-    "Left display": ("Projection and position of the left eye's display.", "left"),
-    "Right display": ("Projection and position of the right eye's display.", "right"),
-    "Result": ("The whole rig: check, compare and save it.", None),
+    _BOARD: (tr("The calibration target and the initial rig."), None),
+    tr("Depth and headset camera"): (
+        tr("Pose of the depth camera on the headset: T_H_D."),
+        "T_H_D",
+    ),
+    _VIEWPOINT: (tr("The camera in the position of the wearer's eye."), None),
+    tr("Left display"): (tr("Projection and position of the left eye's display."), "left"),
+    tr("Right display"): (tr("Projection and position of the right eye's display."), "right"),
+    tr("Result"): (tr("The whole rig: check, compare and save it."), None),
 }
 """By title: the step's purpose, and the part of the rig that it calibrates."""
 
@@ -81,10 +86,10 @@ class RigWizard(QDialog):
     ) -> None:
         super().__init__(parent)
         self.setObjectName("rigWizard")
-        self.setWindowTitle("Calibrate a rig")
+        self.setWindowTitle(tr("Calibrate a rig"))
         self.project = RigProject(folder, realsense or RealSenseSettings(), self)
         self._banner = Banner()
-        self._rail = with_name(QListWidget(), "rigRail", "Steps")
+        self._rail = with_name(QListWidget(), "rigRail", tr("Steps"))
         self._title, self._purpose = QLabel(), QLabel()
         self._stack = QStackedWidget()
         result = ResultPage(self.project)
@@ -99,9 +104,9 @@ class RigWizard(QDialog):
         ):
             self._stack.addWidget(page)
             self._pages.append(page)
-        self._back = button("rigBack", "Back")
-        self._next = button("rigNext", "Next")
-        self._close = button("rigClose", "Close", help_text="All entries are kept")
+        self._back = button("rigBack", tr("Back"))
+        self._next = button("rigNext", tr("Next"))
+        self._close = button("rigClose", tr("Close"), help_text=tr("All entries are kept"))
         for title in _STEPS:
             self._rail.addItem(QListWidgetItem(title))
         self._lay_out()
@@ -162,7 +167,7 @@ class RigWizard(QDialog):
             chosen = icon(name, self.palette().highlightedText().color().name())
             sign.addPixmap(chosen.pixmap(2 * SPACING_PX), QIcon.Mode.Selected)
             self._rail.item(row).setIcon(sign)
-            self._rail.item(row).setToolTip(verdict or "not done yet")
+            self._rail.item(row).setToolTip(verdict or tr("not done yet"))
 
     def _verdict(self, title: str) -> str:
         """Return a step's verdict; empty if it is not done."""
@@ -170,9 +175,9 @@ class RigWizard(QDialog):
         part = _STEPS[title][1]
         if part is not None:
             return origins[part].verdict if part in origins else ""
-        if title == "Board":
+        if title == _BOARD:
             return "good"
-        if title == "Viewpoint camera":
+        if title == _VIEWPOINT:
             return self.project.camera_verdict
         verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}
         return "good" if verdicts == {"good"} else ""
