@@ -108,7 +108,7 @@ def test_the_format_is_the_slowest_from_15_hz_on() -> None:
         ({"0": group(NAME, one_format("fast"))}, "sent no list of cameras"),  # type: ignore[arg-type]
     ],
 )
-def test_without_a_depth_camera_the_reason_is_told(groups: object, problem: str) -> None:
+def test_a_missing_depth_camera_is_an_error_with_its_reason(groups: object, problem: str) -> None:
     with pytest.raises(CameraError, match=problem):
         find_depth(as_sent(groups), LENS)
 
