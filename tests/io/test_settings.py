@@ -15,10 +15,12 @@ from hypothesis import strategies as st
 from handcal.cli.demo import DemoSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings, settings_json
+from handcal.register.fuse import FuseSettings
 from handcal.station.procedure import CalibrationSettings
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses
+SCALES = len(FuseSettings().wearer_scales)
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ def any_value(kind: Any) -> st.SearchStrategy[Any]:
         str: st.text(),
         tuple[float, float, float]: st.lists(PLAUSIBLE, min_size=3, max_size=3),
         # As long as the wearers' default scales and weights, which belong together.
-        tuple[float, ...]: st.lists(PLAUSIBLE, min_size=4, max_size=4),
+        tuple[float, ...]: st.lists(PLAUSIBLE, min_size=SCALES, max_size=SCALES),
     }
     return known[kind]
 
