@@ -234,8 +234,9 @@ def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
 
 
 def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSettings) -> Verdict:
-    # Rounded down, so that what is refused never reads as the limit. The space does not break.
-    percent = f"{int(100.0 * gain.probability_better)}\u00a0%"
+    # Rounded down, so that what is refused never reads as the limit, and no more than 99: nobody is
+    # entirely sure. The space does not break.
+    percent = f"{min(99, int(100.0 * gain.probability_better))}\u00a0%"
     if _is_enough(gain.after_arcmin, gain.probability_better, settings):
         return Verdict(
             "accept",

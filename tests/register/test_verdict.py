@@ -66,7 +66,7 @@ def test_a_surely_better_solution_within_the_target_is_accepted() -> None:
         assert verdict.name == "accept"
         assert verdict.reason == (
             f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
-            "100\u00a0% sure to be better than none"
+            "99\u00a0% sure to be better than none"
         )
         assert 1.0 < gain.after_arcmin < SETTINGS.target_arcmin < gain.without_arcmin
 
