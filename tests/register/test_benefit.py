@@ -99,7 +99,7 @@ def test_the_error_in_depth_is_the_movement_of_an_object_that_covers_its_drawing
     ahead_m = np.array([0.0, 0.0, 0.003])
     corners_m = target_corners_m(WORKING_DISTANCE_M)
     drawn_px = project(eye_projection(DISPLAY, ahead_m), corners_m)
-    moved_m = depth_error_m(DISPLAY, ahead_m)
+    moved_m = float(depth_error_m(DISPLAY, ahead_m))
     offline = eye_projection(DISPLAY, np.zeros(3))
 
     def apart_px(nearer_m: float) -> float:
