@@ -45,9 +45,9 @@ class DepthBenefit:
     probability_better: float
 
     def __str__(self) -> str:
-        """Return the errors without the calibration and with it, and how sure the gain is."""
+        """Return the errors without the calibration and with it, and the probability."""
         errors = f"{1e3 * self.without_m:.1f} → {1e3 * self.after_m:.1f} mm"
-        return f"{errors}, {percent(self.probability_better)} sure to be better"
+        return f"{errors} (better: {percent(self.probability_better)})"
 
 
 @dataclass(frozen=True, slots=True)
