@@ -6,7 +6,7 @@ Pixel of world point v seen from the offline viewpoint C0: ``ζ m = K H0 E0 v``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -231,6 +231,7 @@ def reprojection_arcmin(
     shifts_m: Mapping[Eye, Float64],
     true_shifts_m: Mapping[Eye, Float64],
     worn_rig: Rig | None = None,
+    eyes: Sequence[Eye] = EYES,
 ) -> float:
     """Return the mean reprojection error seen by the true eyes, in arcmin.
 
@@ -247,12 +248,14 @@ def reprojection_arcmin(
         φ of the true eyes, from the C0 of `worn_rig`.
     worn_rig : Rig, optional
         The true rig, if it differs.
+    eyes : sequence of eye
+        Those that the mean is over.
     """
     worn_rig = worn_rig or rig
     corners_E_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
     T_H_H = rig.T_H_D @ invert(worn_rig.T_H_D)  # error of the tracked target
     errors = []
-    for eye in EYES:
+    for eye in eyes:
         worn = worn_rig.eyes[eye]
         T_E_H = view_of_eye(worn, np.eye(4))
         target_V_m = transform(worn.T_V_H @ T_H_H @ invert(T_E_H), corners_E_m)

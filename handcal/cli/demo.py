@@ -8,7 +8,7 @@ measure the error of the result.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -286,6 +286,14 @@ def _judge(
     nothing_m = {eye: np.zeros(3) for eye in EYES}
     solved_m = nothing_m | {eye: shift.shift_m for eye, shift in results.eyes.items()}
     drawn_m = dict(calibration.applied_shift_m)
+    states_m = {"before": nothing_m, "begun": begun_m, "after": solved_m, "drawn": drawn_m}
+
+    def errors_arcmin(eyes: Sequence[Eye]) -> dict[str, float]:
+        return {
+            name: reprojection_arcmin(rig, one_m, eyes_m, worn_rig, eyes)
+            for name, one_m in states_m.items()
+        }
+
     return {
         "eyes": {
             eye: {
@@ -297,6 +305,8 @@ def _judge(
                 "reason": results.verdicts[eye].reason,
                 "evidence": [one.name for one in calibration.evidence.contradictions],
                 "verified": _verified(calibration, eye),
+                "depth": asdict(results.benefits[eye].depth),
+                "reprojection_arcmin": errors_arcmin((eye,)),
             }
             for eye, shift in results.eyes.items()
         },
@@ -304,12 +314,7 @@ def _judge(
             "true_m": _true_eye_distance_m(settings.seed, worn_rig),
             "used": None if measured is None else asdict(measured),
         },
-        "reprojection_arcmin": {
-            "before": reprojection_arcmin(rig, nothing_m, eyes_m, worn_rig),
-            "begun": reprojection_arcmin(rig, begun_m, eyes_m, worn_rig),
-            "after": reprojection_arcmin(rig, solved_m, eyes_m, worn_rig),
-            "drawn": reprojection_arcmin(rig, drawn_m, eyes_m, worn_rig),
-        },
+        "reprojection_arcmin": errors_arcmin(EYES),
     }
 
 

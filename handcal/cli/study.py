@@ -192,16 +192,21 @@ def procedures(arguments: argparse.Namespace) -> None:
     )
     rows = _unless_interrupted(partial(run_procedure_study, settings))
     save(arguments.json, {"rows": [asdict(row) for row in rows]})
-    shown = table("", "before", "after", "95 %", "time", "worse", "accepted", "both")
+    shown = table(
+        "", "before", "after", "95 %", "time", "worse", "accepted", "both", "depth", "worse"
+    )
     for row in rows:
         shown.add_row(
             f"{row.plan}, {row.variant}, errors × {row.scale:g}",
             *(f"{row.before_arcmin:.1f}′", f"{row.after_arcmin:.2f}′"),
             *(f"{row.after_p95_arcmin:.1f}′", f"{row.seconds:.1f} s"),
             *map(_percent, (row.worse_share, row.accepted_share, row.accepted_worse_share)),
+            "" if row.depth_after_mm is None else f"{row.depth_after_mm:.1f} mm",
+            _percent(row.depth_worse_share),
         )
     console.print(
-        "Errors without the calibration, with it, and its 95th percentile; shares of eyes."
+        "Errors without the calibration, with it, and its 95th percentile; shares of eyes; the "
+        "error in depth at 0.5 m."
     )
     console.print(shown)
 

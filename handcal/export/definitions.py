@@ -22,6 +22,10 @@ DEFINITIONS = {
         "What φ's covariance leads to in the display: root mean square at the corners of an 8 cm "
         "square straight ahead at half a metre, in arcminutes (′, a sixtieth of a degree)."
     ),
+    "error in depth": (
+        "Distance along the viewing direction by which an object at 0.5 m must move to cover its "
+        "drawing: expected without the calibration → with it."
+    ),
     "eye distance": "Distance between the two solved eyes, from φ and the rig.",
     "residual, RMS": (
         "Distance of a hand point to its partner on the cursor after registration; RMS over the "

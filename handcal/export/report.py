@@ -174,7 +174,8 @@ def _solution(outcome: SessionOutcome, results: Results) -> Section:
             for eye, shift in results.eyes.items()
         ],
     )
-    items: list[Item] = [table]
+    depths = (f"{eye} {results.benefits[eye].depth}" for eye in results.eyes)
+    items: list[Item] = [table, f"Expected error in depth: {'; '.join(depths)}."]
     if results.eye_distance_m is not None:
         items.append(f"Implied eye distance: {1e3 * results.eye_distance_m:.1f} mm.")
     return Section("How it was solved", items)

@@ -5,6 +5,10 @@ target as they are drawn and as they should be, at its three distances. Around t
 calibration it is linear in φ: with the Jacobian J of the drawn corners, drawing with φ for an eye
 at φ' errs by J (φ - φ') at each corner. Its expectation over a Gaussian has no closed form, so it
 is averaged over a fixed set of samples: equal input gives equal output.
+
+The error in depth is the distance along the viewing direction by which an object at the working
+distance must move to cover its drawing: (1 - z φ4) |φ3 - φ3'| by the model of registration
+(`handcal.register.model`), with φ4 the inverse distance of the focal plane.
 """
 
 from __future__ import annotations
@@ -24,8 +28,26 @@ from handcal.display import (
 from handcal.geometry import project
 from handcal.types import EyeDisplay, EyeShift, Float64
 
+WORKING_DISTANCE_M = TARGET_DEPTHS_M[1]
+"""Distance at which the error in depth is expected."""
+
 _SAMPLES_LOG2 = 9
 _STEP_M = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class DepthBenefit:
+    """The error in depth of one eye, at `WORKING_DISTANCE_M`; the fields are as in `Benefit`."""
+
+    before_m: float
+    without_m: float
+    after_m: float
+    probability_better: float
+
+    def __str__(self) -> str:
+        """Return the errors without the calibration and with it, and the probability."""
+        errors = f"{1e3 * self.without_m:.1f} → {1e3 * self.after_m:.1f} mm"
+        return f"{errors} (better: {percent(self.probability_better)})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +62,16 @@ class Benefit:
     """Expected with the solved φ."""
     probability_better: float
     """Probability that the solved φ errs less than the offline calibration."""
+    depth: DepthBenefit
+
+
+def percent(probability: float) -> str:
+    """Return a probability in percent, with a space that does not break.
+
+    Rounded down, so that what is refused never reads as the limit, and no more than 99: nobody is
+    entirely sure.
+    """
+    return f"{min(99, int(100.0 * probability))}\u00a0%"
 
 
 def expected_arcmin(display: EyeDisplay, mean_m: Float64, covariance_m2: Float64) -> float:
@@ -69,15 +101,30 @@ def benefit(
     shift_m, covariance_m2 : (3,), (3, 3) float64
         φ of the eye after the alignments; the former is drawn with.
     """
+    before_m = _samples(prior_mean_m, prior_covariance_m2)
     eyes_m = _samples(shift_m, covariance_m2)
     after = _errors_arcmin(display, eyes_m - shift_m)
     without = _errors_arcmin(display, eyes_m)
+    depth_after_m = depth_error_m(display, eyes_m - shift_m)
+    depth_without_m = depth_error_m(display, eyes_m)
     return Benefit(
-        before_arcmin=expected_arcmin(display, prior_mean_m, prior_covariance_m2),
+        before_arcmin=float(_errors_arcmin(display, before_m).mean()),
         without_arcmin=float(without.mean()),
         after_arcmin=float(after.mean()),
         probability_better=float((after < without).mean()),
+        depth=DepthBenefit(
+            before_m=float(depth_error_m(display, before_m).mean()),
+            without_m=float(depth_without_m.mean()),
+            after_m=float(depth_after_m.mean()),
+            probability_better=float((depth_after_m < depth_without_m).mean()),
+        ),
     )
+
+
+def depth_error_m(display: EyeDisplay, difference_m: Float64) -> Float64:
+    """Return the errors in depth (...) of drawing with φ, for its differences (..., 3) from φ'."""
+    along_m: Float64 = np.abs(difference_m[..., 2])
+    return along_m * (1.0 - WORKING_DISTANCE_M / display.z_C0_S_m)
 
 
 def foreseen_benefits(

@@ -250,7 +250,7 @@ def results_json(results: Results) -> dict[str, Any]:
         "eyes": {
             eye: _shift_json(shift)
             | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
-            | {"benefit": asdict(results.benefits[eye])}
+            | _benefit_json(results.benefits[eye])
             | {"advice": _advice_json(results.advice.get(eye))}
             | _measured_json(results.measured_arcmin.get(eye))
             for eye, shift in results.eyes.items()
@@ -272,6 +272,12 @@ def results_json(results: Results) -> dict[str, Any]:
             for shifts in results.alignments.values()
         ],
     }
+
+
+def _benefit_json(benefit: Benefit) -> dict[str, Any]:
+    found = asdict(benefit)
+    depth = found.pop("depth")
+    return {"benefit": found, "depth": depth}
 
 
 def _advice_json(advice: Advice | None) -> dict[str, Any] | None:

@@ -13,7 +13,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from handcal.register.benefit import Benefit, benefit, expected_arcmin, foreseen_benefits
+from handcal.register.benefit import (
+    Benefit,
+    benefit,
+    expected_arcmin,
+    foreseen_benefits,
+    percent,
+)
 from handcal.register.fuse import Fused, eye_position_m, eye_slice
 from handcal.types import EYES, Eye, EyeShift, PlanName, Rig, Verdict, Verification
 
@@ -234,14 +240,12 @@ def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
 
 
 def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSettings) -> Verdict:
-    # Rounded down, so that what is refused never reads as the limit, and no more than 99: nobody is
-    # entirely sure. The space does not break.
-    percent = f"{min(99, int(100.0 * gain.probability_better))}\u00a0%"
+    sure = percent(gain.probability_better)
     if _is_enough(gain.after_arcmin, gain.probability_better, settings):
         return Verdict(
             "accept",
             f"expected error {gain.after_arcmin:.1f}′ instead of {gain.without_arcmin:.1f}′; "
-            f"{percent} sure to be better than none",
+            f"{sure} sure to be better than none",
         )
     is_soon_accepted = advice.is_accepted and advice.alignments <= _FEW_ALIGNMENTS
     if gain.without_arcmin <= gain.after_arcmin or (
@@ -250,11 +254,11 @@ def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSet
         return Verdict(
             "keep",
             f"the offline calibration is expected to err by only {gain.without_arcmin:.1f}′ here; "
-            f"this result, expected at {gain.after_arcmin:.1f}′, is only {percent} sure to be "
+            f"this result, expected at {gain.after_arcmin:.1f}′, is only {sure} sure to be "
             "better",
         )
     more = _further_text(advice, eye)
-    now = f"expected error {gain.after_arcmin:.1f}′, {percent} sure to be better than none"
+    now = f"expected error {gain.after_arcmin:.1f}′, {sure} sure to be better than none"
     then = f"{advice.after_arcmin:.1f}′ expected after {more}"
     if advice.meets_target:
         return Verdict("repeat", f"{now}; {then}")

@@ -45,6 +45,8 @@ class EyeResult:
     bars: tuple[Bar, ...]
     another: str
     """The effect of one more alignment."""
+    depth: str
+    """The error in depth without the calibration and with it."""
 
 
 def eye_results(results: Results) -> list[EyeResult]:
@@ -64,7 +66,8 @@ def eye_results(results: Results) -> list[EyeResult]:
         another = tr("One more alignment: {:.1f}′ expected").format(
             results.expected_after_another_arcmin[eye]
         )
-        found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, another))
+        depth = tr("Depth: {}").format(benefit.depth)
+        found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, another, depth))
     return found
 
 
@@ -84,7 +87,7 @@ def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] 
     for one in eye_results(results):
         lines += ["", f"{EYE_NAMES[one.eye]}: {VERDICT_WORDS[one.verdict]}", one.reason]
         lines += [f"{bar.name}: {bar.text}" for bar in one.bars]
-        lines.append(one.another)
+        lines += [one.depth, one.another]
     return "\n".join(lines)
 
 
@@ -121,7 +124,7 @@ class ResultCard(QWidget):
 
 
 class _Column(QWidget):
-    """One eye: verdict, bars, effect of another alignment, reason."""
+    """One eye: verdict, bars, depth, effect of another alignment, reason."""
 
     def __init__(self, eye: Eye) -> None:
         super().__init__()
@@ -151,7 +154,7 @@ class _Column(QWidget):
         word = tr("– Not solved") if result is None else VERDICT_WORDS[result.verdict]
         self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
         self._reason.setText(result.reason if result else "")
-        self._another.setText(result.another if result else "")
+        self._another.setText(f"{result.depth}\n{result.another}" if result else "")
         self._bars.show_bars(result, target_arcmin, scale_arcmin)
         self.refresh()
 

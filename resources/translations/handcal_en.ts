@@ -3054,6 +3054,10 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Depth: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Target: {:.1f}′</source>
         <translation type="unfinished"></translation>
     </message>

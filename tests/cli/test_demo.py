@@ -75,7 +75,11 @@ def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
         assert eye["reason"]
         off_mm = np.subtract(eye["shift_mm"], eye["true_shift_mm"])
         assert eye["error_mm"] == pytest.approx(np.linalg.norm(off_mm))
+        assert set(eye["depth"]) == {"before_m", "without_m", "after_m", "probability_better"}
     assert set(result["reprojection_arcmin"]) == {"before", "begun", "after", "drawn"}
+    for name, arcmin in result["reprojection_arcmin"].items():
+        of_eyes = [eye["reprojection_arcmin"][name] for eye in result["eyes"].values()]
+        assert arcmin == pytest.approx(np.mean(of_eyes))
     assert result["plan"] == "paper"
     assert result["seconds"] > 0.0
     assert set(result["guard"]) == {"rejected", "accepted_deg"}

@@ -54,6 +54,7 @@ def test_it_says_what_was_found(pages: list[Figure], outcome: SessionOutcome) ->
         assert f"{expected:.1f}" in found
     for value in outcome.final_shift_m("left"):
         assert mm(value) in found
+        assert f"{eye} {outcome.results.benefits[eye].depth}" in " ".join(found)
     assert outcome.results.eye_distance_m is not None
     assert f"Implied eye distance: {1e3 * outcome.results.eye_distance_m:.1f} mm." in found
     assert "=P-07, $x_" in found

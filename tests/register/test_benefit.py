@@ -3,8 +3,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.display import reprojection_arcmin
-from handcal.register.benefit import benefit, expected_arcmin, foreseen_benefits
+from handcal.display import eye_projection, reprojection_arcmin, target_corners_m
+from handcal.geometry import project
+from handcal.register.benefit import (
+    WORKING_DISTANCE_M,
+    benefit,
+    depth_error_m,
+    expected_arcmin,
+    foreseen_benefits,
+    percent,
+)
 from handcal.rig.example import example_rig
 from handcal.types import EYES, Eye, Float64
 
@@ -85,3 +93,36 @@ def test_expected_error_of_one_axis_by_hand() -> None:
     by_hand = 60 * np.degrees(1e-3 * at_2_m / 2.0) * np.sqrt(2 / np.pi)
     found = expected_arcmin(DISPLAY, np.zeros(3), np.diag([0.001, 0.0, 0.0]) ** 2)
     assert found == pytest.approx(by_hand, rel=0.02)
+
+
+def test_the_error_in_depth_is_the_movement_of_an_object_that_covers_its_drawing() -> None:
+    ahead_m = np.array([0.0, 0.0, 0.003])
+    corners_m = target_corners_m(WORKING_DISTANCE_M)
+    drawn_px = project(eye_projection(DISPLAY, ahead_m), corners_m)
+    moved_m = float(depth_error_m(DISPLAY, ahead_m))
+    offline = eye_projection(DISPLAY, np.zeros(3))
+
+    def apart_px(nearer_m: float) -> float:
+        return float(np.abs(project(offline, corners_m - [0.0, 0.0, nearer_m]) - drawn_px).max())
+
+    assert apart_px(moved_m) < 0.02 * apart_px(0.0)
+
+
+def test_the_errors_in_depth_are_those_of_a_gaussian_by_hand() -> None:
+    ratio = 1.0 - WORKING_DISTANCE_M / DISPLAY.z_C0_S_m
+    covariance_m2 = np.diag([1e-3, 1e-3, 0.6e-3]) ** 2
+    found = benefit(
+        DISPLAY, np.zeros(3), PRIOR_M2, np.array([0.0, 0.0, 0.012]), covariance_m2
+    ).depth
+    folded = np.sqrt(2.0 / np.pi) * ratio
+    assert found.before_m == pytest.approx(0.004 * folded, rel=0.01)
+    assert found.without_m == pytest.approx(0.012 * ratio, rel=0.01)
+    assert found.after_m == pytest.approx(0.6e-3 * folded, rel=0.01)
+    assert found.probability_better == 1.0
+    unknown = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.array([0.004, 0.0, 0.0]), PRIOR_M2).depth
+    assert unknown.probability_better == 0.0
+    assert str(found) == "9.0 → 0.4 mm (better: 99\u00a0%)"
+
+
+def test_nobody_is_entirely_sure() -> None:
+    assert [percent(one) for one in (0.0, 0.949, 1.0)] == [f"{n}\u00a0%" for n in (0, 94, 99)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +52,9 @@ def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None
         "stop_reason",
     }  # fmt: skip
     for eye in EYES:
-        assert set(data["eyes"][eye]) == solved | {"verdict", "reason", "benefit", "advice"}
+        judged = {"verdict", "reason", "benefit", "depth", "advice"}
+        assert set(data["eyes"][eye]) == solved | judged
+        assert data["eyes"][eye]["depth"] == asdict(results.benefits[eye].depth)
         assert data["eyes"][eye]["shift_m"] == results.eyes[eye].shift_m.tolist()
         assert np.shape(data["eyes"][eye]["covariance_m2"]) == (3, 3)
         assert data["eyes"][eye]["verdict"] == results.verdicts[eye].name

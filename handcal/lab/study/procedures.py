@@ -23,6 +23,7 @@ from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearers import StudyWearer, align_points, draw_wearer
 from handcal.progress import Progress
+from handcal.register.benefit import depth_error_m
 from handcal.register.placement import PlacementSettings
 from handcal.register.prior import LearnedPrior, learn_prior
 from handcal.sim.people import VARIANTS, Variant, begin_sitting
@@ -69,6 +70,11 @@ class ProcedureRow:
     """The wearer's time."""
     worse_share: float
     """Share of the eyes that are worse than before."""
+    depth_before_mm: float | None
+    depth_after_mm: float | None
+    """Error in depth at 0.5 m, of what is drawn (`depth_error_m`)."""
+    depth_worse_share: float | None
+    """Share of the eyes whose error in depth is larger than before."""
     accepted_share: float | None
     accepted_worse_share: float | None
     """Share of all eyes that are accepted, and that are accepted and worse than before."""
@@ -130,6 +136,7 @@ def procedure_trial(settings: ProcedureSettings, case: Case) -> list[StudyRow]:
         | _errors(wearer, eye, offline[eye], _rendered(wearer, eye, calibrated.shift_m[eye]))
         | {"eye": eye, "seconds": calibrated.seconds}
         | _told(calibrated, eye)
+        | _depth_errors(wearer, eye, calibrated.shift_m[eye])
         for eye in EYES
     ]
 
@@ -150,12 +157,16 @@ def _summarise(plan: str, variant: str, scale: float, rows: Sequence[StudyRow]) 
     before, after = column("before_arcmin"), column("after_arcmin")
     is_worse = after > before
     accepted = worse_too = correlation = ratio = None
+    depth_before = depth_after = depth_worse = None
     if rows[0]["verdict"] is not None:
         is_accepted = np.array([row["verdict"] == "accept" for row in rows])
         expected = column("expected_arcmin")
         accepted, worse_too = float(is_accepted.mean()), float((is_accepted & is_worse).mean())
         correlation = float(np.corrcoef(expected, after)[0, 1])
         ratio = float(expected.mean() / after.mean())
+        before_mm, after_mm = column("depth_before_mm"), column("depth_after_mm")
+        depth_before, depth_after = float(before_mm.mean()), float(after_mm.mean())
+        depth_worse = float((after_mm > before_mm).mean())
     return ProcedureRow(
         plan=plan,
         variant=variant,
@@ -165,6 +176,9 @@ def _summarise(plan: str, variant: str, scale: float, rows: Sequence[StudyRow]) 
         after_p95_arcmin=float(np.quantile(after, 0.95)),
         seconds=float(column("seconds").mean()),
         worse_share=float(is_worse.mean()),
+        depth_before_mm=depth_before,
+        depth_after_mm=depth_after,
+        depth_worse_share=depth_worse,
         accepted_share=accepted,
         accepted_worse_share=worse_too,
         expected_actual_correlation=correlation,
@@ -234,6 +248,14 @@ def _errors(
         return float(arcmin_from_px(display, apart_px).mean())
 
     return {"before_arcmin": error_arcmin(before), "after_arcmin": error_arcmin(after)}
+
+
+def _depth_errors(wearer: StudyWearer, eye: Eye, shift_m: Float64) -> dict[str, float]:
+    display, true_m = wearer.rig.eyes[eye], wearer.true_shift_m[eye]
+    return {
+        "depth_before_mm": float(1e3 * depth_error_m(display, true_m)),
+        "depth_after_mm": float(1e3 * depth_error_m(display, shift_m - true_m)),
+    }
 
 
 def _by_spaam(

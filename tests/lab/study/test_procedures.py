@@ -46,6 +46,8 @@ def made(error_arcmin: float, **changes: float | str | None) -> StudyRow:
         "seconds": 12.0,
         "verdict": "accept",
         "expected_arcmin": 0.5 * error_arcmin,
+        "depth_before_mm": 2.0,
+        "depth_after_mm": 0.25 * error_arcmin,
     }
     return row | changes
 
@@ -56,6 +58,7 @@ def test_a_wearer_without_errors_is_calibrated_by_the_plan_in_its_time() -> None
     for row in rows:
         assert float(row["before_arcmin"] or 0.0) > 3.0
         assert float(row["after_arcmin"] or 9.0) < 2.0
+        assert float(row["depth_after_mm"] or 9.0) < 1.0
         assert row["verdict"] == "accept"
         assert row["seconds"] == pytest.approx(RAISING_S + 2 * ALIGNING_S + 2 * MODEL.verify_s)
 
@@ -110,6 +113,8 @@ def test_the_figures_of_known_rows() -> None:
     assert found.seconds == 12.5
     assert found.worse_share == 0.25
     assert (found.accepted_share, found.accepted_worse_share) == (0.75, 0.25)
+    assert (found.depth_before_mm, found.depth_after_mm) == (2.0, 1.5)
+    assert found.depth_worse_share == 0.25
     assert found.expected_actual_correlation == pytest.approx(1.0)
     assert found.expected_over_actual == pytest.approx(0.5)
     assert found.after_p95_arcmin == pytest.approx(np.quantile([2.0, 4.0, 12.0, 6.0], 0.95))
@@ -119,7 +124,7 @@ def test_what_has_no_verdict_has_no_share() -> None:
     rows = [made(2.0, verdict=None, expected_arcmin=None, plan="spaam-25")] * 2
     (found,) = procedure_rows(rows)
     assert found.accepted_share is None
-    assert found.expected_over_actual is None
+    assert found.expected_over_actual is found.depth_after_mm is None
 
 
 @pytest.mark.parametrize(
