@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 from small_gicp import KdTree
 
 from handcal.geometry import invert, transform
@@ -94,6 +95,7 @@ def measure_shape_change(
     node, share = _shares(nodes, points)
     if rows is None:
         rows = registration_rows(cursor, hand, T_hand_cursor, settings)
+    both = _products(node, share, count)
     stiffness = _STIFFNESS * _laplacian(nodes) + 1e-4 * np.eye(count)
     moved: Float64 = np.zeros((count, 3))
     for step in range(_STEPS):
@@ -104,16 +106,17 @@ def measure_shape_change(
         toward = rows.toward @ T_hand_cursor[:3, :3]
         before_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - rows.gap_m
         measured, wanted = _normal_equation(
-            node, share, rows.index, toward, rows.weight, before_m, count
+            node, share, both, rows.index, toward, rows.weight, before_m, count
         )
         normal = measured.copy()
         for i in range(3):
             normal[i::3, i::3] += len(toward) / count * stiffness
-        moved = np.asarray(np.linalg.solve(normal, wanted).reshape(-1, 3), np.float64)
+        inverse = _inverse(normal) if step == _STEPS - 1 else None
+        solution = lapack.dposv(normal, wanted)[1] if inverse is None else inverse @ wanted
+        moved = solution.reshape(-1, 3)
     point_moved = np.einsum("nk,nkd->nd", share, moved[node])
     left_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - before_m
     variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
-    inverse = np.linalg.inv(normal)
     scatter = np.sum((inverse @ measured) * inverse)
     cut_m = points[cursor.near_cut]
     T_moved = best_rigid(nodes, nodes + moved)
@@ -135,9 +138,17 @@ def _shares(nodes_m: Float64, points_m: Float64) -> tuple[Indices, Float64]:
     return index.view(np.intp), share / share.sum(axis=1, keepdims=True)
 
 
+def _products(node: Indices, share: Float64, count: int) -> tuple[Indices, Float64]:
+    """Return places in a (K, K) matrix and what each point adds there, half of a symmetric one."""
+    first, second = np.triu_indices(node.shape[1])
+    halved = np.where(first == second, 0.5, 1.0)
+    return node[:, first] * count + node[:, second], halved * share[:, first] * share[:, second]
+
+
 def _normal_equation(
     node: Indices,
     share: Float64,
+    both: tuple[Indices, Float64],
     point: Indices,
     toward: Float64,
     weight: Float64,
@@ -149,8 +160,7 @@ def _normal_equation(
     A row says that its point moves by `wanted_m` along `toward`. The rows of one point are added
     first, as they share its nodes.
     """
-    places = (node[:, :, None] * count + node[:, None]).ravel()
-    products = share[:, :, None] * share[:, None]
+    places, products = both
     weighted = toward * weight[:, None]
     normal = np.empty((count, 3, count, 3))
     wanted = np.empty((count, 3))
@@ -159,9 +169,17 @@ def _normal_equation(
         wanted[:, i] = np.bincount(node.ravel(), (share * at_point[:, None]).ravel(), count)
         for j in range(i + 1):
             at_point = np.bincount(point, weighted[:, i] * toward[:, j], len(node))
-            block = np.bincount(places, (products * at_point[:, None, None]).ravel(), count**2)
-            normal[:, i, :, j] = normal[:, j, :, i] = block.reshape(count, count)
+            half = np.bincount(places.ravel(), (products * at_point[:, None]).ravel(), count**2)
+            half = half.reshape(count, count)
+            normal[:, i, :, j] = normal[:, j, :, i] = half + half.T
     return normal.reshape(3 * count, 3 * count), wanted.ravel()
+
+
+def _inverse(normal: Float64) -> Float64:
+    """Return the inverse of a symmetric positive definite matrix, by Cholesky's factors."""
+    upper = np.triu(lapack.dpotri(lapack.dpotrf(normal)[0])[0])
+    inverse: Float64 = upper + np.triu(upper, 1).T
+    return inverse
 
 
 def change_text(change: ShapeChange, R_D: Float64) -> str:
