@@ -181,8 +181,14 @@ def _normal_equation(
 
 
 def _inverse(normal: Float64) -> Float64:
-    """Return the inverse of a symmetric positive definite matrix, by Cholesky's factors."""
-    upper = np.triu(lapack.dpotri(lapack.dpotrf(normal)[0])[0])
+    """Return the inverse of a symmetric positive definite matrix, by Cholesky's factors.
+
+    LinAlgError if it is not positive definite.
+    """
+    factor, failed_at = lapack.dpotrf(normal)
+    if failed_at:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    upper = np.triu(lapack.dpotri(factor)[0])
     inverse: Float64 = upper + np.triu(upper, 1).T
     return inverse
 
