@@ -37,6 +37,9 @@ from handcal.types import Bool, EyeShift, Float64
 _POINTS = 1000
 # Number of points at which the distance between neighbours of a whole cloud is measured.
 _SPACING_POINTS = 200
+# φ is fitted to at most this many of the pairs of clouds that hold different points: all points
+# of the hand were moved alike, so that more say no more.
+_FITTED = 5000
 # First a coarse registration, to cut both clouds alike, then a fine one.
 _COARSE = RigidSettings(tolerance_m=1e-3)
 _FINE = RigidSettings()
@@ -153,13 +156,15 @@ def fit_match(
     """
     T_cursor = T_E if T_drawn is None else T_drawn @ T_E
     T_back = np.asarray(np.linalg.inv(T_cursor))
-    hand = transform(T_E, match.hand_m)
-    registered = transform(T_cursor @ match.rigid.T_target_source, match.hand_m)
     gap_m, index, kept = match.pairs
     history = [float(np.mean(gap_m[kept] ** 2))]
     inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
-    paired = hand[kept]
-    R, unturned = _unturned(paired, registered[kept])
+    chosen = np.flatnonzero(kept)
+    if not match.same_points:
+        chosen = chosen[:: 1 + len(chosen) // (_FITTED + 1)]
+    hand_m = match.hand_m[chosen]
+    paired = transform(T_E, hand_m)
+    R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))
     moved_m = balanced_turn(transform(T_cursor, match.outline_m), R, mean_point(unturned))
     unturned += moved_m
     rigid_fit_m, _ = _fit_pairs(unturned, paired, distance_m, history[0] / 3.0)
@@ -167,6 +172,7 @@ def fit_match(
     aspect_m = shift_m - rigid_fit_m
     same_points = match.same_points
     if same_points:
+        hand = transform(T_E, match.hand_m)
         shape = predict(hand, shift_m, distance_m, exact=True)
         cursor = transform(T_cursor, match.cursor_m)
         kept = kept & _is_nearest(index, gap_m)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from handcal.geometry import transform
+from handcal.register.surface import mean_point
 from handcal.types import Bool, Float64
 
 # Points this near the common cut count as beside it.
@@ -56,7 +57,7 @@ def common_cut(
     wrist_m = edge_m.mean(axis=0)
     near = np.linalg.norm(edge_m - wrist_m, axis=1) < _ONE_EDGE_M
     wrist_m = edge_m[near].mean(axis=0) if near.any() else wrist_m
-    middle_m = np.mean([cloud.mean(axis=0) for cloud in clouds], axis=0)
+    middle_m = np.mean([mean_point(cloud) for cloud in clouds], axis=0)
     along = (wrist_m - middle_m) / max(float(np.linalg.norm(wrist_m - middle_m)), 1e-9)
     places = [cloud @ along for cloud in clouds]
     ends = [float(np.quantile(place, _OUTERMOST)) for place in places]

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from small_gicp import KdTree
 
 from handcal.geometry import invert, rigid, transform
@@ -125,15 +124,13 @@ def register_rigid(
     reason = None
     is_near = T_start is not None
     for _ in range(settings.max_iterations):
-        T_target_source, information, cost_m2, step, rows = _step(
-            source,
-            target,
-            T_target_source,
-            settings,
-            None if is_near else settings.start_interior,
-            1.0 / max(len(history) - _FULL_STEPS, 1),
-        )
-        history.append(cost_m2)
+        most = None if is_near else settings.start_interior
+        rows = registration_rows(source, target, T_target_source, settings, max_interior=most)
+        share = 1.0 / max(len(history) - _FULL_STEPS, 1)
+        step, information = _step(rows, share)
+        T_step = _about(rows.centre_m, step)
+        T_target_source = T_step @ T_target_source
+        history.append(float(rows.weight @ rows.gap_m**2 / rows.weight.sum()))
         length_m = np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:])
         if is_near and length_m < settings.tolerance_m:
             reason = f"step below {settings.tolerance_m * 1e6:.0f} µm"
@@ -145,7 +142,12 @@ def register_rigid(
         np.array(history),
         reason is not None,
         reason or f"limit of {settings.max_iterations} iterations",
-        rows,
+        replace(
+            rows,
+            at_m=transform(T_step, rows.at_m),
+            centre_m=rows.centre_m + step[3:],
+            gap_m=rows.gap_m + rows.jacobian @ step,
+        ),
     )
 
 
@@ -212,11 +214,10 @@ def motion_covariance(
     inverse = np.linalg.inv(J.T @ jacobian + 1e-9 * np.eye(6))
     moved = transform(T_target_source, source.points_m)
     centres = cube_means(moved, _PATCH_M)
-    _, patch = nearest(KdTree(centres), rows.at_m)
+    patch = nearest(KdTree(centres), moved)[1][rows.index]
     count = len(centres)
-    is_of = (patch == np.arange(count)[:, None]).astype(np.float64)
-    scores = is_of @ (rows.gap_m[:, None] * J)
-    outlines = is_of[:, : rows.outlines] @ J[: rows.outlines]
+    scores = _sums(patch, rows.gap_m[:, None] * J, count)
+    outlines = _sums(patch[: rows.outlines], J[: rows.outlines], count)
     apart_m, _ = nearest(target.tree, moved)
     unknown_m = _OUTLINE_GAPS * float(np.median(apart_m))
     meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores.T @ scores
@@ -224,34 +225,26 @@ def motion_covariance(
     return np.asarray(inverse @ meat @ inverse + _EXACT_M2 * np.eye(6))
 
 
-def _step(
-    source: Surface,
-    target: Surface,
-    T_target_source: Float64,
-    settings: RigidSettings,
-    max_interior: int | None,
-    share: float,
-) -> tuple[Float64, Float64, float, Float64, Rows]:
-    """Take a share of a Gauss-Newton step.
+def _sums(group: Indices, values: Float64, count: int) -> Float64:
+    """Return the sums of the values (N, K) of each of so many groups, (count, K)."""
+    return np.stack([np.bincount(group, column, count) for column in values.T], axis=1)
 
-    Returned are the transform, information, mean squared residual, step and rows.
-    """
-    rows = registration_rows(source, target, T_target_source, settings, max_interior=max_interior)
-    J, weight, gap_m = rows.jacobian, rows.weight, rows.gap_m
-    information = J.T @ (weight[:, None] * J)
-    gradient = J.T @ (weight * gap_m)
+
+def _step(rows: Rows, share: float) -> tuple[Float64, Float64]:
+    """Return a share of a Gauss-Newton step, (6,), and its matrix."""
+    J = rows.jacobian
+    weighted = rows.weight[:, None] * J
+    information = weighted.T @ J
+    gradient = weighted.T @ rows.gap_m
     step = -share * np.asarray(np.linalg.solve(information + 1e-9 * np.eye(6), gradient))
-    turn = rigid(Rotation.from_rotvec(step[:3]).as_matrix())
-    centre = rows.centre_m
-    about_centre = rigid(translation_m=centre + step[3:]) @ turn @ rigid(translation_m=-centre)
-    cost_m2 = float(weight @ gap_m**2 / weight.sum())
-    left = replace(
-        rows,
-        at_m=transform(about_centre, rows.at_m),
-        centre_m=centre + step[3:],
-        gap_m=gap_m + J @ step,
-    )
-    return about_centre @ T_target_source, information, cost_m2, step, left
+    return step, information
+
+
+def _about(centre_m: Float64, step: Float64) -> Float64:
+    """Return the transform of a step: a rotation about a centre, and a translation."""
+    T = rigid(step[:3])
+    T[:3, 3] = centre_m + step[3:] - T[:3, :3] @ centre_m
+    return T
 
 
 def _outline_pairs(

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 from small_gicp import KdTree
 
 from handcal.geometry import invert, transform
@@ -27,6 +28,10 @@ _NODES_PER_POINT = 4
 # Weight of the prior that neighbouring nodes move alike, against the pairs of one node.
 _STIFFNESS = 0.1
 _STEPS = 2
+# Pairs are not searched for again where the mean square of the movement is below this share of what
+# noise explains: of 391 simulated and real pairs of clouds none of the 314 below it had a change of
+# shape after a second step.
+_STILL = 0.7
 # Variance of the nodes over that of independent rows. Fitted to disjoint samples of real frames and
 # to simulated clouds (2.4 to 6.5).
 _NOISE_FACTOR = 4.5
@@ -94,35 +99,38 @@ def measure_shape_change(
     node, share = _shares(nodes, points)
     if rows is None:
         rows = registration_rows(cursor, hand, T_hand_cursor, settings)
+    both = _products(node, share, count)
     stiffness = _STIFFNESS * _laplacian(nodes) + 1e-4 * np.eye(count)
-    moved: Float64 = np.zeros((count, 3))
+    point_moved: Float64 = np.zeros_like(points)
     for step in range(_STEPS):
-        point_moved = np.einsum("nk,nkd->nd", share, moved[node])
         if step:
             bent = points + point_moved
             rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
         toward = rows.toward @ T_hand_cursor[:3, :3]
         before_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - rows.gap_m
         measured, wanted = _normal_equation(
-            node, share, rows.index, toward, rows.weight, before_m, count
+            node, share, both, rows.index, toward, rows.weight, before_m, count
         )
         normal = measured.copy()
         for i in range(3):
             normal[i::3, i::3] += len(toward) / count * stiffness
-        moved = np.asarray(np.linalg.solve(normal, wanted).reshape(-1, 3), np.float64)
-    point_moved = np.einsum("nk,nkd->nd", share, moved[node])
-    left_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - before_m
-    variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
-    inverse = np.linalg.inv(normal)
-    scatter = np.sum((inverse @ measured) * inverse)
+        inverse = _inverse(normal)
+        all_moved = (inverse @ wanted).reshape(-1, 3)
+        point_moved = np.einsum("nk,nkd->nd", share, all_moved[node])
+        left_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - before_m
+        variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
+        noise_m2 = variance_m2 * float(np.sum((inverse @ measured) * inverse)) / count
+        T_moved = best_rigid(nodes, nodes + all_moved)
+        moved = transform(invert(T_moved), nodes + all_moved) - nodes
+        if np.mean(np.sum(moved**2, axis=1)) < _STILL * noise_m2:
+            break
     cut_m = points[cursor.near_cut]
-    T_moved = best_rigid(nodes, nodes + moved)
     return ShapeChange(
         nodes_m=nodes,
-        moved_m=transform(invert(T_moved), nodes + moved) - nodes,
+        moved_m=moved,
         toward_arm=(cut_m.mean(axis=0) if len(cut_m) else points.mean(axis=0))
         - points.mean(axis=0),
-        noise_m=float(np.sqrt(variance_m2 * scatter / count)),
+        noise_m=float(np.sqrt(noise_m2)),
     )
 
 
@@ -135,9 +143,17 @@ def _shares(nodes_m: Float64, points_m: Float64) -> tuple[Indices, Float64]:
     return index.view(np.intp), share / share.sum(axis=1, keepdims=True)
 
 
+def _products(node: Indices, share: Float64, count: int) -> tuple[Indices, Float64]:
+    """Return places in a (K, K) matrix and what each point adds there, half of a symmetric one."""
+    first, second = np.triu_indices(node.shape[1])
+    halved = np.where(first == second, 0.5, 1.0)
+    return node[:, first] * count + node[:, second], halved * share[:, first] * share[:, second]
+
+
 def _normal_equation(
     node: Indices,
     share: Float64,
+    both: tuple[Indices, Float64],
     point: Indices,
     toward: Float64,
     weight: Float64,
@@ -149,8 +165,7 @@ def _normal_equation(
     A row says that its point moves by `wanted_m` along `toward`. The rows of one point are added
     first, as they share its nodes.
     """
-    places = (node[:, :, None] * count + node[:, None]).ravel()
-    products = share[:, :, None] * share[:, None]
+    places, products = both
     weighted = toward * weight[:, None]
     normal = np.empty((count, 3, count, 3))
     wanted = np.empty((count, 3))
@@ -159,9 +174,23 @@ def _normal_equation(
         wanted[:, i] = np.bincount(node.ravel(), (share * at_point[:, None]).ravel(), count)
         for j in range(i + 1):
             at_point = np.bincount(point, weighted[:, i] * toward[:, j], len(node))
-            block = np.bincount(places, (products * at_point[:, None, None]).ravel(), count**2)
-            normal[:, i, :, j] = normal[:, j, :, i] = block.reshape(count, count)
+            half = np.bincount(places.ravel(), (products * at_point[:, None]).ravel(), count**2)
+            half = half.reshape(count, count)
+            normal[:, i, :, j] = normal[:, j, :, i] = half + half.T
     return normal.reshape(3 * count, 3 * count), wanted.ravel()
+
+
+def _inverse(normal: Float64) -> Float64:
+    """Return the inverse of a symmetric positive definite matrix, by Cholesky's factors.
+
+    LinAlgError if it is not positive definite.
+    """
+    factor, failed_at = lapack.dpotrf(normal)
+    if failed_at:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    upper = np.triu(lapack.dpotri(factor)[0])
+    inverse: Float64 = upper + np.triu(upper, 1).T
+    return inverse
 
 
 def change_text(change: ShapeChange, R_D: Float64) -> str:

@@ -226,8 +226,17 @@ def near_cut_edge(
     """
     if is_cut is None or not is_cut.any():
         return np.zeros(len(points_m), dtype=np.bool_)
-    distance_m, _ = nearest(KdTree(cloud_m[is_cut]), points_m)
-    return distance_m < _CUT_BAND_SPACINGS * spacing_m
+    edge_m, band_m = cloud_m[is_cut], _CUT_BAND_SPACINGS * spacing_m
+    # Few points are in the box of the edge, and only these are searched for.
+    may_be_near = np.ones(len(points_m), np.bool_)
+    for at_m, low_m, high_m in zip(points_m.T, edge_m.min(axis=0), edge_m.max(axis=0), strict=True):
+        may_be_near &= (at_m >= low_m - band_m) & (at_m <= high_m + band_m)
+    candidates = np.flatnonzero(may_be_near)
+    is_near = np.zeros(len(points_m), np.bool_)
+    if len(candidates):
+        distance_m, _ = nearest(KdTree(edge_m), points_m.take(candidates, axis=0))
+        is_near[candidates] = distance_m < band_m
+    return is_near
 
 
 def point_spacing_m(tree: KdTree, points_m: Float64) -> float:

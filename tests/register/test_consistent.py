@@ -6,6 +6,7 @@ import pytest
 from handcal import solve_eye_shift
 from handcal.lab.bench.trials import mean_length_mm, trial_alignment, trial_hand
 from handcal.lab.study.trials import floor_error_m, solve_trial
+from handcal.register import consistent
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
@@ -145,6 +146,17 @@ def test_the_covariance_grows_with_turn_and_noise() -> None:
         return float(np.sqrt(np.trace(solved.covariance_m2)))
 
     assert sigma_m(0.0, 0.0005) < sigma_m(0.0, 0.003) < sigma_m(5.0, 0.003) < sigma_m(9.0, 0.003)
+
+
+def test_a_share_of_the_pairs_gives_the_shift_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = _measured(1, 3.0)
+    of_all = solve_trial(made, "consistent")
+    monkeypatch.setattr(consistent, "_FITTED", 400)
+    of_some = solve_trial(made, "consistent")
+    assert of_some.inlier_ratio == of_all.inlier_ratio
+    moved_m = of_some.shift_m - of_all.shift_m
+    assert np.any(moved_m != 0.0)
+    assert moved_m @ np.linalg.solve(of_all.covariance_m2, moved_m) < 0.1
 
 
 def test_what_is_cut_is_no_inlier() -> None:

@@ -79,6 +79,19 @@ def test_near_cut_edge_knows_nothing_without_cuts(square_m: Float64) -> None:
     assert not near_cut_edge(square_m, square_m, none, PITCH_M).any()
 
 
+def test_near_cut_edge_as_by_all_distances() -> None:
+    """Only candidates in a box about the edge are searched for; the answer is that of all."""
+    rng = np.random.default_rng(0)
+    for spacing_m in (0.0005, 0.004):
+        cloud_m, points_m = rng.uniform(0.0, 0.1, (300, 3)), rng.uniform(-0.01, 0.11, (400, 3))
+        is_cut = cloud_m @ [0.6, 0.8, 0.0] > 0.1
+        apart_m = np.linalg.norm(points_m[:, None] - cloud_m[is_cut], axis=2).min(axis=1)
+        near = near_cut_edge(points_m, cloud_m, is_cut, spacing_m)
+        np.testing.assert_array_equal(near, apart_m < 1.5 * spacing_m)
+    far_m = points_m + 1.0
+    assert not near_cut_edge(far_m, cloud_m, is_cut, spacing_m).any()
+
+
 def test_thinning_takes_some_of_the_points_always_the_same(square_m: Float64) -> None:
     one, again = (describe_surface(square_m, None, 300) for _ in range(2))
     assert 150 < len(one.points_m) < 450

@@ -28,7 +28,7 @@ class BenchSettings:
     """Repetitions of timing ``paper``."""
     peer_points: tuple[int, ...] = (1000, 2000, 5000, 20_000, 200_000)
     """Sizes of the clouds registered beside other libraries; the middle one is the usual one."""
-    peer_trials: int = 12
+    peer_trials: int = 48
     """Alignments of each size for these."""
     offline_rigs: int = 1
     """Rigs calibrated from rendered photographs, which takes minutes for each."""
