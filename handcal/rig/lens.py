@@ -116,6 +116,16 @@ def predict(points_m: Float64, pose: Float64, camera: Camera) -> tuple[Float64, 
     return np.asarray(pixels, np.float64).reshape(-1, 2), by
 
 
+def pixels_of(points_m: Float64, pose: Float64, camera: Camera) -> Float64:
+    """Return the pixels that `predict` returns, without derivatives, in a fraction of the time."""
+    project = cv2.fisheye if isinstance(camera, FisheyeIntrinsics) else cv2
+    coefficients = np.array(camera.distortion or (0.0,) * 5)
+    pixels, _ = project.projectPoints(
+        points_m[:, None], pose[:3], pose[3:], camera_matrix_of(camera), coefficients
+    )
+    return np.asarray(pixels, np.float64).reshape(-1, 2)
+
+
 def camera_matrix_of(camera: Camera) -> Float64:
     """Return the (3, 3) camera matrix K."""
     return np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])

@@ -15,7 +15,7 @@ from handcal.rig.lens import (
     LensModel,
     as_lens,
     first_pose,
-    predict,
+    pixels_of,
     solved_parameters,
     undistorted_camera,
 )
@@ -134,7 +134,7 @@ def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
         camera = undistorted_camera(lens, few[0].size, width * few[0].size[0])
         poses = [first_pose(seen, camera) for seen in few]
         off_px = [
-            seen.pixels - predict(seen.points_m, as_vector(pose), camera)[0]
+            seen.pixels - pixels_of(seen.points_m, as_vector(pose), camera)
             for seen, pose in zip(few, poses, strict=True)
             if pose is not None
         ]
@@ -146,7 +146,7 @@ def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
 
 
 def _rms_px(seen: BoardView, pose: Float64, fit: Adjusted) -> float:
-    off_px = seen.pixels - predict(seen.points_m, pose, fit.setup.cameras[0])[0]
+    off_px = seen.pixels - pixels_of(seen.points_m, pose, fit.setup.cameras[0])
     return float(np.sqrt(np.mean(np.sum(off_px**2, axis=1))))
 
 
