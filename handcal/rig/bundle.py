@@ -24,8 +24,8 @@ from handcal.rig.fit import marginal_covariance
 from handcal.rig.lens import (
     Camera,
     LensModel,
+    derivatives_at,
     parameters,
-    predict,
     solved_parameters,
     with_parameters,
 )
@@ -288,10 +288,9 @@ class _Problem:
                 (R_place,), (J_place,) = _rotations(place[None, :3])
                 replaced_m = points_m @ R_place.T
                 points_m = replaced_m + place[3:]
-            pixels, by = predict(points_m, np.zeros(6), camera)
-            by_point = by[:, 3:6]
+            pixels, by_point, by_parameters = derivatives_at(points_m, camera)
             of_place = 6 if self._has_place and place is not None else 0
-            rows[:, of_place:-7] = by[:, [6 + free for free in corners.free]]
+            rows[:, of_place:-7] = by_parameters[:, corners.free]
             if place is not None:
                 if of_place:
                     rows[:, :3] = _crossed(replaced_m, by_point) @ J_place
