@@ -128,7 +128,7 @@ def best_lens(fits: Sequence[LensFit]) -> LensFit:
 
 def _is_worse(one: LensFit, least: LensFit) -> bool:
     more_px2 = one.held_out_px2 - least.held_out_px2
-    return float(more_px2.mean()) > float(more_px2.std(ddof=1)) / np.sqrt(len(more_px2))
+    return bool(more_px2.mean() > more_px2.std(ddof=1) / np.sqrt(len(more_px2)))
 
 
 def _judged(lens: LensModel, fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> LensFit:

@@ -117,8 +117,8 @@ def each_alone(
     """
     poses, off_px = [], []
     for camera, views, known in (
-        (depth, [pair.depth for pair in both.values()], start and start.T_D_B),
-        (headset, [pair.headset for pair in both.values()], start and start.T_H_B),
+        (depth, [pair.depth for pair in both.values()], start.T_D_B if start else None),
+        (headset, [pair.headset for pair in both.values()], start.T_H_B if start else None),
     ):
         found = []
         for number, (name, seen) in enumerate(zip(both, views, strict=True)):

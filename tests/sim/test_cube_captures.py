@@ -100,14 +100,14 @@ def test_a_cube_too_large_for_the_display_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_prior_along_the_line_of_sight_is_the_cameras_stand() -> None:
-    def sigmas_m(settings: CaptureSettings) -> list[float]:
-        return np.sqrt(np.diag(eye_prior(cube_prior(settings)).covariance_m2)[:3]).tolist()
+    def sigmas_m(settings: CaptureSettings) -> Float64:
+        return np.sqrt(np.diag(eye_prior(cube_prior(settings)).covariance_m2)[:3])
 
     settings = CaptureSettings(aside_m=0.003, place_sigma_m=0.0004)
     aside_m = np.hypot(0.003, 0.0004)
     assert sigmas_m(settings) == pytest.approx([aside_m, aside_m, 0.0004])
-    wearer = np.sqrt(np.diag(eye_prior().covariance_m2)[:3])
-    assert sigmas_m(replace(settings, prior="wearer")) == pytest.approx(wearer.tolist())
+    wearer_m = np.sqrt(np.diag(eye_prior().covariance_m2)[:3])
+    assert sigmas_m(replace(settings, prior="wearer")) == pytest.approx(wearer_m)
 
 
 @pytest.mark.campaign
