@@ -92,7 +92,9 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     assert np.ptp(sight.corners_px, axis=0).max() < camera.width / 2
 
 
-def test_a_camera_that_fails_is_told_and_it_can_be_started_again(qtbot: QtBot, make: Make) -> None:
+def test_the_failure_of_a_camera_is_shown_and_it_can_be_started_again(
+    qtbot: QtBot, make: Make
+) -> None:
     def fail(_order: TrackingOrder, connect: Any, camera: Any, *_: Any) -> CubeTracking:
         assert connect is paired_headset
         assert camera is depth_camera
