@@ -32,6 +32,8 @@ class CubeEntries(CubeTestSettings):
     drawn: str = ", ".join(_PLAN.drawn)
     """Names with commas between them, as of `CapturePlan`."""
     with_grid: bool = _PLAN.with_grid
+    tracked_by: str = "network"
+    """``network``, ``camera`` or ``virtual``: what tracks the cube live."""
 
     @property
     def plan(self) -> CapturePlan:

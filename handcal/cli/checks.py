@@ -82,7 +82,9 @@ def doctor(arguments: argparse.Namespace) -> None:
         findings += _headset_findings(arguments)
     for finding in findings:
         advice = f"\n         → {finding.advice}" if finding.advice else ""
-        console.print(f"{finding.health.value:8} {finding.what}: {finding.found}{advice}")
+        console.print(
+            f"{finding.health.value:8} {finding.what}: {finding.found}{advice}", markup=False
+        )
     if any(finding.health is Health.BROKEN for finding in findings):
         raise HandcalError("fix the problems listed above and try again")
 

@@ -199,6 +199,12 @@ def capture(arguments: argparse.Namespace) -> None:
         default=1,
         help="alignments of the hand at each position",
     ),
+    arg(
+        "--prior",
+        choices=("camera", "wearer"),
+        default="camera",
+        help="prior of the solver: the placement of the camera, or the eye box of wearers",
+    ),
     *_RIG_AND_EYE,
 )
 def simulate(arguments: argparse.Namespace) -> None:
@@ -212,6 +218,7 @@ def simulate(arguments: argparse.Namespace) -> None:
         seed=arguments.seed,
         poses=arguments.poses,
         alignments=arguments.alignments,
+        prior=arguments.prior,
     )
     with show_progress() as progress:
         render_captures(settings, arguments.folder, progress)

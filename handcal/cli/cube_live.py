@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.display_check import network_server
@@ -19,10 +18,7 @@ from handcal.types import EYES
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from handcal.link.server import HeadsetServer
-    from handcal.sim.cube_bench import CubeBench
-    from handcal.station.cube_tracking import CubeTracker
-    from handcal.types import Eye, Float64, Rig
+    from handcal.types import Eye, Float64
 
 _STEP_MM = 0.25
 _KEYS: Mapping[str, tuple[int, float]] = {
@@ -58,12 +54,6 @@ _CUBE = (
 )
 
 
-class _Setup(NamedTuple):
-    server: HeadsetServer | None
-    tracker: CubeTracker
-    bench: CubeBench | None
-
-
 @command(
     arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)"),
     arg(
@@ -84,31 +74,23 @@ class _Setup(NamedTuple):
 )
 def track(arguments: argparse.Namespace) -> None:
     """Track a cube with the depth camera, and have the headset draw it where it is."""
-    import numpy as np
+    from handcal.station.cube_tracking import TrackingOrder, track_cube
 
-    from handcal.rig.example import example_rig
-    from handcal.rig.rig_file import read_rig
-    from handcal.station.cube_tracking import run_cube_tracking
-    from handcal.station.drawing import Drawing
-
-    rig = example_rig() if arguments.rig is None else read_rig(arguments.rig)
-    with (
-        _setup(arguments, rig, not arguments.no_headset) as setup,
-        until_interrupted() as is_stopped,
-        show_progress(is_stopped) as progress,
-    ):
-        if setup.server is not None:
-            offline_m = {eye: np.zeros(3) for eye in EYES}
-            Drawing(rig, setup.server, "").send(offline_m)
-        found = run_cube_tracking(setup.tracker, setup.server, arguments.seconds, progress)
-        pose = found.tracked[-1].T_W_T if found.tracked else None
-        error_mm = None
-        if pose is not None and setup.bench is not None:
-            error_mm = 1e3 * _apart_m(pose, setup.bench.T_W_T)
+    with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
+        found = track_cube(
+            TrackingOrder(arguments.rig, arguments.cube, arguments.seconds),
+            None if arguments.no_headset else lambda: network_server(arguments),
+            None
+            if arguments.camera == "simulator"
+            else lambda: open_source(arguments.camera, realsense_of(arguments)),
+            progress=progress,
+        )
+    pose = found.tracked[-1].T_W_T if found.tracked else None
+    error_mm = None if found.error_m is None else 1e3 * found.error_m
     jitter_m = found.jitter_m
     result = {
         "frames": found.frames,
-        "tracked": len(found.tracked),
+        "tracked": found.poses,
         "rate_hz": found.rate_hz,
         "jitter_mm": None if jitter_m is None else 1e3 * jitter_m,
         "is_at_rest": bool(found.tracked and found.tracked[-1].is_at_rest),
@@ -116,7 +98,7 @@ def track(arguments: argparse.Namespace) -> None:
         "error_mm": error_mm,
     }
     save(arguments.json, result)
-    console.print(f"{len(found.tracked)} poses in {found.frames} frames")
+    console.print(f"{found.poses} poses in {found.frames} frames")
     if jitter_m is not None:
         console.print(f"At rest it moves by {1e3 * jitter_m:.2f} mm RMS from frame to frame")
     if error_mm is not None:
@@ -171,30 +153,6 @@ def trials(arguments: argparse.Namespace) -> None:
     console.print(shown)
 
 
-@contextmanager
-def _setup(arguments: argparse.Namespace, rig: Rig, has_headset: bool) -> Iterator[_Setup]:
-    """Yield the link, the tracker and, with the simulator, the simulated wearer."""
-    import numpy as np
-
-    from handcal.rig.cube import Cube
-    from handcal.rig.cube_file import read_cube
-    from handcal.sim.cube_bench import simulated_wearer
-    from handcal.station.cube_tracking import CubeTracker
-
-    cube = Cube() if arguments.cube is None else read_cube(arguments.cube)
-    if arguments.camera == "simulator":
-        with simulated_wearer(rig, cube, 1) as (server, bench):
-            tracker = CubeTracker(bench, cube, rig.T_H_D, server.pose_at_host_ns)
-            yield _Setup(server, tracker, bench)
-        return
-    with open_source(arguments.camera, realsense_of(arguments)) as camera:
-        if not has_headset:
-            yield _Setup(None, CubeTracker(camera, cube, rig.T_H_D, lambda _: np.eye(4)), None)
-            return
-        with network_server(arguments) as server:
-            yield _Setup(server, CubeTracker(camera, cube, rig.T_H_D, server.pose_at_host_ns), None)
-
-
 def _ask_to_place(depth_m: float) -> None:
     console.input(
         f"Put the cube {depth_m:g} m from the eyes, with two or three faces towards them, then "
@@ -216,7 +174,3 @@ def _adjust(eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Floa
         shift_m = moved
         draw(shift_m)
     return shift_m
-
-
-def _apart_m(a: Float64, b: Float64) -> float:
-    return float(((a[:3, 3] - b[:3, 3]) ** 2).sum() ** 0.5)

@@ -94,6 +94,8 @@ class CubeTestSettings:
     """Poses of the cube at each position of the camera."""
     alignments: int = 1
     """Alignments of the hand at each position, for rendered captures."""
+    prior: Literal["camera", "wearer"] = "camera"
+    """For rendered captures, as in `CaptureSettings`."""
 
 
 @dataclass(frozen=True, slots=True)

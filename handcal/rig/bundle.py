@@ -24,8 +24,8 @@ from handcal.rig.fit import marginal_covariance
 from handcal.rig.lens import (
     Camera,
     LensModel,
+    derivatives_at,
     parameters,
-    predict,
     solved_parameters,
     with_parameters,
 )
@@ -128,10 +128,10 @@ def adjust(
     """
     beside = [_beside(one.seen) for one in sightings]
     whole = _Problem(sightings, lenses, solve_place and setup.place is not None)
-    problem, kept = whole, [np.ones(len(near), np.bool_) for near in beside]
+    problem, kept, linear = whole, [np.ones(len(near), np.bool_) for near in beside], None
     for least_gain in _LEAST_GAINS:
-        setup = problem.minimised(setup, steps, least_gain)
-        off_px = whole.residuals(setup)
+        setup, linear = problem.minimised(setup, steps, least_gain, linear)
+        off_px = whole.residuals(linear if problem is whole else whole.linear(setup))
         before, kept = kept, _regular(off_px, beside)
         if not all(np.array_equal(old, new) for old, new in zip(before, kept, strict=True)):
             some = [
@@ -139,16 +139,19 @@ def adjust(
                 for one, keep in zip(sightings, kept, strict=True)
             ]
             problem = _Problem(some, lenses, solve_place and setup.place is not None)
+            linear = None
         elif least_gain == _LEAST_GAINS[-1]:
             break
-    return Adjusted(setup, tuple(off_px), tuple(kept), problem.blocks(setup), whole.is_coefficient)
+    linear = problem.linear(setup) if linear is None else linear
+    return Adjusted(setup, tuple(off_px), tuple(kept), problem.blocks(linear), whole.is_coefficient)
 
 
 def linearised(
     sightings: Sequence[Sighting], setup: Setup, lenses: Sequence[LensModel | None]
 ) -> tuple[tuple[Float64, Float64, Float64], ...]:
     """Return `Adjusted.blocks` of a setup as it is, with the second camera's pose as unknown."""
-    return _Problem(sightings, lenses, setup.place is not None).blocks(setup)
+    problem = _Problem(sightings, lenses, setup.place is not None)
+    return problem.blocks(problem.linear(setup))
 
 
 def _beside(seen: BoardView) -> NDArray[np.int64]:
@@ -161,15 +164,20 @@ def _regular(
     off_px: Sequence[Float64], beside: Sequence[NDArray[np.int64]]
 ) -> list[NDArray[np.bool_]]:
     """Return which corners to keep: all if too many are far off."""
-    alone_px = [
-        off - np.median(off[near], axis=1) for off, near in zip(off_px, beside, strict=True)
-    ]
+    alone_px = [off - _median(off[near]) for off, near in zip(off_px, beside, strict=True)]
     sigma_px = 1.4826 * float(np.median(np.abs(np.concatenate(alone_px))))
     limit_px = _STRAY_SIGMAS * max(_LEAST_SIGMA_PX, sigma_px)
     strays = [np.linalg.norm(alone, axis=1) > limit_px for alone in alone_px]
     of_view, of_all = _MAX_STRAY_SHARES
     is_few = np.concatenate(strays).mean() <= of_all
     return [~(stray & is_few & (stray.mean() <= of_view)) for stray in strays]
+
+
+def _median(values: Float64) -> Float64:
+    """Return `np.median` over the middle axis of (N, K, 2), for small K several times as fast."""
+    count = values.shape[1]
+    ordered = np.sort(values, axis=1)
+    return 0.5 * (ordered[:, (count - 1) // 2] + ordered[:, count // 2])
 
 
 class _Corners(NamedTuple):
@@ -206,46 +214,58 @@ class _Problem:
         coefficients = [number >= 4 for free in self._free for number in free]
         self.is_coefficient = np.array([False] * (6 * has_place) + coefficients, np.bool_)
 
-    def minimised(self, setup: Setup, steps: int, least_gain: float) -> Setup:
-        """Return the setup of least squares."""
-        linear = self._linear(setup)
+    def minimised(
+        self, setup: Setup, steps: int, least_gain: float, linear: list[Float64] | None = None
+    ) -> tuple[Setup, list[Float64]]:
+        """Return the setup of least squares, and `linear` of it.
+
+        Parameters
+        ----------
+        setup : Setup
+        steps : int
+        least_gain : float
+        linear : list of float64, optional
+            Of the given setup, if known.
+        """
+        linear = self.linear(setup) if linear is None else linear
         cost, damping = _cost(linear), 1e-3
         for _ in range(steps):
-            normal = self._normal(linear)
+            normal, enough = self._normal(linear), max(damping / 10.0, 1e-12)
             while damping < 1e10:
                 trial = self._moved(setup, *_step(*normal, damping))
-                linear = self._linear(trial)
-                gain = cost - _cost(linear)
+                of_trial = self.linear(trial)
+                gain = cost - _cost(of_trial)
                 if gain >= 0.0:
                     break
-                damping *= 10.0
+                # Less would be refused the next time, too.
+                damping = enough = 10.0 * damping
             else:
-                return setup
-            setup, cost, damping = trial, cost - gain, max(damping / 10.0, 1e-12)
+                return setup, linear
+            setup, linear, cost, damping = trial, of_trial, cost - gain, enough
             if gain <= least_gain * cost:
                 break
-        return setup
+        return setup, linear
 
-    def residuals(self, setup: Setup) -> list[Float64]:
+    def residuals(self, linear: Sequence[Float64]) -> list[Float64]:
         """Return detected minus predicted corners, (N, 2) each."""
-        linear, found = self._linear(setup), {}
+        found = {}
         for corners, of_camera in zip(self._corners, linear, strict=True):
             for sighting, _, part in corners.parts:
                 found[sighting] = of_camera[_rows(part), -1].reshape(-1, 2)
         return [found[number] for number in range(len(found))]
 
-    def blocks(self, setup: Setup) -> tuple[tuple[Float64, Float64, Float64], ...]:
+    def blocks(self, linear: Sequence[Float64]) -> tuple[tuple[Float64, Float64, Float64], ...]:
         """Return `Adjusted.blocks`."""
         parts: list[list[Float64]] = [[] for _ in range(self._frames)]
-        for corners, linear in zip(self._corners, self._linear(setup), strict=True):
-            wide = np.zeros((len(linear), self._count + 7))
-            wide[:, [*corners.used, *range(self._count, self._count + 7)]] = linear
+        for corners, of_camera in zip(self._corners, linear, strict=True):
+            wide = np.zeros((len(of_camera), self._count + 7))
+            wide[:, [*corners.used, *range(self._count, self._count + 7)]] = of_camera
             for _, frame, part in corners.parts:
                 parts[frame].append(wide[_rows(part)])
         of_frames = [np.vstack(part) for part in parts]
         return tuple((one[:, :-7], one[:, -7:-1], one[:, -1]) for one in of_frames)
 
-    def _linear(self, setup: Setup) -> list[Float64]:
+    def linear(self, setup: Setup) -> list[Float64]:
         """Return for each camera, (2 N, Q + 7), of each corner's x and y the derivatives.
 
         By the shared parameters that concern the camera and by the frame's pose; in the last column
@@ -255,30 +275,32 @@ class _Problem:
         boards = np.stack(setup.poses)
         R, J = _rotations(boards[:, :3])
         for number, (camera, corners) in enumerate(zip(setup.cameras, self._corners, strict=True)):
-            if not corners.parts:
-                found.append(np.empty((0, len(corners.used) + 7)))
+            rows = np.empty((2 * len(corners.pixels), len(corners.used) + 7))
+            found.append(rows)
+            if not len(rows):
                 continue
-            turned_m = np.concatenate(
-                [corners.points_m[part] @ R[frame].T for _, frame, part in corners.parts]
-            )
+            turned_m = np.empty_like(corners.points_m)
+            for _, frame, part in corners.parts:
+                turned_m[part] = corners.points_m[part] @ R[frame].T
             points_m = turned_m + boards[corners.frame, 3:]
             place = setup.place if number > 0 else None
             if place is not None:
                 (R_place,), (J_place,) = _rotations(place[None, :3])
                 replaced_m = points_m @ R_place.T
                 points_m = replaced_m + place[3:]
-            pixels, by = predict(points_m, np.zeros(6), camera)
-            by_point = by[:, 3:6]
-            shared = [by[:, [6 + free for free in corners.free]]]
+            pixels, by_point, by_parameters = derivatives_at(points_m, camera)
+            of_place = 6 if self._has_place and place is not None else 0
+            rows[:, of_place:-7] = by_parameters[:, corners.free]
             if place is not None:
-                if self._has_place:
-                    shared = [_crossed(replaced_m, by_point) @ J_place, by_point, *shared]
+                if of_place:
+                    rows[:, :3] = _crossed(replaced_m, by_point) @ J_place
+                    rows[:, 3:6] = by_point
                 by_point = by_point @ R_place
             by_turn = _crossed(turned_m, by_point)
             for _, frame, part in corners.parts:
-                by_turn[_rows(part)] = by_turn[_rows(part)] @ J[frame]
-            off_px = (corners.pixels - pixels).reshape(-1, 1)
-            found.append(np.hstack([*shared, by_turn, by_point, off_px]))
+                rows[_rows(part), -7:-4] = by_turn[_rows(part)] @ J[frame]
+            rows[:, -4:-1] = by_point
+            rows[:, -1] = (corners.pixels - pixels).ravel()
         return found
 
     def _normal(
@@ -401,9 +423,9 @@ def _crossed(points: Float64, rows: Float64) -> Float64:
 
     A row of derivatives by a point becomes one by a small rotation of the point.
     """
-    x, y, z = np.repeat(points, 2, axis=0).T
-    a, b, c = rows.T
-    return np.column_stack([y * c - z * b, z * a - x * c, x * b - y * a])
+    x, y, z = points.T[:, :, None]
+    a, b, c = rows.reshape(-1, 2, 3).transpose(2, 0, 1)
+    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a], axis=-1).reshape(-1, 3)
 
 
 def as_vector(T: Float64) -> Float64:

@@ -15,7 +15,7 @@ from handcal.rig.lens import (
     LensModel,
     as_lens,
     first_pose,
-    predict,
+    pixels_of,
     solved_parameters,
     undistorted_camera,
 )
@@ -25,8 +25,8 @@ from handcal.types import Float64
 # Focal lengths tried, in widths of the image, and the views that judge them.
 _FOCAL_WIDTHS = np.geomspace(0.25, 4.0, 9)
 _START_VIEWS = 8
-_AS_GOOD = 1.05
-_FISHEYE_GAIN = 2.0
+# In the least held-out error, and in the least uncertainty at the image's edge.
+_NEAR, _UNCERTAIN = 1.05, 2.0
 # Prism and tilted are not among them: their coefficients shift the image's middle and so turn the
 # camera, by half a degree on real wide-angle images, for a residual smaller by 7 %.
 _COMPARED: tuple[LensModel, ...] = ("none", "radial", "full", "rational", "fisheye")
@@ -38,10 +38,9 @@ class LensFit:
 
     lens: LensModel
     fit: Adjusted
-    held_out_px: float
-    """RMS residual of each view with intrinsics from the others, to first order; over the corners
-    that all models compared have kept."""
-
+    held_out_px2: Float64
+    """(V,); mean square residual of each view with intrinsics from the others, to first order; over
+    the corners that all models compared have kept."""
     edge_px: float
     """`ProjectionUncertainty.edge_px`; infinite if the views do not determine the camera."""
 
@@ -49,6 +48,11 @@ class LensFit:
     def camera(self) -> Camera:
         """The camera solved for."""
         return self.fit.setup.cameras[0]
+
+    @property
+    def held_out_px(self) -> float:
+        """Square root of the mean of `held_out_px2`."""
+        return float(np.sqrt(np.mean(self.held_out_px2)))
 
 
 def fit_camera(
@@ -104,17 +108,27 @@ def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
 
 
 def best_lens(fits: Sequence[LensFit]) -> LensFit:
-    """Return the model with the least uncertainty, of those whose held-out error is near the least.
+    """Return the simplest model whose held-out error does not differ from the least.
 
-    Near is within 5 %. A model with coefficients that these views do not determine has a large
-    uncertainty where the board was not seen. A fisheye must halve the uncertainty of a pinhole,
-    because not everything can use one.
+    It does not if the difference, by views, is within one standard error (Breiman et al. 1984,
+    Classification and Regression Trees, section 3.4.3). Left out beforehand are models whose error
+    is not near the least, within 5 %, and those with more than twice the least uncertainty at the
+    image's edge: their coefficients are not determined where the board was not seen. A fisheye is
+    taken if no pinhole remains, because not everything can use one.
     """
     least_px = min(one.held_out_px for one in fits)
-    good = [one for one in fits if one.held_out_px <= _AS_GOOD * least_px]
-    return min(
-        good, key=lambda one: one.edge_px * (_FISHEYE_GAIN if one.lens == "fisheye" else 1.0)
-    )
+    near = [one for one in fits if one.held_out_px <= _NEAR * least_px]
+    edge_px = min(one.edge_px for one in near)
+    known = [one for one in near if one.edge_px <= _UNCERTAIN * edge_px] or near
+    known = [one for one in known if one.lens != "fisheye"] or known
+    least = min(known, key=lambda one: one.held_out_px)
+    as_good = [one for one in known if one is least or not _is_worse(one, least)]
+    return min(as_good, key=lambda one: _COMPARED.index(one.lens))
+
+
+def _is_worse(one: LensFit, least: LensFit) -> bool:
+    more_px2 = one.held_out_px2 - least.held_out_px2
+    return bool(more_px2.mean() > more_px2.std(ddof=1) / np.sqrt(len(more_px2)))
 
 
 def _judged(lens: LensModel, fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> LensFit:
@@ -123,7 +137,7 @@ def _judged(lens: LensModel, fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -
     if covariance is not None:
         solved = solved_parameters(lens)
         edge_px = projection_uncertainty(fit.setup.cameras[0], solved, covariance).edge_px
-    return LensFit(lens, fit, _held_out_px(fit, kept), edge_px)
+    return LensFit(lens, fit, _held_out_px2(fit, kept), edge_px)
 
 
 def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
@@ -134,7 +148,7 @@ def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
         camera = undistorted_camera(lens, few[0].size, width * few[0].size[0])
         poses = [first_pose(seen, camera) for seen in few]
         off_px = [
-            seen.pixels - predict(seen.points_m, as_vector(pose), camera)[0]
+            seen.pixels - pixels_of(seen.points_m, as_vector(pose), camera)
             for seen, pose in zip(few, poses, strict=True)
             if pose is not None
         ]
@@ -146,12 +160,12 @@ def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
 
 
 def _rms_px(seen: BoardView, pose: Float64, fit: Adjusted) -> float:
-    off_px = seen.pixels - predict(seen.points_m, pose, fit.setup.cameras[0])[0]
+    off_px = seen.pixels - pixels_of(seen.points_m, pose, fit.setup.cameras[0])
     return float(np.sqrt(np.mean(np.sum(off_px**2, axis=1))))
 
 
-def _held_out_px(fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> float:
-    """Return the RMS residual of each view when it is left out, over the corners in `kept`.
+def _held_out_px2(fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> Float64:
+    """Return the mean square residual of each view when left out, over the corners in `kept`.
 
     The camera moves by one Gauss-Newton step when the view is left out; its own pose is then
     solved again. This is the prediction sum of squares (Allen 1974) by views.
@@ -170,5 +184,5 @@ def _held_out_px(fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> float:
         rest = information * np.outer(scale, scale) - scaled.T @ scaled
         move = np.linalg.lstsq(rest, scaled.T @ residuals, rcond=1e-13)[0]
         off_px = (residuals + scaled @ move).reshape(-1, 2)
-        squares.append(np.sum(off_px**2, axis=1)[common[mine]])
-    return float(np.sqrt(np.mean(np.concatenate(squares))))
+        squares.append(np.mean(np.sum(off_px**2, axis=1)[common[mine]]))
+    return np.array(squares)

@@ -145,7 +145,7 @@ def calibrate_stereo(
         for number, name in enumerate(both)
     }
     if lenses != [None, None]:
-        alone = each_alone(both, depth, headset)
+        alone = each_alone(both, depth, headset, alone)
     worst = _worst(both, fit, T_H_D, T_D_B)
     apart = differences(T_H_D, alone.T_H_D)
     covariance = fit.covariance()

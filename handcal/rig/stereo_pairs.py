@@ -98,8 +98,17 @@ def check_sizes(both: Mapping[str, Pair], depth: Camera | None, headset: Camera 
             )
 
 
-def each_alone(both: Mapping[str, Pair], depth: Camera, headset: Camera) -> Alone:
+def each_alone(
+    both: Mapping[str, Pair], depth: Camera, headset: Camera, start: Alone | None = None
+) -> Alone:
     """Solve the board's pose in each image by itself.
+
+    Parameters
+    ----------
+    both : mapping of name to Pair
+    depth, headset : Camera
+    start : Alone, optional
+        The same with similar cameras.
 
     Raises
     ------
@@ -107,13 +116,13 @@ def each_alone(both: Mapping[str, Pair], depth: Camera, headset: Camera) -> Alon
         If an image has no solution.
     """
     poses, off_px = [], []
-    for camera, views in (
-        (depth, [pair.depth for pair in both.values()]),
-        (headset, [pair.headset for pair in both.values()]),
+    for camera, views, known in (
+        (depth, [pair.depth for pair in both.values()], start.T_D_B if start else None),
+        (headset, [pair.headset for pair in both.values()], start.T_H_B if start else None),
     ):
         found = []
-        for name, seen in zip(both, views, strict=True):
-            T = first_pose(seen, camera)
+        for number, (name, seen) in enumerate(zip(both, views, strict=True)):
+            T = first_pose(seen, camera) if known is None else known[number]
             if T is None:
                 raise ViewsError(f"the board's pose in pair {name} cannot be solved: drop it")
             found.append(as_vector(T))

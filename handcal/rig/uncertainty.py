@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from handcal.geometry import rigid
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import Setup, Sighting, board_in, linearised
-from handcal.rig.lens import Camera, LensModel, predict, to_plane
+from handcal.rig.lens import Camera, LensModel, pixels_of, predict, to_plane
 from handcal.types import Float64, freeze
 
 GRID = (12, 9)
@@ -164,7 +164,7 @@ def next_pair(
         trial = replace(setup, poses=(pose,))
         of_pair = []
         for number, camera in enumerate(setup.cameras):
-            pixels = predict(points_m, board_in(trial, 0, number), camera)[0]
+            pixels = pixels_of(points_m, board_in(trial, 0, number), camera)
             seen = _inside(pixels, camera)
             ids = np.flatnonzero(seen)
             view = BoardView(points_m[seen], pixels[seen], (camera.width, camera.height), ids, 2.0)
@@ -216,7 +216,7 @@ def candidate_views(camera: Camera, points_m: Float64) -> Iterator[tuple[str, Fl
                 in_front = (points_m @ turn.T + pose[3:])[:, 2].min() > 0.1 * distance_m
                 if (
                     in_front
-                    and _inside(predict(points_m, pose, camera)[0], camera).mean()
+                    and _inside(pixels_of(points_m, pose, camera), camera).mean()
                     > _LEAST_SEEN_SHARE
                 ):
                     yield f"{where}, {how}, {100 * share:.0f} % of the image wide", pose

@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,6 +24,8 @@ from handcal.geometry import image_points, invert, project, rigid, transform
 from handcal.io.files import make_folder, sync_folder, write_json
 from handcal.io.images import write_png
 from handcal.progress import Progress
+from handcal.register.fuse import FuseSettings
+from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.register.results import SolveSettings, solve_session
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_file import write_cube
@@ -69,6 +72,9 @@ class CaptureSettings:
     """Distance from the centre of the eye box to the other positions."""
     place_sigma_m: float = 0.001
     """Standard deviation of the camera's position, each axis."""
+    prior: Literal["camera", "wearer"] = "camera"
+    """The solver's prior: the placement of the camera, which moves aside only; or the eye box of
+    wearers."""
     turn_sigma_rad: float = 0.02
     """Standard deviation of the camera's rotation relative to the display, about each axis."""
     points: int = 5000
@@ -182,7 +188,8 @@ class _Studio:
             )
             for _ in range(settings.alignments)
         ]
-        return solve_session(alignments, self._rig, SolveSettings()).eyes[settings.eye].shift_m
+        solve = SolveSettings(fuse=FuseSettings(prior=cube_prior(settings)))
+        return solve_session(alignments, self._rig, solve).eyes[settings.eye].shift_m
 
     def capture_display(self, shown: UInt8, T_E_C: Float64, rng: np.random.Generator) -> UInt8:
         """Return the camera's image of the display in the dark."""
@@ -228,6 +235,21 @@ class _Studio:
         raise CubeError(
             "the cube is not seen whole on the display and by the cameras: use a smaller one"
         )
+
+
+def cube_prior(settings: CaptureSettings) -> PriorSettings:
+    """Return the solver's prior of φ before the alignments.
+
+    A camera on a stand is moved aside on purpose, and stays where it was along the line of sight. A
+    wearer's eye does not: with the eye box as prior, alignments move φ along z by more than the
+    stand's error.
+    """
+    if settings.prior == "wearer":
+        return PriorSettings()
+    near_m2 = settings.place_sigma_m**2
+    aside_m2 = settings.aside_m**2 + near_m2
+    covariance_m2 = np.diag([aside_m2, aside_m2, near_m2] * 2)
+    return PriorSettings(learned=LearnedPrior((0.0,) * 6, tuple(covariance_m2.ravel().tolist()), 1))
 
 
 def some_cube_pose(display: EyeDisplay, depth_m: float, rng: np.random.Generator) -> Float64:

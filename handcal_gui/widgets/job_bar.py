@@ -20,6 +20,12 @@ _WHOLE = 1000
 class JobBar(QWidget):
     """Runs jobs one at a time; its space stays reserved in between.
 
+    Parameters
+    ----------
+    end : str, optional
+        Text of the button that ends a job; default: Cancel.
+    parent : QWidget or None
+
     Attributes
     ----------
     failed : Signal(str)
@@ -30,14 +36,14 @@ class JobBar(QWidget):
     failed = Signal(str)
     busy_changed = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, end: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._job: Job | None = None
         self._then: Callable[[Any], object] = lambda _: None
         self._doing: QLabel = with_name(ElidedLabel(), "doing")
         self._bar = with_name(QProgressBar(), "progress", tr("Progress"))
         self._bar.setFixedWidth(20 * SPACING_PX)
-        self._cancel = button("cancel", tr("Cancel"))
+        self._cancel = button("cancel", end or tr("Cancel"))
         self._cancel.clicked.connect(self.cancel)
         fill_row(self, self._bar, self._doing, self._cancel, grows=self._doing)
         self._refresh()

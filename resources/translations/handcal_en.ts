@@ -3541,6 +3541,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Track…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Track the cube with the depth camera, and have the headset draw it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>User test</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4125,7 +4133,87 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Track the cube</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracked by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RealSense on a paired headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RealSense that does not move</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A headset draws the cube&apos;s edges where it stands in the room.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth camera, colour</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pose of the cube</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Stop</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Start</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose what tracks the cube, and press Start</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Opening the camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Stopped</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the cube is not tracked</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>waiting for a pose of the head</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the cube moves</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the cube is at rest</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Filtered; from the cube&apos;s middle to the origin of the headset&apos;s world.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In the room, mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation vector, °</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured in this image; from the depth camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Before the camera, mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -126,6 +126,12 @@ def test_opencvs_sample_is_solved_as_well_as_by_opencv_with_the_same_lens(
     assert calibrate_stereo(sample_pairs, settings=FULL).rms_px < 1.002 * 0.194
 
 
+def test_opencvs_sample_is_solved_as_well_with_the_lens_chosen_by_held_out_error(
+    sample_pairs: Pairs,
+) -> None:
+    assert calibrate_stereo(sample_pairs, settings=AUTO).rms_px < 1.02 * 0.194
+
+
 def test_the_lens_of_opencvs_sample_is_a_pinhole(shared_data: Path) -> None:
     folder = shared_data / "boards" / "opencv_stereo"
     board = Board(kind="checkerboard", squares=(10, 7))

@@ -11,10 +11,15 @@ from handcal.errors import CameraEndError, FileError, HandcalError
 from handcal.geometry import transform
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
+from handcal.register.results import SolveSettings, solve_session
 from handcal.rig.cube import Cube
 from handcal.rig.cube_track import TrackedCube, cube_corners_m
 from handcal.session.session import Session
-from handcal.sim.cube_bench import CubeBench
+from handcal.sim.cube_bench import CubeBench, simulated_wearer
+from handcal.sim.hand import make_hand
+from handcal.sim.overlay import overlay_by_eye
+from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
+from handcal.station import user_test
 from handcal.station.cube_tracking import CubeTracker, run_cube_tracking
 from handcal.station.user_test import TrialSettings, run_user_trials
 from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics, Shape
@@ -128,3 +133,53 @@ def test_a_cube_elsewhere_and_an_unsolved_session_are_refused(
         pytest.raises(FileError, match="left eye is not solved"),
     ):
         run_user_trials(empty, server, cube, room.adjust, room.place, impatient)
+
+
+@pytest.mark.campaign
+def test_the_published_procedure_finds_the_true_error(
+    session: Session,
+    monkeypatch: pytest.MonkeyPatch,
+    record_testsuite_property: Callable[[str, float], None],
+) -> None:
+    """Three wearers, ten calibrations each, left eye: 360 corners, seeds 1 to 3.
+
+    The two means are in the file of ``--junit-xml``.
+    """
+    rig = replace(Session.open(session.path).rig, depth_intrinsics=CAMERA)
+    found_px, true_px = [], []
+    for seed in (1, 2, 3):
+        rng, hand, usual = np.random.default_rng([seed, 7]), make_hand(seed), WearerSettings()
+        with simulated_wearer(rig, Cube(), seed) as (server, room):
+            true_m = draw_eyes(np.random.default_rng(seed), usual)
+            for _ in range(10):
+                alignment = overlay_by_eye(
+                    rng,
+                    hand,
+                    rig,
+                    true_m,
+                    5000,
+                    0.001,
+                    placement_error=draw_placement_error(rng, usual),
+                )
+                solved = solve_session([alignment], rig, SolveSettings()).eyes["left"].shift_m
+                monkeypatch.setattr(
+                    user_test, "solved_shifts_m", lambda *_, solved=solved: {"left": solved}
+                )
+                for trial in run_user_trials(
+                    session,
+                    server,
+                    CubeTracker(room, Cube(), rig.T_H_D, server.pose_at_host_ns),
+                    room.adjust,
+                    room.place,
+                    TrialSettings(eyes=("left",)),
+                ):
+                    found_px.append(trial.error_px)
+                    true_px.append(
+                        reprojection_error_px(
+                            rig.eyes["left"], solved, true_m["left"], trial.corners_E_m
+                        )
+                    )
+    assert np.size(found_px) == 360
+    record_testsuite_property("found_px", float(np.mean(found_px)))
+    record_testsuite_property("true_px", float(np.mean(true_px)))
+    assert np.mean(found_px) == pytest.approx(np.mean(true_px), rel=0.1)

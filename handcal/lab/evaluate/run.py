@@ -115,6 +115,7 @@ def render_captures(
         eye=settings.eye,
         poses=settings.poses,
         alignments=settings.alignments,
+        prior=settings.prior,
     )
     write_captures(folder, _rig(settings), chosen, progress)
 

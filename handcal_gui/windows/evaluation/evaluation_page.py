@@ -35,8 +35,8 @@ class EvaluationSpec:
     evaluation: Evaluation
     form: Callable[[], EntriesForm]
     """Creates the form for its entries."""
-    preparation: Preparation | None = None
-    """Button and dialog that prepare the data, if needed."""
+    preparations: tuple[Preparation, ...] = ()
+    """Buttons and dialogs that prepare data and devices."""
 
 
 class EvaluationPage(QWidget):
@@ -65,7 +65,7 @@ class EvaluationPage(QWidget):
         self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
-        self._prepare = PreparationButton(spec.preparation) if spec.preparation else None
+        self._preparing = [PreparationButton(one) for one in spec.preparations]
         self._bar = JobBar()
         self._found = FindingLine("readiness")
         self._results = ResultsView()
@@ -73,8 +73,8 @@ class EvaluationPage(QWidget):
         self._lay_out(spec.question)
         self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
-        if self._prepare is not None:
-            self._prepare.closed.connect(self._restart)
+        for prepare in self._preparing:
+            prepare.closed.connect(self._restart)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
         self._look.answered.connect(self._on_readiness)
@@ -107,8 +107,8 @@ class EvaluationPage(QWidget):
 
     def stop(self) -> None:
         """Cancel the evaluation or its preparation, and wait for the end."""
-        if self._prepare is not None:
-            self._prepare.stop()
+        for prepare in self._preparing:
+            prepare.stop()
         self._bar.stop()
         self._look.stop()
 
@@ -164,8 +164,8 @@ class EvaluationPage(QWidget):
 
     def _refresh(self) -> None:
         readiness = self._readiness
-        if self._prepare is not None:
-            self._prepare.follow(None if self.is_busy else self._entries)
+        for prepare in self._preparing:
+            prepare.follow(None if self.is_busy else self._entries)
         can_run = readiness is not None and readiness.can_run and not self._waits_for
         self._button.setEnabled(can_run)
         if readiness is not None:
@@ -188,8 +188,8 @@ class EvaluationPage(QWidget):
 
     def _lay_out(self, question: str) -> None:
         row = hbox(self._button, spacing=2 * SPACING_PX)
-        if self._prepare is not None:
-            row.addWidget(self._prepare)
+        for prepare in self._preparing:
+            row.addWidget(prepare)
         row.addWidget(self._bar, 1)
         vbox(
             paragraph("question", question),

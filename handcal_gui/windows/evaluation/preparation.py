@@ -35,6 +35,8 @@ class Preparation:
     """Returns whether the entries suffice to open the dialog."""
     dialog: Callable[[Any, QWidget], PreparationDialog]
     """Creates the dialog, given entries and a parent."""
+    name: str = "prepare"
+    """Object name of the button."""
 
 
 class PreparationButton(QPushButton):
@@ -54,7 +56,7 @@ class PreparationButton(QPushButton):
 
     def __init__(self, preparation: Preparation, parent: QWidget | None = None) -> None:
         super().__init__(preparation.button, parent, autoDefault=True)
-        with_name(self, "prepare", preparation.button, preparation.help_text)
+        with_name(self, preparation.name, preparation.button, preparation.help_text)
         self._preparation = preparation
         self._entries: Any = None
         self._dialog: PreparationDialog | None = None

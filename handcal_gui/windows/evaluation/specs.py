@@ -24,6 +24,7 @@ from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.evaluation.capture_dialog import MOST_POSES, CaptureDialog
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationSpec
 from handcal_gui.windows.evaluation.preparation import Preparation
+from handcal_gui.windows.evaluation.track_dialog import TrackDialog
 from handcal_gui.windows.evaluation.trials_dialog import TrialsDialog
 from handcal_gui.windows.evaluation.work import FileEvaluation, StudyEvaluation
 
@@ -60,11 +61,20 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             ),
             FileEvaluation(_missing_captures, run_cube_test),
             _cube_form,
-            Preparation(
-                tr("Capture…"),
-                tr("Take the captures with a camera; enter their folder first."),
-                lambda entries: bool(entries.captures),
-                CaptureDialog,
+            (
+                Preparation(
+                    tr("Capture…"),
+                    tr("Take the captures with a camera; enter their folder first."),
+                    lambda entries: bool(entries.captures),
+                    CaptureDialog,
+                ),
+                Preparation(
+                    tr("Track…"),
+                    tr("Track the cube with the depth camera, and have the headset draw it."),
+                    lambda _: True,
+                    TrackDialog,
+                    "track",
+                ),
             ),
         ),
         "users": EvaluationSpec(
@@ -78,14 +88,16 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 lambda entries, progress: run_user_test(entries.settings, progress),
             ),
             _users_form,
-            Preparation(
-                tr("Record…"),
-                tr(
-                    "Record the trials of one session with a cube in the room; enter the session "
-                    "first."
+            (
+                Preparation(
+                    tr("Record…"),
+                    tr(
+                        "Record the trials of one session with a cube in the room; enter the "
+                        "session first."
+                    ),
+                    lambda entries: bool(entries.sessions),
+                    TrialsDialog,
                 ),
-                lambda entries: bool(entries.sessions),
-                TrialsDialog,
             ),
         ),
         "segmentation": EvaluationSpec(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import queue
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,11 +12,6 @@ from typing import TypeAlias
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from handcal.camera.camera import Camera
-from handcal.camera.realsense import RealSenseCamera
-from handcal.errors import HandcalError
-from handcal.link.pairing import Pairings, pairing_file
-from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
 from handcal.session.trial import Trial
 from handcal.station.doctor import Finding, Health
@@ -34,10 +28,11 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.result_rows import EYE_NAMES
+from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset
 from handcal_gui.windows.evaluation.preparation import PreparationDialog
 
 STEP_M = 0.00025
-_POLL_S, _PATIENCE_S = 0.1, 120.0
+_POLL_S = 0.1
 _MOVES: dict[str, tuple[str, int, int, int, Qt.Key]] = {
     # text; row and column; axis of φ, from 1, with its sign; key. The drawing of something nearer
     # than the virtual image moves against the eye.
@@ -197,11 +192,11 @@ class TrialsDialog(PreparationDialog):
             Path(entries.sessions).expanduser(),
             Path(entries.cube).expanduser() if entries.cube else None,
         )
-        connect = None if entries.headset == "virtual" else _paired_headset
+        connect = None if entries.headset == "virtual" else paired_headset
 
         def work(progress: Progress) -> object:
             self._desk = desk = _Desk(self.told.emit, progress)
-            return self._record(order, connect, _depth_camera, desk.leader, progress)
+            return self._record(order, connect, depth_camera, desk.leader, progress)
 
         self._table.show_rows(("px", "′"), ())
         self._bar.run(tr("Waiting for the headset"), work, self._show_trials)
@@ -280,17 +275,3 @@ class TrialsDialog(PreparationDialog):
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,
         )
-
-
-@contextmanager
-def _paired_headset() -> Iterator[HeadsetServer]:
-    pairings = Pairings.read(pairing_file())
-    if not pairings.all:
-        raise HandcalError(tr("no headset is paired; pair one with Connect a headset"))
-    with HeadsetServer(pairings, ("0.0.0.0", 47800)) as server:  # noqa: S104
-        server.wait_connected(_PATIENCE_S)
-        yield server
-
-
-def _depth_camera() -> AbstractContextManager[Camera]:
-    return RealSenseCamera()

@@ -27,7 +27,7 @@ class ScenarioDialog(PreparationDialog):
 def window(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator[EvaluationWindow]:
     """Show an evaluation that can be prepared with a seed other than 0."""
     preparation = Preparation("Prepare…", "Do.", lambda one: one.seed != 0, ScenarioDialog)
-    specs = {"noise": replace(numbers.spec, preparation=preparation)}
+    specs = {"noise": replace(numbers.spec, preparations=(preparation,))}
     window = EvaluationWindow(specs, EvaluationEntries(noise=entries))
     qtbot.addWidget(window)
     window.show()

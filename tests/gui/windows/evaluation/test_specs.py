@@ -83,12 +83,12 @@ def test_frames_are_chosen_before_the_segmentation_is_tested(tmp_path: Path) -> 
 
 def test_a_cube_test_is_run_once_there_are_captures_to_look_at(tmp_path: Path) -> None:
     spec = make_specs()["cube"]
-    assert spec.preparation is not None
+    capture, _ = spec.preparations
     entries = CubeEntries(output=str(tmp_path / "results"))
     assert spec.evaluation.readiness(entries).can_run
-    assert not spec.preparation.is_possible(entries)
+    assert not capture.is_possible(entries)
     entries = replace(entries, captures=str(tmp_path / "captures"))
-    assert spec.preparation.is_possible(entries)
+    assert capture.is_possible(entries)
     readiness = spec.evaluation.readiness(entries)
     assert "no folder" in readiness.finding.found
     assert not readiness.can_run

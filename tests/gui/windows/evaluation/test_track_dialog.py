@@ -1,0 +1,124 @@
+"""The dialog with the simulator's headset, and with a tracker that fails."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.errors import CameraError
+from handcal.progress import Progress
+from handcal.station.cube_tracking import CubeSight, CubeTracking, TrackingOrder, track_cube
+from handcal_gui.evaluation_entries import CubeEntries
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset
+from handcal_gui.windows.evaluation.track_dialog import TrackDialog
+
+Make = Callable[[str, Any], TrackDialog]
+
+
+@pytest.fixture
+def make(qtbot: QtBot) -> Iterator[Make]:
+    made: list[TrackDialog] = []
+
+    def make_one(by: str, track: Any) -> TrackDialog:
+        made.append(TrackDialog(CubeEntries(tracked_by=by), track=track))
+        qtbot.addWidget(made[-1])
+        made[-1].show()
+        return made[-1]
+
+    yield make_one
+    for dialog in made:
+        dialog.reject()
+
+
+def button(dialog: TrackDialog, name: str) -> QPushButton:
+    found = dialog.findChild(QPushButton, name)
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def finding(dialog: TrackDialog) -> str:
+    found = dialog.findChild(QLabel, "trackFound")
+    assert isinstance(found, QLabel)
+    return found.text()
+
+
+def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, make: Make) -> None:
+    sights: list[CubeSight] = []
+
+    def track(order: TrackingOrder, *others: Any) -> CubeTracking:
+        connect, camera, see, progress = others
+        assert connect is None
+        assert camera is None
+
+        def both(sight: CubeSight) -> None:
+            sights.append(sight)
+            see(sight)
+
+        return track_cube(order, connect, camera, both, progress)
+
+    dialog = make("virtual", track)
+    start, stop = button(dialog, "start"), button(dialog, "cancel")
+    start.click()
+    assert not start.isEnabled()
+    assert stop.text() == "Stop"
+    table = dialog.findChild(QTableWidget, "pose-of-the-cube")
+    assert isinstance(table, QTableWidget)
+    qtbot.waitUntil(lambda: table.rowCount() == 3, timeout=60_000)
+    view = dialog.findChild(ImageView, "depth-camera,-colour")
+    assert isinstance(view, ImageView)
+    assert view.has_image
+    assert view.message == ""
+    stop.click()
+    qtbot.waitUntil(start.isEnabled, timeout=60_000)
+    assert view.message == "Stopped"
+    assert finding(dialog) == "The cube is not tracked."
+    sight = next(one for one in sights if one.T_D_T is not None and one.tracked is not None)
+    assert sight.T_D_T is not None
+    assert sight.corners_px is not None
+    camera = sight.frame.color_intrinsics
+    assert camera is not None
+    middle_m = sight.T_D_T[:3, 3]
+    middle_px = camera.fx * middle_m[:2] / middle_m[2] + [camera.cx, camera.cy]
+    low_px, high_px = sight.corners_px.min(axis=0), sight.corners_px.max(axis=0)
+    assert (low_px < middle_px).all()
+    assert (middle_px < high_px).all()
+    assert np.ptp(sight.corners_px, axis=0).max() < camera.width / 2
+
+
+def test_the_failure_of_a_camera_is_shown_and_it_can_be_started_again(
+    qtbot: QtBot, make: Make
+) -> None:
+    def fail(_order: TrackingOrder, connect: Any, camera: Any, *_: Any) -> CubeTracking:
+        assert connect is paired_headset
+        assert camera is depth_camera
+        raise CameraError("no RealSense camera is connected")
+
+    dialog = make("network", fail)
+    button(dialog, "start").click()
+    qtbot.waitUntil(lambda: "RealSense camera is connected" in finding(dialog), timeout=60_000)
+    qtbot.waitUntil(button(dialog, "start").isEnabled, timeout=60_000)
+
+
+def test_closing_stops_a_tracker_that_does_not_end_by_itself(qtbot: QtBot, make: Make) -> None:
+    begun: list[bool] = []
+
+    def forever(*given: Any) -> CubeTracking:
+        progress: Progress = given[-1]
+        begun.append(True)
+        while not threading.Event().wait(0.01):
+            progress.check()
+        raise AssertionError
+
+    dialog = make("camera", forever)
+    button(dialog, "start").click()
+    qtbot.waitUntil(lambda: bool(begun), timeout=60_000)
+    dialog.reject()
+    assert not dialog.isVisible()
+    assert button(dialog, "start").isEnabled()
