@@ -24,7 +24,7 @@ from handcal_gui.control.conditions import Conditions
 from handcal_gui.engine.engine_thread import Command, EngineThread
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
-from handcal_gui.pages.wizard.view import Action, Step
+from handcal_gui.pages.wizard.view import ACTION_NAMES, Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow, Panel
@@ -42,6 +42,7 @@ _PANELS_OF_STEPS = {
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
 _RECORD = tr("record the trial")
+_KINDS = {"alignment": tr("alignment"), "trial": tr("trial")}
 _NO_BRIDGES = BridgeSettings()
 
 
@@ -251,7 +252,7 @@ class CalibrationController(QObject):
         trials.hide_target_requested.connect(
             lambda: self._submit(tr("hide the target"), Station.hide_target)
         )
-        compare = "compare"
+        compare = tr("compare")
         trials.compare_requested.connect(lambda: self._submit(compare, Station.compare))
         trials.end_comparison_requested.connect(
             lambda: self._submit(compare, lambda s: s.comparing.end())
@@ -269,12 +270,12 @@ class CalibrationController(QObject):
         for panel in (session, trials):
             panel.delete_requested.connect(
                 lambda kind, number: self._submit(
-                    tr("delete the {}").format(kind), lambda s: s.delete(kind, number)
+                    tr("delete the {}").format(_KINDS[kind]), lambda s: s.delete(kind, number)
                 )
             )
             panel.restore_requested.connect(
                 lambda kind, number: self._submit(
-                    tr("restore the {}").format(kind), lambda s: s.restore(kind, number)
+                    tr("restore the {}").format(_KINDS[kind]), lambda s: s.restore(kind, number)
                 )
             )
         session.notes_changed.connect(self._save_notes)
@@ -376,7 +377,8 @@ class CalibrationController(QObject):
 
     def _on_command_failed(self, name: str, why: str) -> None:
         self._failed_command = name
-        self._window.banner.show_message(tr("Could not {}: {}").format(name, why))
+        done = ACTION_NAMES.get(name, name)
+        self._window.banner.show_message(tr("Could not {}: {}").format(done, why))
 
     def _save_notes(self, text: str) -> None:
         """Save notes in the engine's thread, or here if the engine has failed."""

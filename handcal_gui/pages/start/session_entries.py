@@ -82,6 +82,9 @@ def _recent(path: Path) -> Entry | None:
 
 
 def _text(wearer: str, started: str, alignments: int, trials: int) -> str:
-    held = ((alignments, "alignment"), (trials, "trial"))
-    counts = ", ".join(pluralize(number, what) for number, what in held if number)
+    held = (
+        (alignments, tr("alignment"), tr("alignments")),
+        (trials, tr("trial"), tr("trials")),
+    )
+    counts = ", ".join(pluralize(*one) for one in held if one[0])
     return " · ".join(filter(None, (wearer or tr("Without a name"), local_time(started), counts)))
