@@ -312,13 +312,17 @@ class CalibrationController(QObject):
         always = panels.fine_tune, panels.trials
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
-        self._turns.rotate()
+        # On a slow computer, too, every panel comes to its turn.
+        shows = not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
+        if shows:
+            self._turns.rotate()
         picture = self._wizard_panel.picture
         turns = [one for one in self._turns if one is picture or one in self._visible]
         for panel in (*panels.all(), picture):
             is_due = panel is turns[0] if panel in self._turns else panel in self._visible
-            is_due &= not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
-            if panel in always or is_due:
+            is_guidance = panel is panels.rotation and panel in self._visible
+            is_due &= shows
+            if panel in always or is_due or (is_guidance and self._conditions.is_slow):
                 panel.show_snapshot(snapshot)
         self._window.banner.show_condition(condition)
         wizard = self._wizard_panel.wizard
