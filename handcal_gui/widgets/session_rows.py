@@ -59,10 +59,10 @@ TRIAL_COLUMNS = (
     RecordColumn(tr("Time"), tr("Time of the recording"), rank=3),
 )
 STATISTICS_COLUMNS = (
-    tr("Calibrations"),
     tr("Trials"),
     tr("Mean ′"),
     tr("SD of trials ′"),
+    tr("Calibrations"),
     tr("SD of calibrations ′"),
     tr("Median ′"),
     tr("Max ′"),
@@ -194,10 +194,10 @@ def _spread_cells(spread: TrialSpread) -> tuple[str, ...]:
         return NOTHING if sd_arcmin is None else f"{sd_arcmin:.1f}"
 
     return (
-        str(spread.calibrations),
         str(spread.trials),
         f"{spread.mean_arcmin:.1f}",
         text(spread.trial_sd_arcmin),
+        str(spread.calibrations),
         text(spread.calibration_sd_arcmin),
         f"{spread.median_arcmin:.1f}",
         f"{spread.max_arcmin:.1f}",

@@ -2372,7 +2372,19 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Convergence of each registration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Residuals</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Single</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ of each alignment alone</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2432,7 +2444,7 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Make a cursor; the hand&apos;s rotation from it is then shown here.</source>
+        <source>The hand&apos;s rotation from the cursor will be shown here.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
