@@ -29,6 +29,8 @@ class Conditions:
     ----------
     is_usb : bool
         True if the camera is connected by USB, which may be too slow.
+    is_virtual : bool
+        True if the headset is virtual: without it the simulated camera sees nothing.
 
     Attributes
     ----------
@@ -36,9 +38,10 @@ class Conditions:
         True if too few frames a second are processed.
     """
 
-    def __init__(self, *, is_usb: bool = False) -> None:
+    def __init__(self, *, is_usb: bool = False, is_virtual: bool = False) -> None:
         self.is_slow = False
         self._is_usb = is_usb
+        self._is_virtual = is_virtual
         self._slow_text = ""
         self._rate_since_s: float | None = None
         self._dropped: deque[tuple[float, int]] = deque()
@@ -58,8 +61,10 @@ class Conditions:
         camera, link = snapshot.camera, snapshot.link
         self._has_started |= camera.rate_hz > 0 and link.pose_rate_hz > 0
         self._watch_rate(camera, now_s)
+        ended = snapshot.link_problem if self._is_virtual and self._has_started else ""
         found = (
-            snapshot.problem
+            (tr("{}; press Restart headset in Link").format(ended.rstrip(".")) if ended else "")
+            or snapshot.problem
             or camera.problem
             or snapshot.link_problem
             or snapshot.contradiction

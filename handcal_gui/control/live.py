@@ -353,7 +353,10 @@ class CalibrationController(QObject):
 
     def _on_opened(self, station: Station) -> None:
         self._link = station.link
-        self._conditions = Conditions(is_usb=station.settings.source == "realsense")
+        self._conditions = Conditions(
+            is_usb=station.settings.source == "realsense",
+            is_virtual=station.settings.headset == "virtual",
+        )
         plan = station.plan.settings
         if plan.name == "recommended":
             is_held = self._wizard_panel.wizard.is_held

@@ -12,6 +12,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}; press Restart headset in Link</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>frames per second: only {:.0f} of the camera&apos;s {:.0f} are used; close other programs</source>
         <translation type="unfinished"></translation>
     </message>

@@ -58,7 +58,9 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
 
 def _unfinished(session: UnfinishedSession) -> Entry:
     if session.problem:
-        text = f"{session.path.name}: {session.problem}"
+        name = session.path.name
+        named = session.problem.replace(str(session.path), name)
+        text = named if name in named else f"{name}: {named}"
         return Entry(session.path, text, is_enabled=False)
     text = _text(session.wearer, session.started, session.alignments, session.trials)
     if session.damaged:

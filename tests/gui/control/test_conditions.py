@@ -31,6 +31,16 @@ def test_a_problem_that_passes_is_not_shown(snapshot: Maker) -> None:
     assert watch(conditions, fine, [3.1]) == [""]
 
 
+def test_a_virtual_headset_that_ended_is_the_cause_of_all_else(snapshot: Maker) -> None:
+    ended = replace(snapshot(**UNPLUGGED), link_problem="the virtual headset has ended.")
+    for is_virtual, text in (
+        (True, "the virtual headset has ended; press Restart headset in Link"),
+        (False, "the camera was unplugged"),
+    ):
+        conditions = Conditions(is_virtual=is_virtual)
+        assert watch(conditions, ended, [0.0, 5.0])[-1] == text
+
+
 def test_a_start_is_no_problem(snapshot: Maker) -> None:
     conditions = Conditions()
     silent = snapshot(
