@@ -75,7 +75,7 @@ _BARE_WINDOW = (
 
 
 class _ReplayCamera(Closable):
-    """Plays frames from memory at the camera's rate, as its SDK would deliver them."""
+    """Plays frames from memory at the camera's rate; those that nobody takes are lost."""
 
     name = "Replay"
     identity = CameraIdentity()
@@ -86,10 +86,12 @@ class _ReplayCamera(Closable):
         self._index = 0
         self._next_s = time.monotonic()
 
-    def read(self, timeout_s: float = 1.0) -> Frame:
+    def read(self, timeout_s: float = 1.0) -> Frame:  # noqa: ARG002 (it never fails)
         time.sleep(max(0.0, self._next_s - time.monotonic()))
-        self._next_s = max(self._next_s + self._replay.period_s, time.monotonic() - timeout_s)
-        self._index += 1
+        steps = 1 + int((time.monotonic() - self._next_s) / self._replay.period_s)
+        self._next_s += steps * self._replay.period_s
+        self._index += steps
+        self._replay.taken += 1
         now_ns = time.monotonic_ns()
         frame = self._replay.frames[self._replay.is_turned][self._index % _NOISES]
         return replace(frame, index=self._index, t_camera_ns=now_ns, t_host_ns=now_ns)
@@ -103,6 +105,7 @@ class _ReplayFrames:
 
     def __init__(self, rate_hz: int) -> None:
         self.period_s = 1.0 / rate_hz
+        self.taken = 0
         self.is_turned = False
         poses = (_T_D_CURSOR, _T_D_CURSOR @ _TURN)
         self.frames = [noisy_frames(T_D_hand, _NOISES) for T_D_hand in poses]
@@ -124,6 +127,8 @@ class _Measurement(QObject):
 
     Attributes
     ----------
+    taken : int
+        Frames that the station has taken.
     delays_ms, ages_ms, memory_mb : list of float
         Delay of every heartbeat beyond its period, age of every frame when it is on the screen,
         and memory of the process every hundred frames.
@@ -135,6 +140,7 @@ class _Measurement(QObject):
         self.ages_ms: list[float] = []
         self.memory_mb: list[float] = []
         self.started_s = self.ended_s = 0.0
+        self.taken = 0
         self._program = program
         self._replay = replay
         self._frames = frames
@@ -174,13 +180,14 @@ class _Measurement(QObject):
         self._shown_ns = snapshot.frame.t_host_ns
         self._seen = snapshot.frame.index
         if self._seen > _WARM_UP and not self.started_s:
-            self.started_s = time.perf_counter()
+            self.started_s, self.taken = time.perf_counter(), -self._replay.taken
         if self._seen > _WARM_UP + 100 * len(self.memory_mb):
             self.memory_mb.append(_resident_mb())
             sys.stderr.write(f"frames seen: {self._seen - _WARM_UP}\n")
             sys.stderr.flush()
         if self._seen > _WARM_UP + self._frames:
             self.ended_s = time.perf_counter()
+            self.taken += self._replay.taken
             QApplication.quit()
 
 
@@ -217,7 +224,7 @@ def measure(frames: int, rate_hz: int) -> list[BenchFigure]:
         with _headset(settings.port):
             app.exec()
         program.close()
-    taken_hz = frames / (watch.ended_s - watch.started_s)
+    taken_hz = watch.taken / (watch.ended_s - watch.started_s)
     least_hz, delay_ms, age_ms = _LIMITS[rate_hz]
     grown = watch.memory_mb[-1] / watch.memory_mb[len(watch.memory_mb) // 4]
     bare_s, first_s = (_start_s(code) for code in (_BARE_WINDOW, _FIRST_WINDOW))

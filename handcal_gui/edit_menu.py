@@ -73,11 +73,13 @@ def _target(window: MainWindow, name: str) -> tuple[QAction | None, bool]:
         if action.objectName() == name and action.isEnabled():
             return action, True
     for panel in _OTHERS[name]:
-        action = window.findChild(QWidget, panel).findChild(QAction, name, _OWN)
-        dock = _dock_of(action)
-        is_of_page = dock.toggleViewAction().isEnabled() if dock else window.page == "live"
-        if is_of_page and action.isEnabled():
-            return action, False
+        owner = window.findChild(QWidget, panel)
+        own = owner.findChild(QAction, name, _OWN) if owner is not None else None
+        if own is None or not own.isEnabled():
+            continue
+        dock = _dock_of(own)
+        if dock.toggleViewAction().isEnabled() if dock else window.page == "live":
+            return own, False
     return None, False
 
 

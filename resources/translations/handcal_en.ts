@@ -3122,6 +3122,14 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>File…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Folder…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose…</source>
         <translation type="unfinished"></translation>
     </message>
