@@ -13,10 +13,10 @@ from handcal_gui.translation import tr
 _WINDOW = tr("Window")
 _NOT_ACTIONS = {
     _WINDOW: (
-        ("Return", tr("Press the button, or open the list, that has the focus")),
-        ("Alt+underlined letter", tr("Press a button at the lower left")),
-        ("Esc", tr("Close the message at the top")),
-        ("Tab", tr("Move to the next button or field")),
+        (tr("Return"), tr("Press the button, or open the list, that has the focus")),
+        (tr("Alt+underlined letter"), tr("Press a button at the lower left")),
+        (tr("Esc"), tr("Close the message at the top")),
+        (tr("Tab"), tr("Move to the next button or field")),
     ),
     tr("Fine-tune"): (
         (tr("Arrows, PgUp, PgDown"), tr("Move what the chosen eye sees, as the key points")),

@@ -31,6 +31,7 @@ from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.dialogs.export import Export, ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.dialogs.support import SupportDialog
+from handcal_gui.edit_menu import add_edit_menu
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.help_menu import add_help_menu
 from handcal_gui.pages.review_page import ReviewPage
@@ -362,6 +363,7 @@ class Program(QObject):
         add("File", tr("&Preferences…"), "Ctrl+,", self._edit_preferences)
         add("File", tr("&Quit"), "Ctrl+Q", self.window.close)
         add("View", tr("&Reset layout"), "", self.window.reset_layout)
+        add_edit_menu(self.window, self.show_library)
         add_help_menu(self.window, self.manual, self.make_support_bundle)
 
     def _restore(self) -> None:

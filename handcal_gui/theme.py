@@ -30,7 +30,10 @@ SPACING_PX = 8
 
 @dataclass(frozen=True, slots=True)
 class Colors:
-    """Colours with a meaning; everything else comes from the palette."""
+    """Colours with a meaning; colour-blind people can tell them apart, too.
+
+    Everything else comes from the palette.
+    """
 
     live: str
     cursor: str
@@ -50,33 +53,33 @@ class Colors:
 
 _LIGHT = Colors(
     live="#1f6fd6",
-    cursor="#8a5a00",
-    red="#c62828",
-    good="#2e7d32",
-    warning="#a15c00",
-    left="#00707a",
+    cursor="#8f690c",
+    red="#820d0d",
+    good="#2b7c4b",
+    warning="#96610f",
+    left="#20686a",
     right="#8e3fa8",
     muted="#5f6772",
     canvas="#ffffff",
 )
 _DARK = Colors(
-    live="#5aa2ff",
-    cursor="#f0c060",
+    live="#619cfa",
+    cursor="#fac747",
     red="#ff6b61",
-    good="#6ccb72",
-    warning="#f2b04c",
-    left="#4dd0d9",
+    good="#7dfab9",
+    warning="#feb63f",
+    left="#86e5d9",
     right="#d391ea",
     muted="#9aa3ae",
     canvas="#17191c",
 )
 _CONTRAST = Colors(
-    live="#66c2ff",
+    live="#67b9ff",
     cursor="#ffd800",
-    red="#ff8a80",
-    good="#7dff8a",
-    warning="#ffd800",
-    left="#5ff0ff",
+    red="#f174a1",
+    good="#6af991",
+    warning="#f1c82b",
+    left="#03af9a",
     right="#ffa6ff",
     muted="#e0e0e0",
     canvas="#000000",

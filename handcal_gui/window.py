@@ -72,7 +72,12 @@ _TITLES = {
     "session": tr("Session"),
     "link": tr("Link"),
 }
-_MENUS = {"File": tr("&File"), "View": tr("&View"), "Help": tr("&Help")}
+_MENUS = {
+    "File": tr("&File"),
+    "Edit": tr("Edi&t"),  # Alt+E adds the left eye, or exports
+    "View": tr("&View"),
+    "Help": tr("&Help"),
+}
 _TITLE_BUTTONS = {"qt_dockwidget_closebutton": "close", "qt_dockwidget_floatbutton": "float"}
 """Icons of a dock's buttons, by the names that Qt gives the buttons."""
 _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
@@ -119,6 +124,8 @@ class MainWindow(QMainWindow):
 
     Attributes
     ----------
+    menus : dict of str to QMenu
+        File, Edit, View and Help.
     closing : Signal()
         The window is about to close.
     arrangement_changed : Signal(str)
@@ -263,15 +270,15 @@ class MainWindow(QMainWindow):
         self.show_page(page)
 
     def add_action(self, menu: str, text: str, keys: str, do: Callable[[], object]) -> QAction:
-        """Add an action to one of the menus File, View and Help."""
+        """Add an action to one of the `menus`."""
         action = QAction(text, self)
         if keys:
             action.setShortcut(QKeySequence(keys))
         action.triggered.connect(lambda _checked=False: do())
         if menu == "View":
-            self._menus[menu].insertAction(self._dock_actions_start, action)
+            self.menus[menu].insertAction(self._dock_actions_start, action)
         else:
-            self._menus[menu].addAction(action)
+            self.menus[menu].addAction(action)
         return action
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -385,8 +392,8 @@ class MainWindow(QMainWindow):
         self._draw_title_buttons()  # Qt recreates them with the titles
 
     def _make_menus(self) -> None:
-        self._menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}
-        view = self._menus["View"]
+        self.menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}
+        view = self.menus["View"]
         go_to = view.addMenu(tr("&Go to"))
         for number, (name, title) in enumerate(_TITLES.items(), 1):
             go_to.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))

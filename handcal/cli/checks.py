@@ -27,7 +27,14 @@ if TYPE_CHECKING:
     arg(
         "--gui",
         action="store_true",
-        help="measure the desktop program instead: needs a display and 12 minutes",
+        help="measure the desktop program instead: needs a display and 12 minutes at 30 Hz",
+    ),
+    arg(
+        "--rate",
+        type=int,
+        choices=(30, 60, 90),
+        default=30,
+        help="with --gui: frames per second of the replayed camera (default: 30)",
     ),
     json=True,
 )
@@ -39,7 +46,8 @@ def bench(arguments: argparse.Namespace) -> None:
         fail(f"unknown part {arguments.only!r}; choose from {', '.join(PARTS)}", 2)
     if arguments.gui:
         with show_progress() as progress:
-            result = _bench_window(300 if arguments.quick else 20_000, progress)
+            frames = 300 if arguments.quick else 20_000
+            result = _bench_window(frames, arguments.rate, progress)
     else:
         with show_progress() as progress:
             result = run_bench(
@@ -142,16 +150,18 @@ def _headset_findings(arguments: argparse.Namespace) -> list[Finding]:
         return examine_headset(server, rig, camera, arguments.patience_s, progress)
 
 
-def _bench_window(frames: int, progress: Progress) -> dict[str, Any]:
+def _bench_window(frames: int, rate_hz: int, progress: Progress) -> dict[str, Any]:
     """Measure the desktop program in a separate process, since the engine may not import it."""
     command = [sys.executable, "-m", "handcal_gui.benchmark", "--frames", str(frames)]
+    command += ["--rate", str(rate_hz)]
     last = "no reason was given"
     with subprocess.Popen(  # noqa: S603
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        progress.at(0.0, f"{frames:,} frames, {frames / 30 / 60:.1f} minutes at 30 frames a second")
+        minutes = frames / rate_hz / 60
+        progress.at(0.0, f"{frames:,} frames, {minutes:.1f} minutes at {rate_hz} frames a second")
         for line in process.stderr:
             last = line.strip() or last
             if (seen := last.removeprefix("frames seen: ")) != last:

@@ -299,7 +299,8 @@ def examine_disk(folder: Path) -> Finding:
     free_bytes = shutil.disk_usage(folder).free
     found = f"{free_bytes / 2**30:.1f} GiB free here"
     if free_bytes < _LEAST_FREE_BYTES:
-        return Finding("Disk", Health.BROKEN, found, "make room: a session takes some megabytes")
+        least = f"{_LEAST_FREE_BYTES / 2**30:.1f} GiB"
+        return Finding("Disk", Health.BROKEN, found, f"make room: {least} must be free")
     return Finding("Disk", Health.GOOD, found)
 
 

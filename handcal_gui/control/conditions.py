@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 
 from handcal.camera.feed import CameraStatus
@@ -15,6 +16,10 @@ _STARTING_S = 4.0
 _SLOW_HZ, _FAST_HZ = 8.0, 10.0
 """Frame rates below which, and above which again, hand and confirmation are hard to match."""
 _SLOW_S = 3.0
+_ENOUGH_HZ, _MOST_LOST = 20.0, 0.5
+"""Below this rate, frames lost in this computer are named if they are more than this share of the
+frames taken."""
+_LOST_OVER_S = 1.0
 
 
 class Conditions:
@@ -24,6 +29,8 @@ class Conditions:
     ----------
     is_usb : bool
         True if the camera is connected by USB, which may be too slow.
+    is_virtual : bool
+        True if the headset is virtual: without it the simulated camera sees nothing.
 
     Attributes
     ----------
@@ -31,12 +38,13 @@ class Conditions:
         True if too few frames a second are processed.
     """
 
-    def __init__(self, *, is_usb: bool = False) -> None:
+    def __init__(self, *, is_usb: bool = False, is_virtual: bool = False) -> None:
         self.is_slow = False
         self._is_usb = is_usb
+        self._is_virtual = is_virtual
         self._slow_text = ""
         self._rate_since_s: float | None = None
-        self._dropped = 0
+        self._dropped: deque[tuple[float, int]] = deque()
         self._problem, self._problem_since_s = "", 0.0
         self._hand_problem, self._hand_since_s = "", 0.0
         self._has_started = False
@@ -53,8 +61,10 @@ class Conditions:
         camera, link = snapshot.camera, snapshot.link
         self._has_started |= camera.rate_hz > 0 and link.pose_rate_hz > 0
         self._watch_rate(camera, now_s)
+        ended = snapshot.link_problem if self._is_virtual and self._has_started else ""
         found = (
-            snapshot.problem
+            (tr("{}; press Restart headset in Link").format(ended.rstrip(".")) if ended else "")
+            or snapshot.problem
             or camera.problem
             or snapshot.link_problem
             or snapshot.contradiction
@@ -80,24 +90,37 @@ class Conditions:
         return replace(snapshot, observation=replace(seen, problem=""))
 
     def _watch_rate(self, camera: CameraStatus, now_s: float) -> None:
-        """Note that frames are few, or many again, once this has lasted."""
-        rate_hz = camera.rate_hz
-        changes = rate_hz >= _FAST_HZ if self.is_slow else 0.0 < rate_hz < _SLOW_HZ
-        if not self._has_started or not changes:
+        """Note that frames are few or many are lost, or no longer, once this has lasted."""
+        rate_hz, lost_hz = camera.rate_hz, self._lost_hz(camera, now_s)
+        is_few = rate_hz < (_FAST_HZ if self.is_slow else _SLOW_HZ)
+        loses = rate_hz < _ENOUGH_HZ and lost_hz > _MOST_LOST * rate_hz
+        if not self._has_started or rate_hz == 0.0 or (is_few or loses) == self.is_slow:
             self._rate_since_s = None
         elif self._rate_since_s is None:
-            self._rate_since_s, self._dropped = now_s, camera.dropped
+            self._rate_since_s = now_s
         elif now_s - self._rate_since_s >= _SLOW_S:
             self.is_slow, self._rate_since_s = not self.is_slow, None
-            # Frames that the camera counted, but nobody took, are lost in this computer.
-            is_camera = self._is_usb and camera.dropped == self._dropped
-            advice = (
-                tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
-            )
-            self._slow_text = (
-                tr("frames per second: only {:.0f} of the {:.0f} that are needed; {}").format(
-                    rate_hz, _SLOW_HZ, advice
-                )
-                if self.is_slow
-                else ""
-            )
+            self._slow_text = ""
+            if self.is_slow:
+                # Frames that the camera counted, but nobody took, are lost in this computer.
+                is_camera = self._is_usb and lost_hz == 0.0
+                self._slow_text = _slow_text(rate_hz, lost_hz, is_camera=is_camera)
+
+    def _lost_hz(self, camera: CameraStatus, now_s: float) -> float:
+        """Return the frames per second that were lost of late."""
+        self._dropped.append((now_s, camera.dropped))
+        while len(self._dropped) > 2 and now_s - self._dropped[1][0] >= _LOST_OVER_S:
+            self._dropped.popleft()
+        since_s, before = self._dropped[0]
+        return (camera.dropped - before) / max(now_s - since_s, _LOST_OVER_S)
+
+
+def _slow_text(rate_hz: float, lost_hz: float, *, is_camera: bool) -> str:
+    if rate_hz >= _SLOW_HZ:
+        return tr(
+            "frames per second: only {:.0f} of the camera's {:.0f} are used; close other programs"
+        ).format(rate_hz, rate_hz + lost_hz)
+    advice = tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
+    return tr("frames per second: only {:.0f} of the {:.0f} that are needed; {}").format(
+        rate_hz, _SLOW_HZ, advice
+    )

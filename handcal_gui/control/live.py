@@ -24,7 +24,7 @@ from handcal_gui.control.conditions import Conditions
 from handcal_gui.engine.engine_thread import Command, EngineThread
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
-from handcal_gui.pages.wizard.view import Action, Step
+from handcal_gui.pages.wizard.view import ACTION_NAMES, Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow, Panel
@@ -42,6 +42,7 @@ _PANELS_OF_STEPS = {
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
 _RECORD = tr("record the trial")
+_KINDS = {"alignment": tr("alignment"), "trial": tr("trial")}
 _NO_BRIDGES = BridgeSettings()
 
 
@@ -251,7 +252,7 @@ class CalibrationController(QObject):
         trials.hide_target_requested.connect(
             lambda: self._submit(tr("hide the target"), Station.hide_target)
         )
-        compare = "compare"
+        compare = tr("compare")
         trials.compare_requested.connect(lambda: self._submit(compare, Station.compare))
         trials.end_comparison_requested.connect(
             lambda: self._submit(compare, lambda s: s.comparing.end())
@@ -269,12 +270,12 @@ class CalibrationController(QObject):
         for panel in (session, trials):
             panel.delete_requested.connect(
                 lambda kind, number: self._submit(
-                    tr("delete the {}").format(kind), lambda s: s.delete(kind, number)
+                    tr("delete the {}").format(_KINDS[kind]), lambda s: s.delete(kind, number)
                 )
             )
             panel.restore_requested.connect(
                 lambda kind, number: self._submit(
-                    tr("restore the {}").format(kind), lambda s: s.restore(kind, number)
+                    tr("restore the {}").format(_KINDS[kind]), lambda s: s.restore(kind, number)
                 )
             )
         session.notes_changed.connect(self._save_notes)
@@ -311,13 +312,17 @@ class CalibrationController(QObject):
         always = panels.fine_tune, panels.trials
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
-        self._turns.rotate()
+        # On a slow computer, too, every panel comes to its turn.
+        shows = not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
+        if shows:
+            self._turns.rotate()
         picture = self._wizard_panel.picture
         turns = [one for one in self._turns if one is picture or one in self._visible]
         for panel in (*panels.all(), picture):
             is_due = panel is turns[0] if panel in self._turns else panel in self._visible
-            is_due &= not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
-            if panel in always or is_due:
+            is_guidance = panel is panels.rotation and panel in self._visible
+            is_due &= shows
+            if panel in always or is_due or (is_guidance and self._conditions.is_slow):
                 panel.show_snapshot(snapshot)
         self._window.banner.show_condition(condition)
         wizard = self._wizard_panel.wizard
@@ -348,7 +353,10 @@ class CalibrationController(QObject):
 
     def _on_opened(self, station: Station) -> None:
         self._link = station.link
-        self._conditions = Conditions(is_usb=station.settings.source == "realsense")
+        self._conditions = Conditions(
+            is_usb=station.settings.source == "realsense",
+            is_virtual=station.settings.headset == "virtual",
+        )
         plan = station.plan.settings
         if plan.name == "recommended":
             is_held = self._wizard_panel.wizard.is_held
@@ -376,7 +384,8 @@ class CalibrationController(QObject):
 
     def _on_command_failed(self, name: str, why: str) -> None:
         self._failed_command = name
-        self._window.banner.show_message(tr("Could not {}: {}").format(name, why))
+        done = ACTION_NAMES.get(name, name)
+        self._window.banner.show_message(tr("Could not {}: {}").format(done, why))
 
     def _save_notes(self, text: str) -> None:
         """Save notes in the engine's thread, or here if the engine has failed."""

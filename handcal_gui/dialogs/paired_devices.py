@@ -96,7 +96,9 @@ class PairedDevices(QWidget):
         for row, one in enumerate(devices):
             name = QTableWidgetItem(one.name or tr("Without a name"))
             is_connected = one.device_id == connected_id
-            device = QTableWidgetItem(f"{one.device_id}{', connected' if is_connected else ''}")
+            device = QTableWidgetItem(
+                tr("{}, connected").format(one.device_id) if is_connected else one.device_id
+            )
             device.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
             device.setFont(number_font())
             self._table.setItem(row, _NAME, name)

@@ -15,6 +15,7 @@ from handcal.errors import HandcalError
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.engine.worker import Worker
+from handcal_gui.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
@@ -111,7 +112,9 @@ class EngineThread(Worker):
             why = str(error)
         except Exception as error:
             _LOG.exception("the engine failed unexpectedly")
-            why = f"handcal hit an unexpected error ({_describe(error)}); the session is kept"
+            why = tr("handcal hit an unexpected error ({}); the session is kept").format(
+                _describe(error)
+            )
         self._emit_later(self.ended.emit, why)
 
     @contextmanager

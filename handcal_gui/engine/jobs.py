@@ -11,6 +11,7 @@ from PySide6.QtCore import Signal
 from handcal.errors import CancelledError, HandcalError
 from handcal.progress import Progress
 from handcal_gui.engine.worker import Worker
+from handcal_gui.translation import tr
 
 _LOG = logging.getLogger(__name__)
 _STEPS = 1000
@@ -67,9 +68,9 @@ class Job(Worker):
             self._emit_later(self.failed.emit, str(error))
         except Exception as error:
             _LOG.exception("a job failed unexpectedly")
+            described = f"{type(error).__name__}: {error}"
             self._emit_later(
-                self.failed.emit,
-                f"handcal hit an unexpected error ({type(error).__name__}: {error})",
+                self.failed.emit, tr("handcal hit an unexpected error ({})").format(described)
             )
         else:
             self._emit_later(self.succeeded.emit, result)

@@ -36,10 +36,14 @@ class NumberTable(QTableWidget):
     name : str
         For screen readers and, in lower case with dashes, as object name.
     parent : QWidget or None
+    hides : bool
+        Where not all columns fit, the last ones are hidden and are in the tooltips; otherwise the
+        table scrolls.
     """
 
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, name: str, parent: QWidget | None = None, *, hides: bool = False) -> None:
         super().__init__(parent)
+        self._hides = hides
         self.setObjectName(name.lower().replace(" ", "-"))
         self.setAccessibleName(name)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -65,11 +69,9 @@ class NumberTable(QTableWidget):
         self.setRowCount(len(rows))
         self.setHorizontalHeaderLabels(list(columns))
         for number, row in enumerate(rows):
-            label = QTableWidgetItem(row.label)
-            label.setToolTip(row.tooltip)
-            self.setVerticalHeaderItem(number, label)
+            self.setVerticalHeaderItem(number, QTableWidgetItem(row.label))
             for column, text in enumerate(row.cells):
-                self.setItem(number, column, _number_item(text, row.tooltip))
+                self.setItem(number, column, _number_item(text))
             if len(row.cells) < len(columns):
                 self.setSpan(number, len(row.cells) - 1, 1, len(columns) - len(row.cells) + 1)
         self._fit_columns()
@@ -93,14 +95,31 @@ class NumberTable(QTableWidget):
 
     def _fit_columns(self) -> None:
         """Give each column the width of its contents, and an equal share of the rest."""
-        header = self.horizontalHeader()
+        header, columns = self.horizontalHeader(), range(self.columnCount())
+        for column in columns:
+            self.showColumn(column)  # a hidden one has no width
         needed_px = [
             max(self.sizeHintForColumn(column), header.sectionSizeHint(column))
-            for column in range(self.columnCount())
+            for column in columns
         ]
-        spare_px = max(0, self.viewport().width() - sum(needed_px))
-        for column, width_px in enumerate(needed_px):
-            self.setColumnWidth(column, width_px + spare_px // len(needed_px))
+        room_px = self.viewport().width()
+        fits = [c == 0 or sum(needed_px[: c + 1]) <= room_px for c in columns]
+        shown = [column for column in columns if fits[column] or not self._hides]
+        spare_px = max(0, room_px - sum(needed_px[column] for column in shown))
+        for column in columns:
+            self.setColumnWidth(column, needed_px[column] + spare_px // len(shown))
+            self.setColumnHidden(column, column not in shown)
+        self._explain(hidden=range(len(shown), len(columns)))
+
+    def _explain(self, hidden: Sequence[int]) -> None:
+        """Set the tooltips, with the cells of hidden columns."""
+        for number, row in enumerate(self._rows):
+            more = [f"{self._columns[i]}: {row.cells[i]}" for i in hidden if i < len(row.cells)]
+            tooltip = "\n".join([*filter(None, (row.tooltip,)), *more])
+            items = (self.item(number, column) for column in range(len(row.cells)))
+            for item in (self.verticalHeaderItem(number), *items):
+                if item is not None:  # resized while the contents are replaced
+                    item.setToolTip(tooltip)
 
 
 def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:
@@ -109,9 +128,8 @@ def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:
     return "\n".join("\t".join(line) for line in lines)
 
 
-def _number_item(text: str, tooltip: str) -> QTableWidgetItem:
+def _number_item(text: str) -> QTableWidgetItem:
     item = QTableWidgetItem(text)
     item.setFont(number_font())
     item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    item.setToolTip(tooltip)
     return item

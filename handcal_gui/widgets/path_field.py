@@ -50,9 +50,12 @@ class PathField(QWidget):
         self._line.setAccessibleName(name)
         self._line.textChanged.connect(self.changed)
         buttons = []
-        for one, ask in (("file", self.choose_file), ("folder", self.choose_folder)):
+        for one, title, ask in (
+            ("file", tr("File…"), self.choose_file),
+            ("folder", tr("Folder…"), self.choose_folder),
+        ):
             if kind in (one, "either"):
-                text = f"{one.capitalize()}…" if kind == "either" else tr("Choose…")
+                text = title if kind == "either" else tr("Choose…")
                 buttons.append(button(f"{one}Choice", text, tr("Choose {}").format(name.lower())))
                 buttons[-1].clicked.connect(ask)
         fill_row(self, self._line, *buttons, grows=self._line)

@@ -13,7 +13,7 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from handcal_gui.keys import add_action
@@ -32,10 +32,12 @@ class RecordColumn:
     title: str
     tooltip: str
     is_number: bool = True
+    rank: int = 0
+    """Where not all columns fit, those of the highest rank are hidden first."""
 
 
 class RecordTable(QTableView):
-    """Shows one item per row.
+    """Shows one item per row; what is in columns that do not fit is in the row's tooltip.
 
     Parameters
     ----------
@@ -66,6 +68,7 @@ class RecordTable(QTableView):
         self._empty_text = empty_text
         self._is_read_only = False
         self._records = _Records(columns)
+        self._widths_px: list[int] = []
         self.setModel(self._records)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -89,6 +92,7 @@ class RecordTable(QTableView):
             tooltip=tr("Delete the selected row (Del); can be undone"),
             context=Qt.ShortcutContext.WidgetShortcut,
         )
+        self.delete_action.setObjectName("delete")
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.selectionModel().selectionChanged.connect(self._refresh)
         self._refresh()
@@ -103,6 +107,7 @@ class RecordTable(QTableView):
             self.selectRow(numbers.index(chosen) if is_there else min(row, len(numbers) - 1))
         if max(numbers, default=0) > max(before, default=0):
             self.scrollToBottom()
+        self._measure_columns()
         self._refresh()
 
     def set_read_only(self, is_read_only: bool) -> None:
@@ -114,6 +119,11 @@ class RecordTable(QTableView):
         """Return the number of the selected item; None if none is selected."""
         rows = self.selectionModel().selectedRows()
         return self._records.numbers[rows[0].row()] if rows else None
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show the columns that fit."""
+        super().resizeEvent(event)
+        self._show_fitting_columns()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint the hint while the table is empty."""
@@ -131,6 +141,27 @@ class RecordTable(QTableView):
         if number is not None:
             self.delete_requested.emit(number)
 
+    def _measure_columns(self) -> None:
+        header, columns = self.horizontalHeader(), range(self._records.columnCount())
+        for column in columns:
+            self.showColumn(column)  # a hidden one has no width
+        self._widths_px = [
+            max(self.sizeHintForColumn(column), header.sectionSizeHint(column))
+            for column in columns
+        ]
+        self._show_fitting_columns()
+
+    def _show_fitting_columns(self) -> None:
+        """Hide the columns that do not fit, those of the highest rank first."""
+        room_px, hidden = self.viewport().width(), set()
+        for column in self._records.by_rank if self._widths_px else ():
+            room_px -= self._widths_px[column]
+            if room_px < 0:
+                hidden.add(column)
+        self._records.hidden = frozenset(hidden)
+        for column in range(self._records.columnCount()):
+            self.setColumnHidden(column, column in hidden)
+
     def _refresh(self) -> None:
         has_choice = self.chosen_number() is not None
         self.delete_action.setEnabled(has_choice and not self._is_read_only)
@@ -142,7 +173,9 @@ class _Records(QAbstractTableModel):
     def __init__(self, columns: Sequence[RecordColumn]) -> None:
         super().__init__()
         self.numbers: list[int] = []
+        self.hidden: frozenset[int] = frozenset()
         self._columns = tuple(columns)
+        self.by_rank = sorted(range(len(columns)), key=lambda column: columns[column].rank)
         self._cells: list[tuple[str, ...]] = []
         self._font = number_font()
 
@@ -167,6 +200,10 @@ class _Records(QAbstractTableModel):
             return self._cells[index.row()][index.column()]
         if role == Qt.ItemDataRole.FontRole and column.is_number:
             return self._font
+        if role == Qt.ItemDataRole.ToolTipRole and self.hidden:
+            cells = self._cells[index.row()]
+            titles = ((self._columns[i].title, cells[i]) for i in sorted(self.hidden))
+            return "\n".join((column.tooltip, "", *(f"{title}: {cell}" for title, cell in titles)))
         return _look(column, role)
 
     def headerData(

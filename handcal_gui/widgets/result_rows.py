@@ -81,7 +81,7 @@ def _phi(index: int, direction: str) -> Quantity:
     )
 
 
-PHI = (_phi(0, tr("to the right of")), _phi(1, "below"), _phi(2, tr("in front of")))
+PHI = (_phi(0, tr("to the right of")), _phi(1, tr("below")), _phi(2, tr("in front of")))
 EXPECTED_ERROR = Quantity(
     tr("Expected error"),
     "′",
@@ -97,7 +97,7 @@ QUANTITIES = (
     *PHI,
     EXPECTED_ERROR,
     Quantity(
-        "RMS (mm)",
+        tr("RMS (mm)"),
         "",
         tr(
             "Distance between hand and cursor after registration, root mean square over the inliers"

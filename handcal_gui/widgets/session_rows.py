@@ -28,33 +28,41 @@ ALIGNMENT_COLUMNS = (
     RecordColumn(tr("No."), tr("Number of the alignment")),
     RecordColumn(tr("Eyes"), tr("Eyes open during the alignment"), is_number=False),
     RecordColumn(
-        tr("Rotation °"), tr("Angle between hand and cursor at the confirmation, in degrees")
+        tr("Rotation °"),
+        tr("Angle between hand and cursor at the confirmation, in degrees"),
+        rank=1,
     ),
-    RecordColumn(tr("Left φ mm"), _PHI.format(tr("left eye"))),
-    RecordColumn(tr("Right φ mm"), _PHI.format(tr("right eye"))),
+    RecordColumn(tr("Left φ mm"), _PHI.format(tr("left eye")), rank=5),
+    RecordColumn(tr("Right φ mm"), _PHI.format(tr("right eye")), rank=6),
     RecordColumn(
-        "RMS mm", tr("Distance between hand and cursor after registration, in millimetres")
+        tr("RMS mm"),
+        tr("Distance between hand and cursor after registration, in millimetres"),
+        rank=2,
     ),
     RecordColumn(
-        tr("Inliers %"), tr("Percentage of the hand's points with a partner on the cursor")
+        tr("Inliers %"),
+        tr("Percentage of the hand's points with a partner on the cursor"),
+        rank=3,
     ),
-    RecordColumn(tr("Time"), tr("Time of the confirmation")),
+    RecordColumn(tr("Time"), tr("Time of the confirmation"), rank=4),
 )
 TRIAL_COLUMNS = (
     RecordColumn(tr("No."), tr("Number of the trial")),
     RecordColumn(tr("Eye"), tr("Eye that looked at the target"), is_number=False),
-    RecordColumn(tr("Distance m"), tr("Distance of the target, in metres")),
+    RecordColumn(tr("Distance m"), tr("Distance of the target, in metres"), rank=1),
     RecordColumn(
-        tr("Error px"), tr("Mean over the target's four corners, in pixels of the display")
+        tr("Error px"),
+        tr("Mean over the target's four corners, in pixels of the display"),
+        rank=2,
     ),
     RecordColumn(tr("Error ′"), tr("Mean over the target's four corners, in arcminutes")),
-    RecordColumn(tr("Time"), tr("Time of the recording")),
+    RecordColumn(tr("Time"), tr("Time of the recording"), rank=3),
 )
 STATISTICS_COLUMNS = (
-    tr("Calibrations"),
     tr("Trials"),
     tr("Mean ′"),
     tr("SD of trials ′"),
+    tr("Calibrations"),
     tr("SD of calibrations ′"),
     tr("Median ′"),
     tr("Max ′"),
@@ -186,10 +194,10 @@ def _spread_cells(spread: TrialSpread) -> tuple[str, ...]:
         return NOTHING if sd_arcmin is None else f"{sd_arcmin:.1f}"
 
     return (
-        str(spread.calibrations),
         str(spread.trials),
         f"{spread.mean_arcmin:.1f}",
         text(spread.trial_sd_arcmin),
+        str(spread.calibrations),
         text(spread.calibration_sd_arcmin),
         f"{spread.median_arcmin:.1f}",
         f"{spread.max_arcmin:.1f}",

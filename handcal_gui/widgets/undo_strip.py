@@ -14,6 +14,8 @@ from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.session_rows import Deletion
 
+_TEXTS = {"alignment": tr("Alignment {} deleted."), "trial": tr("Trial {} deleted.")}
+
 
 class UndoStrip(QWidget):
     """Shows the last deletion; keeps its space while there is nothing to undo.
@@ -43,6 +45,7 @@ class UndoStrip(QWidget):
             self._restore,
             tooltip=tr("Restore the deleted item (Ctrl+Z)"),
         )
+        self._undo.setObjectName("undo")
         self._button = QToolButton()
         self._button.setDefaultAction(self._undo)
         policy = self._button.sizePolicy()
@@ -57,9 +60,7 @@ class UndoStrip(QWidget):
         self._undo.setEnabled(bool(deletions))
         self._button.setVisible(bool(deletions))
         if deletions:
-            self._text.setText(
-                tr("{} {} deleted.").format(deletions[-1].kind.capitalize(), deletions[-1].number)
-            )
+            self._text.setText(_TEXTS[deletions[-1].kind].format(deletions[-1].number))
         else:
             self._text.clear()
 

@@ -12,6 +12,14 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}; press Restart headset in Link</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>frames per second: only {:.0f} of the camera&apos;s {:.0f} are used; close other programs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>plug the camera into a USB 3 port</source>
         <translation type="unfinished"></translation>
     </message>
@@ -53,6 +61,10 @@
     </message>
     <message>
         <source>hide the target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>compare</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -460,6 +472,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}, connected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Revoke {}? Its session ends, and it connects again only after it has been paired again.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -595,7 +611,15 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Return</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Press a button at the lower left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alt+underlined letter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -603,7 +627,15 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Esc</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Move to the next button or field</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tab</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1469,6 +1501,22 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Redo</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Copy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Delete</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Find in sessions…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1506,6 +1554,62 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
     </message>
     <message>
         <source>Save</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>make cursor</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>confirm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>solve</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>apply</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>another alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>redo</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>verify the eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>confirm the verification</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>undo the last nudge</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>skip the verification</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>take the next step</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>check the left eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>check the right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>finish</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1554,6 +1658,10 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
     </message>
     <message>
         <source>Draw with the offline calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Move of the outline</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2268,7 +2376,19 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Convergence of each registration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Residuals</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Single</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ of each alignment alone</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2328,7 +2448,7 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Make a cursor; the hand&apos;s rotation from it is then shown here.</source>
+        <source>The hand&apos;s rotation from the cursor will be shown here.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2502,6 +2622,10 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>the eye distance is a number; enter 45 to 85 mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Show first</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2628,6 +2752,10 @@ and record which fits the hand better. The report tells which was which.</source
     </message>
     <message>
         <source>Error (′)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Median</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2994,6 +3122,14 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>File…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Folder…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3112,12 +3248,20 @@ an alignment of one may change the other, too.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>below</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Expected error</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Expected angle between real and drawn points at 0.4 to 0.6 m due to the uncertainty of φ,
 in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS (mm)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3227,6 +3371,10 @@ below and in front of the rig&apos;s viewpoint, in millimetres</source>
     </message>
     <message>
         <source>right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3356,11 +3504,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Restore the deleted item (Ctrl+Z)</source>
+        <source>Alignment {} deleted.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} {} deleted.</source>
+        <source>Trial {} deleted.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restore the deleted item (Ctrl+Z)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3377,6 +3529,10 @@ one turns out.</source>
     </message>
     <message>
         <source>&amp;File</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Edi&amp;t</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3506,6 +3662,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Calibration of this wearer, oldest first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, expected</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3793,6 +3957,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source> (and {} more)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} sound, every file read.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3853,7 +4021,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Bring the last deleted back</source>
+        <source>Bring the last deleted back (Ctrl+Z)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restore the deleted session</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5170,6 +5342,14 @@ one turns out.</source>
     </message>
     <message>
         <source>not done yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>handcal hit an unexpected error ({}); the session is kept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>handcal hit an unexpected error ({})</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

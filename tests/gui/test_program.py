@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -34,6 +35,7 @@ from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui import launch
+from handcal_gui.control.conditions import Conditions
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
@@ -185,6 +187,23 @@ def _no_network(_address: object) -> None:
 def can_start(technician: Technician) -> bool:
     """Return whether the start page allows starting a calibration."""
     return bool(technician.child(QPushButton, "start").isEnabled())
+
+
+def test_on_a_slow_computer_every_panel_comes_to_its_turn(
+    live: Technician, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller, panels = live.program.live, live.program.window.panels
+    monkeypatch.setattr(Conditions, "_watch_rate", lambda *_: None)
+    controller._conditions.is_slow = True  # after three seconds with few frames
+    live.program.window.resize(1600, 1000)
+    live.program.window.reset_layout()
+    shown: Counter[str] = Counter()
+    for name in ("cloud", "rotation", "camera"):
+        monkeypatch.setattr(
+            getattr(panels, name), "show_snapshot", lambda _, name=name: shown.update([name])
+        )
+    live.wait(lambda: min(shown[name] for name in ("cloud", "rotation", "camera")) >= 2)
+    assert shown["rotation"] >= shown["camera"], "guidance comes first"
 
 
 def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT) -> None:

@@ -43,6 +43,7 @@ WITH_IDENTIFIER = {
 NAMES = {"handcal", "OpenIGTLink", "LSL", "mm", "pairing.key"}
 _WORD = re.compile(r"[^\W\d_]{2,}")
 _IDENTIFIER = re.compile(r"[a-z][\w-]*")
+_FILLED = re.compile(r"^[^:</]*(\s\(?[a-z]{4,}\b|\b[a-z]{4,}\s)[^:</]*$")
 _SENTENCE = re.compile(r"[A-Z][a-z]+ [a-z]")
 
 
@@ -69,6 +70,11 @@ def untranslated(tree: ast.AST) -> Iterator[tuple[int, str]]:
                 if is_shown(one, allows_identifier=name in WITH_IDENTIFIER):
                     apart.add(id(one))
                     yield one.lineno, ast.unparse(one)
+        if isinstance(node, ast.JoinedStr):
+            for text in literals(node):
+                if id(text) not in apart and _FILLED.match(str(text.value)):
+                    apart.add(id(text))
+                    yield text.lineno, str(text.value)
     for text in literals(tree):
         if id(text) not in apart and _SENTENCE.match(str(text.value)):
             yield text.lineno, str(text.value)
@@ -102,10 +108,11 @@ def test_the_test_finds_texts_that_bypass_the_catalogue() -> None:
 label.setText("one")
 box = QLabel("Two words"), with_name(box, "three", "Four")
 _HELP = "Five is a sentence."
+name = f"{eye}, measured", f"color: {shade}", f"{kind}-number", f"{share:.1f} px"
 fine = tr("Six is translated"), with_name(box, "seven", tr("Eight")), label.setText("")
 """
     found = [text.strip("'") for _, text in untranslated(ast.parse(source))]
-    assert found == ["one", "Two words", "Four", "Five is a sentence."]
+    assert found == ["one", "Two words", "Four", ", measured", "Five is a sentence."]
 
 
 def test_the_catalogue_holds_every_text_once_in_one_context() -> None:

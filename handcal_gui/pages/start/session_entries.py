@@ -58,7 +58,9 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
 
 def _unfinished(session: UnfinishedSession) -> Entry:
     if session.problem:
-        text = f"{session.path.name}: {session.problem}"
+        name = session.path.name
+        named = session.problem.replace(str(session.path), name)
+        text = named if name in named else f"{name}: {named}"
         return Entry(session.path, text, is_enabled=False)
     text = _text(session.wearer, session.started, session.alignments, session.trials)
     if session.damaged:
@@ -82,6 +84,9 @@ def _recent(path: Path) -> Entry | None:
 
 
 def _text(wearer: str, started: str, alignments: int, trials: int) -> str:
-    held = ((alignments, "alignment"), (trials, "trial"))
-    counts = ", ".join(pluralize(number, what) for number, what in held if number)
+    held = (
+        (alignments, tr("alignment"), tr("alignments")),
+        (trials, tr("trial"), tr("trials")),
+    )
+    counts = ", ".join(pluralize(*one) for one in held if one[0])
     return " · ".join(filter(None, (wearer or tr("Without a name"), local_time(started), counts)))

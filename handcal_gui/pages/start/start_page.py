@@ -107,7 +107,7 @@ class StartPage(QWidget):
         evaluate = button(
             "evaluate", tr("Evaluate…"), help_text=tr("Measure the accuracy of calibrations")
         )
-        self._evaluate.body.addWidget(evaluate, 0, Qt.AlignmentFlag.AlignRight)
+        self._evaluate.add_to_head(evaluate)
         self._lay_out()
         self._find = LatestJob(lambda question: find_sessions(*question), self)
         self._find.answered.connect(self._show_sessions)
@@ -177,7 +177,7 @@ class StartPage(QWidget):
 
     def _lay_out(self) -> None:
         title = QLabel("handcal")
-        scale_font(title, 2.0, is_bold=True)
+        scale_font(title, 1.6, is_bold=True)
         cards = QWidget()
         parts = (self._resume, 1), (self._open, 1), self._evaluate
         vbox(*parts, on=cards, margins=0, spacing=2 * SPACING_PX)
@@ -190,7 +190,7 @@ class StartPage(QWidget):
         content.setMaximumSize(*_LARGEST_PX)
         hbox(1, (content, 1000), 1, on=self, margins=0)
         grid = QGridLayout(content)
-        grid.setContentsMargins(*4 * (3 * SPACING_PX,))
+        grid.setContentsMargins(*4 * (2 * SPACING_PX,))
         grid.setSpacing(2 * SPACING_PX)
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)

@@ -12,7 +12,7 @@ from handcal.types import EYES, Eye, Frame
 from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
-from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas, show_alike
 from handcal_gui.panels.wearer_view.panel import origin_text
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
@@ -128,6 +128,7 @@ class GuidePicture(QWidget):
             when = (tr(", before the calibration") if self._is_before else tr(", now")) * is_result
             origin = origin_text(view, is_solved=is_solved)
             self._titles[eye].setText(f"{EYE_NAMES[eye]}{origin}{when}")
+        show_alike([self._eyes[eye] for eye in eyes])
         self.result.setVisible(is_result)
         if is_result:
             self.result.show_snapshot(snapshot)

@@ -67,6 +67,25 @@ class Action(StrEnum):
     EXPORT = "export"
 
 
+ACTION_NAMES: dict[str, str] = {
+    Action.MAKE_CURSOR: tr("make cursor"),
+    Action.CONFIRM: tr("confirm"),
+    Action.SOLVE: tr("solve"),
+    Action.APPLY: tr("apply"),
+    Action.ANOTHER: tr("another alignment"),
+    Action.REDO: tr("redo"),
+    Action.VERIFY: tr("verify the eye"),
+    Action.VERIFIED: tr("confirm the verification"),
+    Action.UNDO_NUDGE: tr("undo the last nudge"),
+    Action.SKIP: tr("skip the verification"),
+    Action.TAKE_STEP: tr("take the next step"),
+    Action.CHECK_LEFT: tr("check the left eye"),
+    Action.CHECK_RIGHT: tr("check the right eye"),
+    Action.FINISH: tr("finish"),
+}
+"""The engine's commands in the user's language, within "Could not …"."""
+
+
 @dataclass(frozen=True, slots=True)
 class Precondition:
     """A precondition, and whether it holds."""

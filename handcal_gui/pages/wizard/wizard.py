@@ -100,6 +100,11 @@ class WizardPanel(QWidget):
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
         self._nudges = self._nudge_actions()
+        self._undo = add_action(
+            self, tr("Move of the outline"), "", lambda: self.asked.emit(Action.UNDO_NUDGE)
+        )
+        self._undo.setObjectName("undo")
+        self._undo.setEnabled(False)
         self._go_back = self._go_back_actions()
         self._rail = _Rail()
         self._title = QLabel()
@@ -271,6 +276,9 @@ class WizardPanel(QWidget):
         self._note.setVisible(bool(view.note))
         for action in self._nudges:
             action.setEnabled(view.main.action is Action.VERIFIED)
+        self._undo.setEnabled(
+            any(one.action is Action.UNDO_NUDGE and one.is_enabled for one in view.others)
+        )
         for action in self._go_back:
             action.setEnabled(view.step is not Step.CONNECT)
         self.bar.show_view(view)

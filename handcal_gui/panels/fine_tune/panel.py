@@ -265,8 +265,10 @@ class FineTunePanel(QWidget):
     def _make_actions(self) -> None:
         add = self._add_action
         self._undo = add(tr("Undo"), "Ctrl+Z", tr("Undo the last change"))
+        self._undo.setObjectName("undo")
         self._undo.triggered.connect(lambda: self._go(self._history.undo))
         self._redo = add(tr("Redo"), "Ctrl+Shift+Z", tr("Redo the change"))
+        self._redo.setObjectName("redo")
         self._redo.triggered.connect(lambda: self._go(self._history.redo))
         self._both = add(tr("Both eyes"), "L", tr("Move both eyes by the same amount"))
         self._both.setCheckable(True)

@@ -88,6 +88,7 @@ class ResultsPanel(QWidget):
         rig : Rig
         """
         self._results = results
+        self._copy.setEnabled(results is not None)
         self._stack.setCurrentIndex(0 if results is None else 1)
         if results is None:
             return
@@ -118,12 +119,14 @@ class ResultsPanel(QWidget):
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 
     def _add_copy(self) -> None:
-        add_action(
+        self._copy = add_action(
             self,
             tr("Copy as text"),
             "Ctrl+C",
             lambda: QGuiApplication.clipboard().setText(self.as_text()),
         )
+        self._copy.setObjectName("copy")
+        self._copy.setEnabled(False)  # until there are results
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
 
     def _lay_out(self) -> None:
@@ -135,9 +138,11 @@ class ResultsPanel(QWidget):
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
         tabs.addTab(self._eyes_tab(), tr("Eyes"))
-        tabs.addTab(self._convergence, tr("Convergence"))
+        tabs.addTab(self._convergence, tr("Iterations"))
+        tabs.setTabToolTip(1, tr("Convergence of each registration"))
         tabs.addTab(self._residuals, tr("Residuals"))
-        tabs.addTab(self._alignments_tab(), tr("Alignments"))
+        tabs.addTab(self._alignments_tab(), tr("Single"))
+        tabs.setTabToolTip(3, tr("φ of each alignment alone"))
         tabs.addTab(self._compare, tr("Compare"))
         self._stack = QStackedLayout(self)
         self._stack.addWidget(empty)

@@ -30,7 +30,7 @@ _STRAIGHT_RAD = np.radians(2.0)
 """Rotations below this need no correction: hardly more than the guard's own error."""
 _SHAPE_M = 0.0015
 """A smaller change of shape, rms, is not worth a word."""
-_NO_CURSOR = tr("Make a cursor; the hand's rotation from it is then shown here.")
+_NO_CURSOR = tr("The hand's rotation from the cursor will be shown here.")
 _TAKEN = tr("The alignment is confirmed.")
 _NO_HAND = tr("Hold the hand in view of the camera.")
 _STRAIGHT = tr("The hand is rotated like the cursor.")

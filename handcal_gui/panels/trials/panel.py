@@ -113,7 +113,7 @@ class TrialsPanel(QWidget):
             tr("Trials"), TRIAL_COLUMNS, tr("Trials appear here as they are recorded")
         )
         self._table.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
-        self._statistics = NumberTable(tr("Statistics of trials"))
+        self._statistics = NumberTable(tr("Statistics of trials"), hides=True)
         self._plot = TrialPlot()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(

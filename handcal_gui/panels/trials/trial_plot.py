@@ -34,7 +34,7 @@ class TrialPlot(Plot):
         )
         self.item.setLimits(yMin=0.0)
         self.show_legend()
-        self._median = self.add_line("muted", name="Median")
+        self._median = self.add_line("muted", name=tr("Median"))
         self._errors = {
             eye: self.add_line(eye, name=EYE_NAMES[eye], symbol=_SIGNS[eye][0]) for eye in EYES
         }

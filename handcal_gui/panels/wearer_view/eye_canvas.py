@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QTransform
@@ -47,14 +49,20 @@ class EyeCanvas(QWidget):
         self._view: EyeView | None = None
         self._image = QImage()
         self._message = ""
-        self._crop = QRectF()
+        self._crop = self._shown = QRectF()
         self._is_whole = self._is_offline_shown = False
         self._is_drawn_shown = True
 
     @property
     def crop_px(self) -> QRectF:
         """The part of the display that is shown, in its pixels; more if there is space."""
-        return self._crop
+        return self._shown
+
+    def show_part(self, part_px: QRectF) -> None:
+        """Show another part of the display, until the view changes."""
+        if part_px != self._shown:
+            self._shown = part_px
+            self.update()
 
     def show_view(self, view: EyeView | None, message: str = "") -> None:
         """Show a view, or a message over its dimmed image."""
@@ -70,7 +78,7 @@ class EyeCanvas(QWidget):
     def show_whole(self, is_whole: bool) -> None:
         """Show the whole display, or crop it to the hand."""
         self._is_whole = is_whole
-        self._crop = QRectF()
+        self._crop = self._shown = QRectF()
         self._choose_crop()
         self.update()
 
@@ -133,7 +141,7 @@ class EyeCanvas(QWidget):
 
     def _to_widget(self) -> QTransform:
         """Return the transform that fits the crop into the widget."""
-        crop = self._crop
+        crop = self._shown
         scale = min(self.width() / crop.width(), self.height() / crop.height())
         to_widget = QTransform.fromTranslate(self.width() / 2, self.height() / 2)
         to_widget.scale(scale, scale)
@@ -154,6 +162,19 @@ class EyeCanvas(QWidget):
         elif not self._crop.contains(hand) or not _is_close(self._crop, hand):
             margin = _MARGIN * max(hand.width(), hand.height())
             self._crop = hand.adjusted(-margin, -margin, margin, margin)
+        self._shown = self._crop
+
+
+def show_alike(canvases: Collection[EyeCanvas]) -> None:
+    """Show the same rows of several displays, at one scale."""
+    known = [canvas for canvas in canvases if not canvas.crop_px.isEmpty()]
+    if not known:
+        return
+    parts = [canvas.crop_px for canvas in known]
+    top, bottom = min(one.top() for one in parts), max(one.bottom() for one in parts)
+    width = max(one.width() for one in parts)
+    for canvas, part in zip(known, parts, strict=True):
+        canvas.show_part(QRectF(part.center().x() - width / 2, top, width, bottom - top))
 
 
 def _display(view: EyeView) -> QRectF:

@@ -194,7 +194,7 @@ class SessionsModel(QAbstractTableModel):
             case Qt.ItemDataRole.UserRole:
                 return column.key(entry)
             case Qt.ItemDataRole.ToolTipRole:
-                return entry.problem or str(entry.path)
+                return f"{column.text(entry)}\n{entry.problem or entry.path}"  # it may be elided
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font
             case Qt.ItemDataRole.TextAlignmentRole:

@@ -26,12 +26,17 @@ class TrendPlot(Plot):
         self.show_legend()
         self.item.setLimits(yMin=0.0)
         self._measured = {
-            eye: self.add_line(eye, name=f"{EYE_NAMES[eye]}, measured", symbol=_SYMBOLS[eye])
+            eye: self.add_line(
+                eye, name=tr("{}, measured").format(EYE_NAMES[eye]), symbol=_SYMBOLS[eye]
+            )
             for eye in EYES
         }
         self._expected = {
             eye: self.add_line(
-                eye, name=f"{EYE_NAMES[eye]}, expected", dashed=True, symbol=_SYMBOLS[eye]
+                eye,
+                name=tr("{}, expected").format(EYE_NAMES[eye]),
+                dashed=True,
+                symbol=_SYMBOLS[eye],
             )
             for eye in EYES
         }

@@ -124,6 +124,7 @@ class LibraryWindow(QDialog):
     def showEvent(self, event: QShowEvent) -> None:
         """Read the folder."""
         super().showEvent(event)
+        self._begin_search()
         self.reload()
 
     def _read(
@@ -153,6 +154,10 @@ class LibraryWindow(QDialog):
             most_px = _LONG_NAMES_PX.get(column.title, _MOST_SHOWN_PX)
             self._table.setColumnWidth(number, min(self._table.columnWidth(number), most_px))
 
+    def _begin_search(self) -> None:
+        self._search.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self._search.selectAll()
+
     def _search_again(self) -> None:
         self._filter.search(self._search.text(), self._kind.currentData())
         self._refresh()
@@ -169,6 +174,7 @@ class LibraryWindow(QDialog):
         self._repair.setEnabled(is_free and len(chosen) == 1)
         self._delete.setEnabled(is_free and bool(chosen))
         self._undo.setVisible(bool(self._deleted))
+        self._undo.setEnabled(is_free and bool(self._deleted))
         last = self._deleted[-1].name if self._deleted else ""
         self._deleted_text.setText(tr("{} deleted.").format(last) if last else "")
         shown, total = self._filter.rowCount(), self._sessions.rowCount()
@@ -220,7 +226,8 @@ class LibraryWindow(QDialog):
                     continue
                 named = "; ".join(map(str, found.damaged[:_MOST_NAMED]))
                 more = len(found.damaged) - _MOST_NAMED
-                lines.append(f"{path.name}: {named}{f' (and {more} more)' if more > 0 else ''}")
+                others = tr(" (and {} more)").format(more) if more > 0 else ""
+                lines.append(f"{path.name}: {named}{others}")
             sound = len(paths) - len(lines)
             count = pluralize(sound, tr("session"), tr("sessions"))
             return "\n".join((tr("{} sound, every file read.").format(count), *lines))
@@ -317,7 +324,7 @@ class LibraryWindow(QDialog):
             (
                 "restoreSession",
                 tr("Restore"),
-                tr("Bring the last deleted back"),
+                tr("Bring the last deleted back (Ctrl+Z)"),
                 self._restore_last,
             ),
         ]
@@ -331,6 +338,8 @@ class LibraryWindow(QDialog):
         self._delete, self._undo = found[5:]
         add_action(self._table, tr("Delete sessions"), "Del", self._delete.click)
         add_action(self._table, tr("Open the session"), "Return", self._open_chosen)
+        add_action(self, tr("Search"), "Ctrl+F", self._begin_search)
+        add_action(self, tr("Restore the deleted session"), "Ctrl+Z", self._undo.click)
 
     def _lay_out(self) -> None:
         self._deleted_text = ElidedLabel()

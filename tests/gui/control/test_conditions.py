@@ -31,6 +31,16 @@ def test_a_problem_that_passes_is_not_shown(snapshot: Maker) -> None:
     assert watch(conditions, fine, [3.1]) == [""]
 
 
+def test_a_virtual_headset_that_ended_is_the_cause_of_all_else(snapshot: Maker) -> None:
+    ended = replace(snapshot(**UNPLUGGED), link_problem="the virtual headset has ended.")
+    for is_virtual, text in (
+        (True, "the virtual headset has ended; press Restart headset in Link"),
+        (False, "the camera was unplugged"),
+    ):
+        conditions = Conditions(is_virtual=is_virtual)
+        assert watch(conditions, ended, [0.0, 5.0])[-1] == text
+
+
 def test_a_start_is_no_problem(snapshot: Maker) -> None:
     conditions = Conditions()
     silent = snapshot(
@@ -70,6 +80,22 @@ def test_advice_names_usb_only_for_a_camera_that_sends_few_frames(
     watch(conditions, snapshot(camera={"rate_hz": 2.0}), [0.0, 1.0])
     later = snapshot(camera={"rate_hz": 2.0, "dropped": dropped})
     assert watch(conditions, later, [4.0, 5.0])[-1].endswith(f"needed; {advice}")
+
+
+@pytest.mark.parametrize(("lost", "is_named"), [(20, True), (4, False), (0, False)])
+def test_a_computer_that_loses_many_frames_says_so(
+    snapshot: Maker, lost: int, is_named: bool
+) -> None:
+    """At 15 frames taken a second, so many others are lost."""
+    conditions, said = Conditions(), [""]
+    for second in range(6):
+        seen = snapshot(camera={"rate_hz": 15.0, "dropped": lost * second})
+        said = watch(conditions, seen, [float(second)])
+    text = "frames per second: only 15 of the camera's 35 are used; close other programs"
+    assert said == [text if is_named else ""]
+    assert conditions.is_slow == is_named
+    watch(conditions, snapshot(camera={"rate_hz": 30.0, "dropped": 5 * lost}), [6.0, 10.0, 11.0])
+    assert not conditions.is_slow
 
 
 @pytest.mark.parametrize("rate_hz", [8.0, 15.0, 30.0])

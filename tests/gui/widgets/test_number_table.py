@@ -45,3 +45,18 @@ def test_columns_share_the_room_and_cut_no_number_short(qtbot: QtBot) -> None:
         for column, column_px in enumerate(widths_px):
             assert column_px >= table.sizeHintForColumn(column)
     assert sum(widths_px) == pytest.approx(table.viewport().width(), abs=1)
+
+
+def test_last_columns_that_do_not_fit_may_be_in_the_tooltips(qtbot: QtBot) -> None:
+    table = NumberTable("Some numbers", hides=True)
+    qtbot.addWidget(table)
+    table.show_rows(("Mean ′", "Max ′"), (Row("All", ("2.5", "4.0"), "each counts once"),))
+    table.show()
+    table.resize(table.verticalHeader().width() + table.sizeHintForColumn(0) + 30, 120)
+    assert [table.isColumnHidden(column) for column in range(2)] == [False, True]
+    item = table.item(0, 0)
+    assert item is not None
+    assert item.toolTip() == "each counts once\nMax ′: 4.0"
+    table.resize(900, 120)
+    assert [table.isColumnHidden(column) for column in range(2)] == [False, False]
+    assert item.toolTip() == "each counts once"

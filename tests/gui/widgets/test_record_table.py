@@ -78,3 +78,28 @@ def test_nothing_is_deleted_from_what_is_only_read(table: RecordTable) -> None:
     assert not table.delete_action.isEnabled()
     table.set_read_only(False)
     assert table.delete_action.isEnabled()
+
+
+def test_columns_that_do_not_fit_are_in_the_tooltip_of_the_row(qtbot: QtBot) -> None:
+    columns = (
+        RecordColumn("No.", "Number"),
+        RecordColumn("Size mm", "Its size", rank=2),
+        RecordColumn("Name", "Its name", is_number=False, rank=1),
+    )
+    table = RecordTable("Things", columns, "Things appear here")
+    qtbot.addWidget(table)
+    table.show()
+    table.show_rows({7: ("7", "1.25", "a name of some length")})
+    no, size, name = (table.columnWidth(column) for column in range(3))
+    for width, hidden in (
+        (no + size + name + 10, []),
+        (no + name + 10, [1]),
+        (no + 10, [1, 2]),
+        (no + size + name + 10, []),
+    ):
+        table.resize(width, 200)
+        qtbot.waitUntil(lambda: table.horizontalScrollBar().maximum() == 0)
+        assert [column for column in range(3) if table.isColumnHidden(column)] == hidden
+    table.resize(no + name + 10, 200)
+    tooltip = table.model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
+    assert tooltip == "Number\n\nSize mm: 1.25"

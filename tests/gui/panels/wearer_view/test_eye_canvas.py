@@ -7,7 +7,7 @@ from pytestqt.qtbot import QtBot
 from handcal.rig.example import example_rig
 from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import Float64, UInt8
-from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas, show_alike
 from handcal_gui.theme import colors
 from handcal_gui.widgets.splat import rgb
 
@@ -54,6 +54,21 @@ def test_message_stands_alone(canvas: EyeCanvas) -> None:
     assert _has(canvas, colors().live)
     canvas.show_view(_view(), "No hand in view")
     assert not _has(canvas, colors().live)
+
+
+def test_two_displays_show_the_same_rows_at_one_scale(qtbot: QtBot) -> None:
+    canvases = [EyeCanvas(f"{side} eye") for side in ("Left", "Right")]
+    for canvas, off_m in zip(canvases, ([0.0, 0.0, 0.0], [0.03, 0.05, 0.2]), strict=True):
+        qtbot.addWidget(canvas)
+        canvas.show_view(_view(RING_M + off_m))
+    own = [canvas.crop_px for canvas in canvases]
+    show_alike(canvases)
+    one, other = (canvas.crop_px for canvas in canvases)
+    assert (one.top(), one.height(), one.width()) == (other.top(), other.height(), other.width())
+    assert one.top() != own[0].top() or other.top() != own[1].top()
+    for canvas, crop in zip(canvases, own, strict=True):
+        assert canvas.crop_px.contains(crop.adjusted(0.1, 0.1, -0.1, -0.1))
+    show_alike([EyeCanvas("Nothing shown")])
 
 
 def test_crop_holds_the_hand_and_stays_while_it_does(canvas: EyeCanvas) -> None:

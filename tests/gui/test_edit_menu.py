@@ -1,0 +1,95 @@
+"""The menu Edit triggers the actions of the panels, and none of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtGui import QAction
+from pytestqt.qtbot import QtBot
+
+from handcal.register.results import Results
+from handcal.session.session import Session, SessionRecord
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.window import MainWindow
+from handcal_gui.windows.library.window import LibraryWindow
+from tests.gui.helpers import child
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path) -> Iterator[MainWindow]:
+    program = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(program.window)
+    program.window.show()
+    program.window.activateWindow()
+    yield program.window
+    program.window.close()
+
+
+def offered(window: MainWindow) -> dict[str, str]:
+    """Return the texts of the enabled entries by their names, as after opening the menu."""
+    menu = window.menus["Edit"]
+    menu.aboutToShow.emit()
+    entries = (one for one in menu.actions() if one.isEnabled() and one.objectName())
+    return {one.objectName(): one.text().replace("&", "") for one in entries}
+
+
+def press(window: MainWindow, name: str) -> None:
+    child(window, QAction, name).trigger()
+
+
+def test_nothing_can_be_edited_without_a_session(window: MainWindow) -> None:
+    assert offered(window) == {}
+    window.show_page("live")
+    assert offered(window) == {}
+
+
+def test_a_deletion_is_chosen_in_the_table_and_undone_from_anywhere(
+    qtbot: QtBot, window: MainWindow, record: SessionRecord, results: Results
+) -> None:
+    window.show_page("live")
+    session = window.panels.session
+    session.show_record(record, results)
+    window.go_to("session")
+    table = child(session, RecordTable, "alignments")
+    table.selectRow(1)
+    assert "edit-delete" not in offered(window), "the selection is not what the focus is on"
+    table.setFocus()
+    assert offered(window) == {"edit-delete": "Delete: Session\tDel"}
+    with qtbot.waitSignal(session.delete_requested) as asked:
+        press(window, "edit-delete")
+    assert asked.args == ["alignment", 2]
+    with Session(record.path) as stored:
+        stored.delete("alignment", 2)
+    session.show_record(Session.open(record.path), None)
+    assert offered(window)["edit-undo"] == "Undo: Session\tCtrl+Z"
+    window.go_to("camera")
+    assert offered(window) == {"edit-undo": "Undo: Session"}
+    with qtbot.waitSignal(session.restore_requested) as asked:
+        press(window, "edit-undo")
+    assert asked.args == ["alignment", 2]
+    window.show_page("start")
+    assert offered(window) == {}
+
+
+def test_results_are_copied_once_there_are_some(
+    window: MainWindow, record: SessionRecord, results: Results
+) -> None:
+    window.show_page("review")
+    window.panels.results.show_results(results, record.alignments, record.rig)
+    assert offered(window) == {"edit-copy": "Copy: Results"}
+    window.panels.results.show_results(None, {}, record.rig)
+    assert offered(window) == {}
+
+
+def test_find_opens_the_library_at_its_search(window: MainWindow) -> None:
+    find = next(a for a in window.menus["Edit"].actions() if a.shortcut().toString() == "Ctrl+F")
+    find.trigger()
+    library = child(window, LibraryWindow, "library")
+    focus = library.focusWidget()
+    assert focus is not None
+    assert focus.objectName() == "search"
+    library.accept()
