@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from handcal.link.server import HeadsetServer
+    from handcal.rig_types import Rig
     from handcal.sim.cube_bench import CubeBench
     from handcal.station.cube_tracking import CubeTracker
-    from handcal.types import Eye, Float64, Rig
+    from handcal.types import Eye, Float64
 
 _STEP_MM = 0.25
 _KEYS: Mapping[str, tuple[int, float]] = {

@@ -21,6 +21,7 @@ from handcal.progress import Progress
 from handcal.register.fuse import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Rig
 from handcal.sim.hand import Side
 from handcal.sim.wearer import WearerSettings, draw_eyes
 from handcal.station.evidence import Contradiction
@@ -32,7 +33,7 @@ from handcal.station.procedure import Calibration, Observation
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName, Rig
+from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName
 
 # A slow computer gets more time.
 _PATIENCE = Patience(60.0, frames=300)

@@ -21,9 +21,10 @@ from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import device_number
 from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
+from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import Packet, Rejection, Slot
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection, Shape, Target
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 
 MAX_WEARERS = 16
 _POSES_PER_DATAGRAM = 3

@@ -19,17 +19,9 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import DIGEST_BYTES
 from handcal.link.pairing import MAX_NAME_CHARACTERS
 from handcal.link.reliable import Receipt
+from handcal.link.shapes import Shape, Target
 from handcal.link.wire import MAX_FRAGMENTS, Slot
-from handcal.types import (
-    EYES,
-    Eye,
-    Float64,
-    HeadsetIdentity,
-    HeadsetView,
-    Projection,
-    Shape,
-    Target,
-)
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView, Projection
 
 QUANTUM_M = 1e-4
 MAX_POINTS = 50_000

@@ -22,7 +22,8 @@ from handcal.display import (
     target_corners_m,
 )
 from handcal.geometry import project
-from handcal.types import EyeDisplay, EyeShift, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import EyeShift, Float64
 
 _SAMPLES_LOG2 = 9
 _STEP_M = 1e-5

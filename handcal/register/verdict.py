@@ -15,7 +15,8 @@ import numpy as np
 
 from handcal.register.benefit import Benefit, benefit, expected_arcmin, foreseen_benefits
 from handcal.register.fuse import Fused, eye_position_m, eye_slice
-from handcal.types import EYES, Eye, EyeShift, PlanName, Rig, Verdict, Verification
+from handcal.rig_types import Rig
+from handcal.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
 
 MOST_ALIGNMENTS = 10
 # More than this are not worth it where the offline calibration is within the target.

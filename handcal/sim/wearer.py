@@ -15,6 +15,7 @@ import numpy as np
 from handcal.display import view_of_eye
 from handcal.geometry import interpolate_pose, invert, rigid, transform
 from handcal.link.nudges import NudgeSum, VerifyRequest
+from handcal.rig_types import Rig
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import (
     CursorMatch,
@@ -25,7 +26,7 @@ from handcal.sim.placement import (
     view_through,
 )
 from handcal.sim.verifying import Check, SeenDifference, see_difference
-from handcal.types import EYES, LOOK_AROUND, Eye, Float64, Rig
+from handcal.types import EYES, LOOK_AROUND, Eye, Float64
 
 _Phase: TypeAlias = Literal["raised", "reaching", "awaiting", "verifying"]
 

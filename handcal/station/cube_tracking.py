@@ -22,11 +22,12 @@ from handcal.errors import (
 )
 from handcal.geometry import invert, transform
 from handcal.link.server import HeadsetServer
+from handcal.link.shapes import Shape
 from handcal.progress import Progress
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_track import CubeFilter, CubeTrackSettings, TrackedCube, cube_corners_m
 from handcal.station.procedure import CalibrationSettings
-from handcal.types import EYES, Float64, Frame, Shape, UInt8
+from handcal.types import EYES, Float64, Frame, UInt8
 
 _WAITING = 30  # frames whose head pose has not arrived
 _RESEND_M = 0.0003

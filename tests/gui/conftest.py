@@ -28,6 +28,7 @@ from handcal.link.server import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
+from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
@@ -46,7 +47,6 @@ from handcal.types import (
     Float64,
     Frame,
     HeadsetIdentity,
-    Rig,
     UInt8,
 )
 

@@ -21,17 +21,9 @@ from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.settings import LinkSettings
+from handcal.link.shapes import Shape, Target
 from handcal.link.wire import Rejection
-from handcal.types import (
-    EYES,
-    Eye,
-    Float64,
-    HeadsetIdentity,
-    HeadsetView,
-    Projection,
-    Shape,
-    Target,
-)
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView, Projection
 from tests.helpers import eventually
 
 BAD = Impairment(loss=0.3, reorder=0.2, duplicate=0.2, delay_s=0.003, seed=1)

@@ -13,8 +13,9 @@ from handcal.rig.cube_file import read_cube
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid
+from handcal.rig_types import Rig
 from handcal.sim.cube_captures import CaptureSettings, write_captures
-from handcal.types import Intrinsics, Rig
+from handcal.types import Intrinsics
 
 CAMERA = Intrinsics(640, 360, 900.0, 898.5, 322.0, 177.5, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
 SETTINGS = CaptureSettings(positions=("left",), poses=1, points=1000, camera=CAMERA)

@@ -17,6 +17,7 @@ from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer, LinkStatistics
 from handcal.link.wire import VERSION
 from handcal.rig.example import example_rig
+from handcal.rig_types import DisplayCheck
 from handcal.sim.camera import SyntheticCamera, SyntheticSettings
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
@@ -31,14 +32,7 @@ from handcal.station.headset import (
     headset_state,
     run_pose_delay,
 )
-from handcal.types import (
-    DisplayCheck,
-    Float64,
-    Frame,
-    HeadsetIdentity,
-    HeadsetView,
-    Intrinsics,
-)
+from handcal.types import Float64, Frame, HeadsetIdentity, HeadsetView, Intrinsics
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()

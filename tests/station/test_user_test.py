@@ -11,13 +11,14 @@ from handcal.errors import CameraEndError, FileError, HandcalError
 from handcal.geometry import transform
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
+from handcal.link.shapes import Shape
 from handcal.rig.cube import Cube
 from handcal.rig.cube_track import TrackedCube, cube_corners_m
 from handcal.session.session import Session
 from handcal.sim.cube_bench import CubeBench
 from handcal.station.cube_tracking import CubeTracker, run_cube_tracking
 from handcal.station.user_test import TrialSettings, run_user_trials
-from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics, Shape
+from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics
 from tests.helpers import ROOT
 
 TRUE_M: dict[Eye, Float64] = {
