@@ -1,4 +1,4 @@
-"""What a session survives: other writers, kills, a full disk, and files that are damaged."""
+"""Sessions that survive other writers, kills, a full disk, and damaged files."""
 
 import contextlib
 import json

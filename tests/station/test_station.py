@@ -30,7 +30,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.station.verifying import SKIPPED
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
-from tests.helpers import Patience, eventually
+from tests.helpers import Patience, eventually, slow_simulator, write_small_rig
 
 NAIVE_SEED = 3
 PATIENCE_S = 50.0
@@ -43,9 +43,13 @@ CALIBRATION = CalibrationSettings(
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> StationSettings:
+def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StationSettings:
+    slow_simulator(monkeypatch)
     return StationSettings(
-        seed=NAIVE_SEED, sessions=str(tmp_path / "sessions"), calibration=CALIBRATION
+        seed=NAIVE_SEED,
+        rig=str(write_small_rig(tmp_path / "rig.yaml")),
+        sessions=str(tmp_path / "sessions"),
+        calibration=CALIBRATION,
     )
 
 
