@@ -15,6 +15,7 @@ from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
+from handcal.link.fields import MalformedError
 from handcal.link.impair import UNIMPAIRED, ImpairedTransport, Impairment
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
@@ -247,7 +248,7 @@ class HeadsetClient(Endpoint):
         envelope = messages.parse(packet.payload)
         body = envelope.WhichOneof("body")
         if body not in ("retry", "welcome", "refused"):
-            raise messages.MalformedError(f"no handshake has a {body}")
+            raise MalformedError(f"no handshake has a {body}")
         if self._channel is not None or getattr(envelope, body).nonce != self._nonce:
             return Rejection.REPLAYED
         match body:
@@ -317,7 +318,7 @@ class HeadsetClient(Endpoint):
                 target = messages.read_target(envelope.target)
                 self._state = replace(self._state, target=target)
             case other:
-                raise messages.MalformedError(f"a PC sends no {other}")
+                raise MalformedError(f"a PC sends no {other}")
 
     def _keep(self, projection: Projection) -> None:
         """Draw with a projection, and keep it by its wearer; those of another rig are dropped."""

@@ -13,7 +13,8 @@ from handcal.errors import CameraTimeoutError, HandcalError, HandError, PoseErro
 from handcal.geometry import transform
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
-from handcal.link.server import HeadsetServer, LinkStatistics
+from handcal.link.server import HeadsetServer
+from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION, Rejection
 from handcal.progress import Progress
 from handcal.rig_types import Rig

@@ -24,7 +24,7 @@ from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.io.closable import Closable
 from handcal.io.settings import settings_json
 from handcal.link.client import HeadsetClient, HeadsetState
-from handcal.link.server import LinkStatistics
+from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig

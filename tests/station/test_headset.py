@@ -15,7 +15,8 @@ import pytest
 from handcal.errors import HandcalError, PoseError
 from handcal.geometry import invert, rigid, transform
 from handcal.link.client import HeadsetClient
-from handcal.link.server import HeadsetServer, LinkStatistics
+from handcal.link.server import HeadsetServer
+from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION
 from handcal.rig.example import example_rig
 from handcal.rig_types import DisplayCheck
