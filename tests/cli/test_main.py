@@ -23,6 +23,7 @@ from handcal.session.session import Session
 from handcal.station import doctor
 from handcal.station.doctor import Finding, Health
 from handcal.types import Alignment
+from tests.helpers import write_small_rig
 
 # A shell that starts tests in the background has SIGINT ignored, and so would the program.
 INTERRUPTIBLE = """
@@ -287,8 +288,9 @@ def test_opencv_adds_no_line_of_its_own(tmp_path: Path) -> None:
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
 def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: Path) -> None:
+    rig, runs = write_small_rig(tmp_path / "rig.yaml"), tmp_path / "runs"
     with subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTIBLE, "demo", "--output", tmp_path],
+        [sys.executable, "-c", INTERRUPTIBLE, "demo", "--rig", rig, "--output", runs],
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -307,7 +309,7 @@ def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: 
         finally:
             process.kill()
     assert not Path("/proc", children[0]).exists()
-    (path,) = tmp_path.iterdir()
+    (path,) = runs.iterdir()
     record = Session.open(path)
     assert [event.name for event in record.events] == ["created", "facts_saved", "cursor_made"]
     assert record.torn_bytes == 0
