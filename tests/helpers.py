@@ -67,7 +67,7 @@ def slow_simulator(patch: pytest.MonkeyPatch, rate_hz: float = 10.0) -> None:
     """
     for fault in ("", *CAMERA_FAULTS):
         slow = replace(CAMERA_FAULTS.get(fault, SyntheticSettings()), rate_hz=rate_hz)
-        patch.setitem(CAMERA_FAULTS, fault, slow)  # type: ignore[arg-type]
+        patch.setitem(CAMERA_FAULTS, fault, slow)
 
 
 def write_small_rig(path: Path) -> Path:

@@ -15,7 +15,7 @@ from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
-from handcal.link.fields import MalformedError
+from handcal.link.fields import MalformedError, read_eyes
 from handcal.link.impair import UNIMPAIRED, ImpairedTransport, Impairment
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
@@ -346,7 +346,7 @@ class HeadsetClient(Endpoint):
                 self._state,
                 is_over_limit=live.red,
                 is_outline=live.outline,
-                live_eyes=messages.read_eyes(live.eyes) or EYES,
+                live_eyes=read_eyes(live.eyes) or EYES,
             )
 
     def _live_hand(self) -> Float64 | None:
