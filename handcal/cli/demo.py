@@ -23,7 +23,8 @@ from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
 from handcal.sim.hand import Side
-from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.sim.wearer import draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
 from handcal.station.follow import Patience, deliver, follow_plan

@@ -23,7 +23,8 @@ from handcal.rig_types import EyeDisplay, Rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.sim.cube_captures import some_cube_pose
-from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.sim.wearer import draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import CameraIdentity, Eye, Float64, Frame, HeadsetIdentity
 
 _RATE_HZ = 30.0

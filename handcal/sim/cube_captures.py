@@ -34,7 +34,8 @@ from handcal.sim.cube import CubePainter, draw_cube
 from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
-from handcal.sim.wearer import WearerSettings, draw_placement_error
+from handcal.sim.wearer import draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import Eye, Float64, Intrinsics, UInt8
 
 POSITIONS = {

@@ -12,7 +12,7 @@ from handcal.geometry import invert, transform
 from handcal.rig_types import Rig
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.simulation import Simulation
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.hands import PlacedHand
 from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings

@@ -21,7 +21,8 @@ from handcal.geometry import rigid
 from handcal.register.fuse import eye_position_m
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
-from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.sim.wearer import draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Eye, EyeDistance
 from tests.helpers import slow_simulator, write_small_rig
 

@@ -11,7 +11,8 @@ from handcal.sim.eyes import TrueEyes
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
-from handcal.sim.wearer import Wearer, WearerSettings
+from handcal.sim.wearer import Wearer
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Eye
 
 T_W_H = rigid([0.02, -0.05, 0.03], [0.05, 0.0, 0.1])

@@ -20,7 +20,8 @@ from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
-from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.sim.wearer import draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.delay import DelaySettings
 from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings

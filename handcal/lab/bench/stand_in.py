@@ -11,7 +11,8 @@ from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment
 from handcal.rig_types import Rig
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
+from handcal.sim.wearer import draw_eyes, draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.statistics import MeanInterval, mean_interval
 from handcal.types import EYES, Float64
 

@@ -26,7 +26,7 @@ from handcal.progress import Progress
 from handcal.register.placement import PlacementSettings
 from handcal.register.prior import LearnedPrior, learn_prior
 from handcal.sim.people import VARIANTS, Variant, begin_sitting
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Eye, Float64, Intrinsics
 
 EARLIER_SESSIONS = 20

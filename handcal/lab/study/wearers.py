@@ -20,7 +20,8 @@ from handcal.rig_types import Rig
 from handcal.sim.hand import HandModel
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import apply_placement_error, overlay_hand, view_through
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
+from handcal.sim.wearer import draw_eyes, draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Alignment, Eye, Float64
 
 _REACH_M = 0.35, 0.70
