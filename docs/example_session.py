@@ -14,7 +14,7 @@ from handcal.lab.study.wearers import StudyWearer, align_hand, draw_wearer
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.procedure import CalibrationSettings
 from handcal.types import EYES, Alignment, Eye, Float64
 

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from handcal.register.results import Results
     from handcal.register.solve import solve_eye_shift
     from handcal.rig.rig_file import read_rig, write_rig
+    from handcal.rig_types import Rig
     from handcal.session.session import open_session
     from handcal.station.solve_again import solve
-    from handcal.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud, Rig
+    from handcal.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud
 
     __version__: str
 
@@ -67,9 +68,10 @@ _HOMES = {
     "register.results": ("Results",),
     "register.solve": ("solve_eye_shift",),
     "rig.rig_file": ("read_rig", "write_rig"),
+    "rig_types": ("Rig",),
     "session.session": ("open_session",),
     "station.solve_again": ("solve",),
-    "types": ("Alignment", "EyeDistance", "EyeShift", "Frame", "HandCloud", "Rig"),
+    "types": ("Alignment", "EyeDistance", "EyeShift", "Frame", "HandCloud"),
 }
 _HOME_OF = {name: f"handcal.{home}" for home, names in _HOMES.items() for name in names}
 

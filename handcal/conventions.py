@@ -24,8 +24,10 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from handcal.display import projections
+from handcal.frozen import brief, freeze
 from handcal.geometry import rigid
-from handcal.types import Eye, Float64, Projection, Rig, Solved, brief, freeze
+from handcal.rig_types import Rig
+from handcal.types import Eye, Float64, Projection, Solved
 
 # Each is its own inverse.
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])

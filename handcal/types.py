@@ -10,13 +10,14 @@ x right, y down, z forward.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from html import escape
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import NDArray
+
+from handcal.frozen import brief, freeze, html_table, readonly
 
 Float64: TypeAlias = NDArray[np.float64]
 Float32: TypeAlias = NDArray[np.float32]
@@ -28,8 +29,6 @@ Eye: TypeAlias = Literal["left", "right"]
 EYES: tuple[Eye, Eye] = ("left", "right")
 EyePlan: TypeAlias = Literal["both", "each", "left", "right"]
 PlanName: TypeAlias = Literal["paper", "recommended"]
-RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
-RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
 Method: TypeAlias = Literal["paper", "linear", "consistent", "icp", "icp-open3d"]
 METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp", "icp-open3d")
 """The last needs the extra ``3d``; studies leave it out unless it is requested."""
@@ -40,78 +39,6 @@ LOOK_AROUND = "Look slowly to the left and to the right, and back."
 
 EYE_DISTANCES_M = 0.045, 0.085
 """Eye distances of adults, with room to spare (Gordon et al. 2014, ANSUR II: 52 to 78 mm)."""
-
-_FEW = 6  # items that `brief` shows
-
-
-def readonly(values: ArrayLike, dtype: DTypeLike, shape: tuple[int | None, ...]) -> NDArray[Any]:
-    """Return `values` as a read-only, C-ordered array of `dtype`; copy only if necessary.
-
-    Parameters
-    ----------
-    values : array_like
-    dtype : dtype
-    shape : tuple of int or None
-        Required shape; None matches any length.
-
-    Raises
-    ------
-    ValueError
-        If the shape does not match.
-    """
-    array = np.asarray(values, dtype=dtype, order="C").view()
-    if len(array.shape) != len(shape) or any(
-        want is not None and got != want for got, want in zip(array.shape, shape, strict=True)
-    ):
-        wanted = "×".join("N" if want is None else str(want) for want in shape)
-        got = "×".join(map(str, array.shape)) or "scalar"
-        raise ValueError(f"expected an array of shape {wanted}, got {got}")
-    array.flags.writeable = False
-    return array
-
-
-def freeze(instance: object, name: str, dtype: DTypeLike, *shape: int | None) -> None:
-    """Make an array field of a frozen dataclass read-only; called from its ``__post_init__``.
-
-    None stays None. ValueError names the field whose shape does not match.
-    """
-    value = getattr(instance, name)
-    if value is not None:
-        try:
-            object.__setattr__(instance, name, readonly(value, dtype, shape))
-        except ValueError as error:
-            raise ValueError(f"{type(instance).__name__}.{name}: {error}") from None
-
-
-def brief(instance: Any) -> str:
-    """Return a dataclass as one line, large arrays by type and shape: a ``__repr__``."""
-    values = ", ".join(
-        f"{one.name}={_brief(getattr(instance, one.name))}" for one in fields(instance)
-    )
-    return f"{type(instance).__name__}({values})"
-
-
-def html_table(rows: Sequence[Sequence[str]]) -> str:
-    """Return a table for notebooks; the first row and the first column are its headings."""
-    head, *body = ([escape(cell) for cell in row] for row in rows)
-    lines = ["".join(f"<th>{cell}</th>" for cell in head)]
-    for name, *cells in body:
-        lines.append(f"<th>{name}</th>" + "".join(f"<td>{cell}</td>" for cell in cells))
-    return f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
-
-
-def _brief(value: object) -> str:
-    if isinstance(value, np.ndarray):
-        if value.size <= _FEW:
-            return np.array2string(value, precision=6, separator=", ").replace("\n", "")
-        return f"{value.dtype} {value.shape}"
-    if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{key!r}: {_brief(one)}' for key, one in value.items())}}}"
-    if isinstance(value, tuple) and len(value) > _FEW:
-        return f"<{len(value)} items>"
-    if isinstance(value, tuple):
-        return f"({', '.join(map(_brief, value))})"
-    return repr(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -455,169 +382,3 @@ class Projection:
         freeze(self, "P", np.float64, 3, 4)
         freeze(self, "T_V_H", np.float64, 4, 4)
         freeze(self, "P_offline", np.float64, 3, 4)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
-    """A shape that the headset draws fixed in the world."""
-
-    corners_W_m: Float64
-    """(4, 3), a quadrilateral in order; or (8, 3), a cube: two opposite faces in the same order."""
-    eyes: tuple[Eye, ...] = EYES
-    """The eyes that draw it."""
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        freeze(self, "corners_W_m", np.float64, None, 3)
-        if len(self.corners_W_m) not in (4, 8):
-            raise ValueError("Shape.corners_W_m: a quadrilateral has 4 corners, a cube 8")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Target:
-    """The target of the user test: drawn for one eye, fixed relative to its display."""
-
-    eye: Eye
-    corners_V_m: Float64
-    """(4, 3); clockwise from the upper left, in V."""
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        freeze(self, "corners_V_m", np.float64, 4, 3)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class EyeDisplay:
-    """One eye's offline calibration."""
-
-    K: Float64
-    """(3, 3); on-axis intrinsics of E, px."""
-    H0: Float64
-    """(3, 3); homography correction of the viewpoint C0 (paper, eq. for H)."""
-    t_C0_V_m: Float64
-    """(3,); position of V from C0 in E's axes, so that ``p_E = p_V + t_C0_V_m``."""
-    z_C0_S_m: float
-    """Distance from C0 to the display's focal plane S."""
-    width_px: int
-    height_px: int
-    T_V_H: Float64
-    """(4, 4); from the headset rig to the rendering camera, as the headset reports it."""
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        freeze(self, "K", np.float64, 3, 3)
-        freeze(self, "H0", np.float64, 3, 3)
-        freeze(self, "t_C0_V_m", np.float64, 3)
-        freeze(self, "T_V_H", np.float64, 4, 4)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Origin:
-    """The origin of one part of a rig: its method, date, data and uncertainty."""
-
-    method: str
-    """One line."""
-    made: str
-    """Date and time, ISO 8601."""
-    views: int
-    """Number of images, or pairs of images, used."""
-    rms_px: float
-    """Root mean square of the reprojection error."""
-    verdict: str
-    reason: str
-    """One line each."""
-    parameters: tuple[str, ...]
-    """Names of the covariance's parameters, with units."""
-    covariance: Float64
-    """(n, n); covariance of the n `parameters`."""
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        freeze(self, "covariance", np.float64, len(self.parameters), len(self.parameters))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DepthCheck:
-    """Measured depth compared with that of a board whose pose is known from colour images.
-
-    ``measured depth = scale * true depth + offset_m``, along the depth camera's axis.
-    """
-
-    made: str
-    """Date and time, ISO 8601."""
-    views: int
-    """Number of views of the board."""
-    scale: float
-    offset_m: float
-    covariance: Float64
-    """(2, 2); of `scale` and `offset_m`, in 1, m and m²."""
-    ranges_m: Float64
-    """(N, 2); nearest and farthest true depth of each range, ascending."""
-    flatness_m: Float64
-    """(N,); RMS distance of the measured points from the plane through them, by range."""
-    flatness_sigma_m: Float64
-    """(N,); its standard deviation."""
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        freeze(self, "covariance", np.float64, 2, 2)
-        freeze(self, "ranges_m", np.float64, None, 2)
-        freeze(self, "flatness_m", np.float64, len(self.ranges_m))
-        freeze(self, "flatness_sigma_m", np.float64, len(self.ranges_m))
-
-    def bias_m(self, depth_m: float) -> tuple[float, float]:
-        """Return measured minus true depth at a true depth, and its standard deviation."""
-        slope = np.array([depth_m, 1.0])
-        variance_m2 = float(slope @ self.covariance @ slope)
-        return (self.scale - 1.0) * depth_m + self.offset_m, float(np.sqrt(variance_m2))
-
-
-@dataclass(frozen=True, slots=True)
-class DisplayCheck:
-    """The check that a headset draws as its projections say, observed from outside."""
-
-    made: str
-    """Date and time, ISO 8601."""
-    observer: Literal["camera", "wearer"]
-    device_id: str
-    runtime: str
-    app: str
-    """The headset that was checked, as it introduced itself."""
-    problems: Mapping[Eye, str]
-    """Fault of each eye that was checked, in one line; empty if it obeys."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "problems", MappingProxyType(dict(self.problems)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rig:
-    """The offline calibration: both eye displays and the pose of the depth camera."""
-
-    name: str
-    eyes: Mapping[Eye, EyeDisplay]
-    T_H_D: Float64
-    """(4, 4); from the depth camera to the headset rig."""
-    depth_intrinsics: Intrinsics
-    origins: Mapping[RigPart, Origin] = field(default_factory=dict)
-    """Origin of each of `RIG_PARTS`, where it is known."""
-    depth_camera: CameraIdentity = CameraIdentity()
-    headset: HeadsetIdentity | None = None
-    depth_check: DepthCheck | None = None
-    """The devices of the rig and the check of its depth; empty or None if unknown."""
-    display_check: DisplayCheck | None = None
-    """The check that the headset draws what it is sent; None if there was none."""
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        freeze(self, "T_H_D", np.float64, 4, 4)
-        object.__setattr__(self, "origins", MappingProxyType(dict(self.origins)))
-        if set(self.eyes) != set(EYES):
-            raise ValueError("Rig.eyes: both left and right are needed")
-        object.__setattr__(self, "eyes", MappingProxyType(dict(self.eyes)))

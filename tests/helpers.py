@@ -7,10 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from handcal.io.resources import resource_path
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.session.session import Session
+from handcal.sim.camera import CAMERA_FAULTS, SyntheticSettings
 from handcal.types import Intrinsics
 
 ROOT = Path(__file__).parents[1]
@@ -55,6 +58,16 @@ def _slowness() -> float:
     sum(_PROBE)
     wall_s, worked_s = time.perf_counter() - wall_s, time.thread_time() - worked_s
     return max(1.0, wall_s / max(worked_s, 1e-6))
+
+
+def slow_simulator(patch: pytest.MonkeyPatch, rate_hz: float = 10.0) -> None:
+    """Let this process's simulated cameras give few frames a second.
+
+    A calibration in real time costs what its frames cost, and is robust to a slow camera.
+    """
+    for fault in ("", *CAMERA_FAULTS):
+        slow = replace(CAMERA_FAULTS.get(fault, SyntheticSettings()), rate_hz=rate_hz)
+        patch.setitem(CAMERA_FAULTS, fault, slow)
 
 
 def write_small_rig(path: Path) -> Path:

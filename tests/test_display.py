@@ -18,7 +18,8 @@ from handcal.display import (
 )
 from handcal.geometry import project, rigid, transform
 from handcal.rig.example import example_rig
-from handcal.types import EyeDisplay, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import Float64
 
 DISPLAY = example_rig().eyes["right"]
 SHIFTS = st.tuples(*[st.floats(-0.02, 0.02)] * 3)

@@ -37,7 +37,7 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.procedure import CalibrationSettings
 from handcal.station.solve_again import solve_again
 from handcal.types import EYES, METHODS, Alignment, Eye, Float64

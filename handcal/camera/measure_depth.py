@@ -13,7 +13,8 @@ from handcal.rig.board import Board, BoardError
 from handcal.rig.choose import ChooseSettings, ViewSelector
 from handcal.rig.depth import DepthView, depth_view, fit_depth
 from handcal.rig.views import MAX_VIEWS, ViewsError
-from handcal.types import DepthCheck, Frame
+from handcal.rig_types import DepthCheck
+from handcal.types import Frame
 
 _SILENT_S = 5.0
 

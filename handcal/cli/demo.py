@@ -21,8 +21,10 @@ from handcal.progress import Progress
 from handcal.register.fuse import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Rig
 from handcal.sim.hand import Side
-from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.sim.wearer import draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
 from handcal.station.follow import Patience, deliver, follow_plan
@@ -32,7 +34,7 @@ from handcal.station.procedure import Calibration, Observation
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName, Rig
+from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName
 
 # A slow computer gets more time.
 _PATIENCE = Patience(60.0, frames=300)

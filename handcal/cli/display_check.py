@@ -18,8 +18,9 @@ from handcal.io.files import make_folder
 if TYPE_CHECKING:
     from handcal.link.server import HeadsetServer
     from handcal.rig.obey import Probe
+    from handcal.rig_types import Rig
     from handcal.station.display_check import Answer, Observe, Show
-    from handcal.types import Eye, Rig
+    from handcal.types import Eye
 
 _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-plane"
 

@@ -18,7 +18,7 @@ from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
-    from handcal.types import Rig
+    from handcal.rig_types import Rig
 
 RIG_AND_OUTPUT = (
     arg(

@@ -242,7 +242,7 @@ def headset(arguments: argparse.Namespace) -> None:
     from handcal.link.pair_by_digits import pair_by_digits
     from handcal.link.pairing import new_device_id, read_pairing_key
     from handcal.sim.headset import HeadsetSettings, run_headset, until_terminated
-    from handcal.sim.wearer import WearerSettings
+    from handcal.sim.wearer_settings import WearerSettings
 
     host, port, device_id = arguments.host, arguments.port, ""
     if arguments.pair:

@@ -9,7 +9,8 @@ import numpy as np
 
 from handcal.export.outcome import SessionOutcome
 from handcal.geometry import invert, transform
-from handcal.types import Eye, EyeDisplay, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import Eye, Float64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

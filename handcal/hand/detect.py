@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 
 from handcal.errors import FileError
-from handcal.types import Float32, Float64, UInt8, freeze
+from handcal.frozen import freeze
+from handcal.types import Float32, Float64, UInt8
 
 STRIDES = (8, 16, 32)
 """Strides of the network's three levels, in pixels."""

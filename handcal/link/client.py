@@ -15,15 +15,17 @@ from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
+from handcal.link.fields import MalformedError, read_eyes
 from handcal.link.impair import UNIMPAIRED, ImpairedTransport, Impairment
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import device_number
 from handcal.link.reliable import Outgoing
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
+from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import Packet, Rejection, Slot
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection, Shape, Target
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 
 MAX_WEARERS = 16
 _POSES_PER_DATAGRAM = 3
@@ -246,7 +248,7 @@ class HeadsetClient(Endpoint):
         envelope = messages.parse(packet.payload)
         body = envelope.WhichOneof("body")
         if body not in ("retry", "welcome", "refused"):
-            raise messages.MalformedError(f"no handshake has a {body}")
+            raise MalformedError(f"no handshake has a {body}")
         if self._channel is not None or getattr(envelope, body).nonce != self._nonce:
             return Rejection.REPLAYED
         match body:
@@ -316,7 +318,7 @@ class HeadsetClient(Endpoint):
                 target = messages.read_target(envelope.target)
                 self._state = replace(self._state, target=target)
             case other:
-                raise messages.MalformedError(f"a PC sends no {other}")
+                raise MalformedError(f"a PC sends no {other}")
 
     def _keep(self, projection: Projection) -> None:
         """Draw with a projection, and keep it by its wearer; those of another rig are dropped."""
@@ -344,7 +346,7 @@ class HeadsetClient(Endpoint):
                 self._state,
                 is_over_limit=live.red,
                 is_outline=live.outline,
-                live_eyes=messages.read_eyes(live.eyes) or EYES,
+                live_eyes=read_eyes(live.eyes) or EYES,
             )
 
     def _live_hand(self) -> Float64 | None:

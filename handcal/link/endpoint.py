@@ -14,7 +14,7 @@ from handcal.errors import LinkError
 from handcal.io.closable import Closable
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire
-from handcal.link.messages import MalformedError
+from handcal.link.fields import MalformedError
 from handcal.link.reliable import Delivery, Inbox, Outbox, Outgoing
 from handcal.link.settings import LinkSettings
 from handcal.link.transport import Address, Transport

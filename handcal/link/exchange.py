@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link.messages import MalformedError
+from handcal.link.fields import MalformedError, read_text
 from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings
 from handcal.link.wire import NONCE_BYTES, Packet, Rejection
 
@@ -158,7 +158,7 @@ def read_pair(envelope: pb.Envelope) -> pb.Pair:
     message = envelope.pair
     if envelope.WhichOneof("body") != "pair" or len(message.nonce) != NONCE_BYTES:
         raise MalformedError("a pairing begins with a nonce")
-    messages.read_text(message.name, MAX_NAME_CHARACTERS)
+    read_text(message.name, MAX_NAME_CHARACTERS)
     return message
 
 

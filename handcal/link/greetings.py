@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from handcal.link import handcal_pb2 as pb
 from handcal.link import wire
-from handcal.link.messages import MalformedError, read_text
+from handcal.link.fields import MalformedError, read_text
 from handcal.link.pairing import MAX_NAME_CHARACTERS
 from handcal.link.wire import NONCE_BYTES, Packet, Welcome
 

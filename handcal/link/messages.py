@@ -14,22 +14,25 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from numpy.typing import ArrayLike, NDArray
 
-from handcal.geometry import is_rigid
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import DIGEST_BYTES
+from handcal.link.fields import (
+    EYE_CODES,
+    MalformedError,
+    flat,
+    is_text,
+    read_eye,
+    read_eyes,
+    read_numbers,
+    read_rigid,
+    read_size,
+    read_text,
+)
 from handcal.link.pairing import MAX_NAME_CHARACTERS
 from handcal.link.reliable import Receipt
+from handcal.link.shapes import Shape, Target
 from handcal.link.wire import MAX_FRAGMENTS, Slot
-from handcal.types import (
-    EYES,
-    Eye,
-    Float64,
-    HeadsetIdentity,
-    HeadsetView,
-    Projection,
-    Shape,
-    Target,
-)
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView, Projection
 
 QUANTUM_M = 1e-4
 MAX_POINTS = 50_000
@@ -37,20 +40,12 @@ CHUNK_POINTS = 200
 MAX_CHUNKS = MAX_POINTS // CHUNK_POINTS
 MAX_PROMPT_CHARACTERS = 500
 MAX_OWNER_CHARACTERS = 200
-MAX_DISPLAY_PX = 65_535
 
 PROJECTION_SLOTS: Mapping[Eye, Slot] = {
     "left": Slot.PROJECTION_LEFT,
     "right": Slot.PROJECTION_RIGHT,
 }
-_EYE_CODES: Mapping[Eye, pb.Eye] = {"left": pb.EYE_LEFT, "right": pb.EYE_RIGHT}
-_EYES: Mapping[int, Eye] = {code: eye for eye, code in _EYE_CODES.items()}
-_REACH_M = 1e3
 _MAX_EYE_DISTANCE_M = 0.2
-
-
-class MalformedError(Exception):
-    """A message that no correct peer sends."""
 
 
 def parse(payload: bytes) -> pb.Envelope:
@@ -78,7 +73,7 @@ def device(value: HeadsetIdentity, shown: Owner) -> pb.Envelope:
         If a text is too long, or a view is not finite.
     """
     texts = (value.name, value.runtime, value.app)
-    if not all(_is_text(text, MAX_NAME_CHARACTERS) for text in texts):
+    if not all(is_text(text, MAX_NAME_CHARACTERS) for text in texts):
         raise ValueError(
             f"name, runtime and app have at most {MAX_NAME_CHARACTERS} characters in one line"
         )
@@ -92,8 +87,8 @@ def device(value: HeadsetIdentity, shown: Owner) -> pb.Envelope:
             protocol=value.protocol,
             views=[
                 pb.View(
-                    eye=_EYE_CODES[eye],
-                    T_V_H=_flat(view.T_V_H),
+                    eye=EYE_CODES[eye],
+                    T_V_H=flat(view.T_V_H),
                     tangents=view.tangents.tolist(),
                     width_px=view.width_px,
                     height_px=view.height_px,
@@ -121,10 +116,10 @@ def read_device(message: pb.Device, device_id: str) -> tuple[HeadsetIdentity, Ow
         app=read_text(message.app, MAX_NAME_CHARACTERS),
         protocol=message.protocol,
         views={
-            _eye(view.eye): HeadsetView(
-                _rigid(view.T_V_H),
-                _numbers(view.tangents, 4),
-                *_size(view.width_px, view.height_px),
+            read_eye(view.eye): HeadsetView(
+                read_rigid(view.T_V_H),
+                read_numbers(view.tangents, 4),
+                *read_size(view.width_px, view.height_px),
             )
             for view in message.views
         },
@@ -171,7 +166,7 @@ def live_hand(
                 red=is_over_limit,
                 points=pb.Points(origin_m=origin_m, offsets=offsets[chunk::count].tobytes()),
                 outline=is_outline,
-                eyes=[_EYE_CODES[eye] for eye in eyes],
+                eyes=[EYE_CODES[eye] for eye in eyes],
             )
         )
         for chunk in range(count)
@@ -183,7 +178,7 @@ def read_points(message: pb.Points) -> Float64:
     if len(message.offsets) % 6 or len(message.offsets) > 6 * MAX_POINTS:
         raise MalformedError("points of a wrong size")
     offsets = np.frombuffer(message.offsets, dtype="<i2").reshape(-1, 3)
-    points: Float64 = _numbers(message.origin_m, 3) + QUANTUM_M * offsets
+    points: Float64 = read_numbers(message.origin_m, 3) + QUANTUM_M * offsets
     return points
 
 
@@ -213,7 +208,7 @@ def prompt(text: str, eyes: Sequence[Eye]) -> pb.Envelope:
     """
     if len(text) > MAX_PROMPT_CHARACTERS:
         raise ValueError(f"a prompt may have at most {MAX_PROMPT_CHARACTERS} characters")
-    return pb.Envelope(prompt=pb.Prompt(text=text, eyes=[_EYE_CODES[eye] for eye in eyes]))
+    return pb.Envelope(prompt=pb.Prompt(text=text, eyes=[EYE_CODES[eye] for eye in eyes]))
 
 
 def read_prompt(message: pb.Prompt) -> tuple[str, tuple[Eye, ...]]:
@@ -221,13 +216,6 @@ def read_prompt(message: pb.Prompt) -> tuple[str, tuple[Eye, ...]]:
     if len(message.text) > MAX_PROMPT_CHARACTERS or len(message.eyes) > len(EYES):
         raise MalformedError("a prompt that is too long")
     return message.text, read_eyes(message.eyes)
-
-
-def read_eyes(codes: Sequence[int]) -> tuple[Eye, ...]:
-    """Read a list of eyes."""
-    if len(codes) > len(EYES):
-        raise MalformedError("more eyes than two")
-    return tuple(_eye(code) for code in codes)
 
 
 def projection(value: Projection) -> pb.Envelope:
@@ -241,15 +229,15 @@ def projection(value: Projection) -> pb.Envelope:
     offline = value.P if value.P_offline is None else value.P_offline
     if not np.isfinite(np.concatenate([value.P, offline, value.T_V_H])).all():
         raise ValueError("the projection must be finite")
-    if not all(_is_text(text, MAX_OWNER_CHARACTERS) for text in (value.wearer, value.rig)):
+    if not all(is_text(text, MAX_OWNER_CHARACTERS) for text in (value.wearer, value.rig)):
         raise ValueError(f"wearer and rig have at most {MAX_OWNER_CHARACTERS} characters")
     return pb.Envelope(
         projection=pb.Projection(
-            eye=_EYE_CODES[value.eye],
+            eye=EYE_CODES[value.eye],
             P=value.P.ravel().tolist(),
             width_px=value.width_px,
             height_px=value.height_px,
-            T_V_H=_flat(value.T_V_H),
+            T_V_H=flat(value.T_V_H),
             P_offline=offline.ravel().tolist(),
             wearer=value.wearer,
             rig=value.rig,
@@ -259,14 +247,14 @@ def projection(value: Projection) -> pb.Envelope:
 
 def read_projection(message: pb.Projection) -> Projection:
     """Read a projection."""
-    P = _numbers(message.P, 12).reshape(3, 4)
+    P = read_numbers(message.P, 12).reshape(3, 4)
     owner = _owner(message.wearer, message.rig)
     return Projection(
-        _eye(message.eye),
+        read_eye(message.eye),
         P,
-        *_size(message.width_px, message.height_px),
-        _rigid(message.T_V_H),
-        _numbers(message.P_offline, 12).reshape(3, 4) if message.P_offline else P,
+        *read_size(message.width_px, message.height_px),
+        read_rigid(message.T_V_H),
+        read_numbers(message.P_offline, 12).reshape(3, 4) if message.P_offline else P,
         owner.wearer,
         owner.rig,
     )
@@ -285,14 +273,14 @@ def target(value: Target | None) -> pb.Envelope:
     if not np.isfinite(value.corners_V_m).all():
         raise ValueError("the target must be finite")
     corners = value.corners_V_m.ravel().tolist()
-    return pb.Envelope(target=pb.Target(eye=_EYE_CODES[value.eye], corners_V_m=corners))
+    return pb.Envelope(target=pb.Target(eye=EYE_CODES[value.eye], corners_V_m=corners))
 
 
 def read_target(message: pb.Target) -> Target | None:
     """Read a target; None if it is removed."""
     if not message.corners_V_m:
         return None
-    return Target(_eye(message.eye), _numbers(message.corners_V_m, 12).reshape(4, 3))
+    return Target(read_eye(message.eye), read_numbers(message.corners_V_m, 12).reshape(4, 3))
 
 
 def shape(value: Shape | None) -> pb.Envelope:
@@ -308,7 +296,7 @@ def shape(value: Shape | None) -> pb.Envelope:
     if not np.isfinite(value.corners_W_m).all():
         raise ValueError("the shape must be finite")
     corners = value.corners_W_m.ravel().tolist()
-    eyes = [_EYE_CODES[eye] for eye in value.eyes]
+    eyes = [EYE_CODES[eye] for eye in value.eyes]
     return pb.Envelope(shape=pb.Shape(corners_W_m=corners, eyes=eyes))
 
 
@@ -319,20 +307,20 @@ def read_shape(message: pb.Shape) -> Shape | None:
         return None
     if count not in (12, 24):
         raise MalformedError("a shape with neither 4 corners nor 8")
-    return Shape(_numbers(message.corners_W_m, count).reshape(-1, 3), read_eyes(message.eyes))
+    return Shape(read_numbers(message.corners_W_m, count).reshape(-1, 3), read_eyes(message.eyes))
 
 
 def poses(recent: Iterable[tuple[int, Float64]]) -> pb.Envelope:
     """Make a message of ``(t_headset_ns, T_W_H)``."""
     return pb.Envelope(
-        poses=pb.Poses(poses=[pb.Pose(t_headset_ns=t, T_W_H=_flat(T)) for t, T in recent])
+        poses=pb.Poses(poses=[pb.Pose(t_headset_ns=t, T_W_H=flat(T)) for t, T in recent])
     )
 
 
 def read_poses(message: pb.Poses) -> Iterator[tuple[int, Float64]]:
     """Read ``(t_headset_ns, T_W_H)``."""
     for pose in message.poses:
-        yield pose.t_headset_ns, _rigid(pose.T_W_H)
+        yield pose.t_headset_ns, read_rigid(pose.T_W_H)
 
 
 def confirm(t_headset_ns: int, cursor_id: int, drawn: bytes) -> pb.Envelope:
@@ -374,49 +362,5 @@ def read_ack(message: pb.Ack) -> Iterator[Receipt]:
         yield Receipt(received.slot, received.message_id, fragments)
 
 
-def _flat(T: Float64) -> list[float]:
-    numbers: list[float] = np.asarray(T, dtype=np.float64)[:3].ravel().tolist()
-    return numbers
-
-
-def _numbers(values: Sequence[float], count: int) -> Float64:
-    numbers = np.array(values, dtype=np.float64)
-    if len(numbers) != count or not np.isfinite(numbers).all():
-        raise MalformedError(f"expected {count} finite numbers")
-    return numbers
-
-
-def _rigid(values: Sequence[float]) -> Float64:
-    T = np.vstack([_numbers(values, 12).reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
-    if not is_rigid(T, _REACH_M):
-        raise MalformedError("a pose that is not a rotation and a translation")
-    T.flags.writeable = False
-    return T
-
-
-def _eye(code: int) -> Eye:
-    eye = _EYES.get(code)
-    if eye is None:
-        raise MalformedError(f"unknown eye {code}")
-    return eye
-
-
-def read_text(text: str, most: int) -> str:
-    """Return a text of at most this many characters, without control characters."""
-    if not _is_text(text, most):
-        raise MalformedError(f"a text of more than {most} characters, or with control characters")
-    return text
-
-
-def _is_text(text: str, most: int) -> bool:
-    return len(text) <= most and all(character >= " " for character in text)
-
-
 def _owner(wearer: str, rig: str) -> Owner:
     return Owner(read_text(wearer, MAX_OWNER_CHARACTERS), read_text(rig, MAX_OWNER_CHARACTERS))
-
-
-def _size(width_px: int, height_px: int) -> tuple[int, int]:
-    if not (0 < width_px <= MAX_DISPLAY_PX and 0 < height_px <= MAX_DISPLAY_PX):
-        raise MalformedError("a display of an impossible size")
-    return width_px, height_px

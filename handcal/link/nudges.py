@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import DIGEST_BYTES
-from handcal.link.messages import MalformedError, read_eyes
+from handcal.link.fields import MalformedError, read_eyes
 from handcal.types import Eye
 
 MAX_NUDGE_ARCMIN = 300.0

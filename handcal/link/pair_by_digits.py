@@ -9,6 +9,7 @@ from contextlib import suppress
 from handcal.errors import LinkError
 from handcal.link import exchange, greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link.fields import MalformedError
 from handcal.link.pairing import device_number
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
@@ -72,6 +73,6 @@ def _read(datagram: bytes, device: int) -> pb.Envelope | None:
         or not wire.is_authentic(exchange.PUBLIC_KEYS.to_headset, datagram)
     ):
         return None
-    with suppress(messages.MalformedError):
+    with suppress(MalformedError):
         return messages.parse(packet.payload)
     return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from handcal.link.server import LinkStatistics
+from handcal.link.statistics import LinkStatistics
 
 
 @dataclass(frozen=True, slots=True)

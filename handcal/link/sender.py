@@ -16,9 +16,10 @@ from handcal.link.endpoint import Endpoint
 from handcal.link.nudges import VerifyRequest
 from handcal.link.reliable import Outgoing
 from handcal.link.settings import LinkSettings
+from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Transport
 from handcal.link.wire import Slot
-from handcal.types import EYES, Eye, Projection, Shape, Target
+from handcal.types import EYES, Eye, Projection
 
 
 class Sender(Endpoint):

@@ -6,8 +6,7 @@ import logging
 import secrets
 import time
 from collections import deque
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from handcal.errors import FileError
 from handcal.link import greetings, messages, nudges, version1, wire
@@ -15,6 +14,7 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link.clock import ClockEstimator
 from handcal.link.endpoint import Channel
 from handcal.link.exchange import Exchange, new_digits
+from handcal.link.fields import MalformedError
 from handcal.link.greetings import Refusal
 from handcal.link.handshake import Caller, Limiter, Reception
 from handcal.link.invitation import Invitation, new_code
@@ -24,6 +24,7 @@ from handcal.link.pairing import Pairing, Pairings
 from handcal.link.poses import PoseBuffer
 from handcal.link.sender import Sender
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
+from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import Packet, Rejection, Welcome
 from handcal.types import Float64, HeadsetIdentity
@@ -64,43 +65,6 @@ class Nudge:
     """As in `Confirmation`."""
     session: int = 0
     """The link's session, in which the sums began at zero."""
-
-
-@dataclass(frozen=True, slots=True)
-class LinkStatistics:
-    """Counters and estimates of the link."""
-
-    connected: bool
-    sent: int
-    received: int
-    """Datagrams sent, and datagrams received and accepted."""
-    lost: int
-    lost_inbound: int
-    """Datagrams lost in this session: to the headset by its last report, from it by gaps."""
-    resent: int
-    """Fragments retransmitted."""
-    acked: int
-    unacked: int
-    failed: int
-    """Reliable messages acknowledged, waiting, and failed."""
-    rejected: Mapping[str, int]
-    """Datagrams dropped, by reason (`wire.Rejection`)."""
-    pose_rate_hz: float
-    """Rate of distinct poses over the newest second."""
-    latency_ms: float | None
-    """Half the median round trip."""
-    clock_offset_ms: float | None
-    clock_drift_ppm: float | None
-    clock_uncertainty_ms: float | None
-    """Headset's clock minus the host's; None until it is known."""
-    bytes_sent: int
-    bytes_received: int
-    given_up: Mapping[str, int] = field(default_factory=dict)
-    """Number of messages that connected headsets never acknowledged, by slot."""
-    missing: tuple[str, ...] = ()
-    """Slots whose newest message the connected headset lacks, because it was given up."""
-    notice: str = ""
-    """Another headset that asks to connect now, and why it is refused; empty if there is none."""
 
 
 @dataclass(slots=True)
@@ -396,7 +360,7 @@ class HeadsetServer(Sender):
             case "pong":
                 self._take_pong(envelope.pong)
             case other:
-                raise messages.MalformedError(f"a headset sends no {other}")
+                raise MalformedError(f"a headset sends no {other}")
 
     def _refresh(self) -> None:
         """Take over changes of the pairings; end the session of a device that was revoked."""

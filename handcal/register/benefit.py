@@ -26,7 +26,8 @@ from handcal.display import (
     target_corners_m,
 )
 from handcal.geometry import project
-from handcal.types import EyeDisplay, EyeShift, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import EyeShift, Float64
 
 WORKING_DISTANCE_M = TARGET_DEPTHS_M[1]
 """Distance at which the error in depth is expected."""

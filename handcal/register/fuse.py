@@ -42,18 +42,8 @@ from handcal.register.prior import (
     posterior,
 )
 from handcal.register.surface import describe_surface
-from handcal.types import (
-    EYES,
-    Alignment,
-    Bool,
-    Eye,
-    EyeDisplay,
-    EyeDistance,
-    EyeShift,
-    Float64,
-    Rig,
-    Verification,
-)
+from handcal.rig_types import EyeDisplay, Rig
+from handcal.types import EYES, Alignment, Bool, Eye, EyeDistance, EyeShift, Float64, Verification
 
 # The cursor's outline is found in this many of its points.
 _OUTLINE_FROM_POINTS = 1500

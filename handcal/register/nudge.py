@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.types import EyeDisplay, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import Float64
 
 
 def nudged_shift_m(

@@ -23,7 +23,8 @@ from handcal.register.prior import EyePrior, eye_prior, posterior
 from handcal.register.results import Results, SolveSettings
 from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes
-from handcal.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
+from handcal.rig_types import Rig
+from handcal.types import EYES, Bool, Eye, Float64, PlanName, Verification
 
 _OUTLINE_FROM_POINTS = 1500
 # Error of a registration, and its growth with the angle by which the camera sees the moved hand

@@ -17,7 +17,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handcal.types import DepthCheck, Float64
+from handcal.rig_types import DepthCheck
+from handcal.types import Float64
 
 MIN_SESSIONS = 10
 """Fewer sessions than this do not make a prior."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from handcal.frozen import html_table
 from handcal.progress import Progress
 from handcal.register.benefit import Benefit, expected_arcmin
 from handcal.register.fuse import Fused, FuseSettings, eye_slice, fuse_alignments
@@ -24,6 +25,7 @@ from handcal.register.verdict import (
     measured_arcmin,
     planned_eyes,
 )
+from handcal.rig_types import Rig
 from handcal.types import (
     EYES,
     Alignment,
@@ -33,11 +35,9 @@ from handcal.types import (
     Float64,
     Method,
     PlanName,
-    Rig,
     Verdict,
     VerdictName,
     Verification,
-    html_table,
     phi_text,
     shift_rows,
 )

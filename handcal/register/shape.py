@@ -15,11 +15,12 @@ import numpy as np
 from scipy.linalg import lapack
 from small_gicp import KdTree
 
+from handcal.frozen import brief, freeze
 from handcal.geometry import invert, transform
 from handcal.register.rcicp import best_rigid
 from handcal.register.rigid import RigidSettings, Rows, registration_rows
 from handcal.register.surface import Indices, Surface, cube_means
-from handcal.types import Float64, brief, freeze
+from handcal.types import Float64
 
 _NODE_SPACING_M = 0.018
 _NODE_CUBE_M = 0.030

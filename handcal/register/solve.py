@@ -19,7 +19,8 @@ from handcal.register.rcicp import (
     solve_paper,
 )
 from handcal.register.surface import mean_point
-from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
+from handcal.rig_types import Rig
+from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method
 
 MIN_POINTS = 100
 MAX_POINTS = 2_000_000

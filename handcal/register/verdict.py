@@ -21,7 +21,8 @@ from handcal.register.benefit import (
     percent,
 )
 from handcal.register.fuse import Fused, eye_position_m, eye_slice
-from handcal.types import EYES, Eye, EyeShift, PlanName, Rig, Verdict, Verification
+from handcal.rig_types import Rig
+from handcal.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
 
 MOST_ALIGNMENTS = 10
 # More than this are not worth it where the offline calibration is within the target.

@@ -64,7 +64,7 @@ def _data_url(kind: str, content: bytes) -> str:
 
 def _printable(value: object) -> object:
     """Return a text without characters that cannot be shown, such as control characters."""
-    if not isinstance(value, str):
+    if not isinstance(value, str) or value.isprintable():
         return value
     return "".join(
         char if char.isprintable() or char in ("\n", _NO_BREAK) else "\ufffd" for char in value

@@ -23,12 +23,14 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from handcal.display import arcmin_from_px, eye_projection, view_of_eye
+from handcal.frozen import freeze
 from handcal.geometry import invert, project, rigid, transform
 from handcal.rig.board import BoardView
 from handcal.rig.display import DisplayHomography, undistort
 from handcal.rig.viewpoint import TrackedView, board_pose, locate_viewpoint
 from handcal.rig.views import ViewsError
-from handcal.types import EyeDisplay, Float64, Intrinsics, Rig, freeze
+from handcal.rig_types import EyeDisplay, Rig
+from handcal.types import Float64, Intrinsics
 
 FEWEST_VIEWS = 5
 LIMIT_ARCMIN = 5.0

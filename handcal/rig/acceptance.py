@@ -32,7 +32,8 @@ from handcal.rig.rig_file import read_rig
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import TrackedView
 from handcal.rig.views import image_files, pair_views, read_views
-from handcal.types import EYES, Eye, EyeDisplay, Intrinsics, Rig
+from handcal.rig_types import EyeDisplay, Rig
+from handcal.types import EYES, Eye, Intrinsics
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.errors import HandcalError
-from handcal.types import Float64, freeze
+from handcal.frozen import freeze
+from handcal.types import Float64
 
 BoardKind: TypeAlias = Literal["charuco", "checkerboard"]
 Int64: TypeAlias = NDArray[np.int64]

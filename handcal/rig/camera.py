@@ -13,6 +13,7 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from handcal.frozen import freeze
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import as_transform
 from handcal.rig.fit import rms
@@ -30,7 +31,7 @@ from handcal.rig.views import (
     used,
     worst_view,
 )
-from handcal.types import Float64, Intrinsics, freeze
+from handcal.types import Float64, Intrinsics
 
 LensChoice: TypeAlias = Literal["auto", LensModel]
 LENS_CHOICES: tuple[str, ...] = ("auto", *get_args(LensModel))

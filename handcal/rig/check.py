@@ -8,19 +8,8 @@ from string import hexdigits
 import numpy as np
 
 from handcal.geometry import is_rigid
-from handcal.types import (
-    EYES,
-    RIG_PARTS,
-    CameraIdentity,
-    DepthCheck,
-    DisplayCheck,
-    EyeDisplay,
-    Float64,
-    HeadsetIdentity,
-    Intrinsics,
-    Origin,
-    Rig,
-)
+from handcal.rig_types import RIG_PARTS, DepthCheck, DisplayCheck, EyeDisplay, Origin, Rig
+from handcal.types import EYES, CameraIdentity, Float64, HeadsetIdentity, Intrinsics
 
 MAX_DEVICE_SIDE_PX = 16384
 MAX_NAME, MAX_TEXT = 200, 500

@@ -15,7 +15,8 @@ from handcal.display import (
     view_of_eye,
 )
 from handcal.geometry import image_points, invert, project, transform
-from handcal.types import EYES, CameraIdentity, Eye, EyeDisplay, Float64, Intrinsics, Rig
+from handcal.rig_types import EyeDisplay, Rig
+from handcal.types import EYES, CameraIdentity, Eye, Float64, Intrinsics
 
 # Room for intrinsics that were solved from images. At 0.5 m, 0.1 m beside the axis, the first moves
 # a point by 0.5 mm, the second by 1.5 mm. Another camera of the same model may lie within both.

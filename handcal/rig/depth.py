@@ -21,7 +21,8 @@ from handcal.rig.display import undistort
 from handcal.rig.fit import clustered_covariance
 from handcal.rig.viewpoint import board_pose
 from handcal.rig.views import ViewsError
-from handcal.types import DepthCheck, Float64, Frame
+from handcal.rig_types import DepthCheck
+from handcal.types import Float64, Frame
 
 MIN_DEPTH_VIEWS = 5
 _LEAST_SPREAD = 1.3

@@ -6,7 +6,8 @@ import numpy as np
 
 from handcal.display import update_matrix
 from handcal.geometry import invert, rigid
-from handcal.types import EyeDisplay, Intrinsics, Rig
+from handcal.rig_types import EyeDisplay, Rig
+from handcal.types import Intrinsics
 
 WIDTH_PX, HEIGHT_PX = 1268, 720
 FOCAL_PX = 2456.0

@@ -9,7 +9,8 @@ import numpy as np
 
 from handcal.display import arcmin_from_px, view_of_eye
 from handcal.geometry import image_points, invert, transform
-from handcal.types import EYES, RIG_PARTS, DepthCheck, DisplayCheck, EyeDisplay, Float64, Rig
+from handcal.rig_types import RIG_PARTS, DepthCheck, DisplayCheck, EyeDisplay, Rig
+from handcal.types import EYES, Float64
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0

@@ -25,7 +25,8 @@ from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_ster
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
 from handcal.rig.views import BoardImage, used
-from handcal.types import CameraIdentity, Eye, Float64, Intrinsics, Rig
+from handcal.rig_types import Rig
+from handcal.types import CameraIdentity, Eye, Float64, Intrinsics
 
 
 @dataclass(frozen=True, slots=True)

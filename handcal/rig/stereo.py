@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from handcal.frozen import freeze
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import Adjusted, Setup, Sighting, adjust, as_transform, as_vector
 from handcal.rig.camera import (
@@ -36,7 +37,7 @@ from handcal.rig.stereo_pairs import (
 from handcal.rig.uncertainty import next_pair
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import BoardImage, ViewsError, WorstView, check_moved, worst_view
-from handcal.types import Float64, freeze
+from handcal.types import Float64
 
 
 @dataclass(frozen=True, slots=True)

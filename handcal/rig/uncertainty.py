@@ -14,11 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.frozen import freeze
 from handcal.geometry import rigid
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import Setup, Sighting, board_in, linearised
 from handcal.rig.lens import Camera, LensModel, pixels_of, predict, to_plane
-from handcal.types import Float64, freeze
+from handcal.types import Float64
 
 GRID = (12, 9)
 """Columns and rows of places in the image at which the uncertainty is known."""

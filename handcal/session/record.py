@@ -14,6 +14,7 @@ import numpy as np
 from handcal.errors import FileError
 from handcal.io.files import read_json, read_limited
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
+from handcal.rig_types import Rig
 from handcal.session.alignment_file import decode_alignment
 from handcal.session.facts import AlignmentFacts, SessionFacts
 from handcal.session.journal import (
@@ -26,7 +27,7 @@ from handcal.session.journal import (
 )
 from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import Trial, make_trial
-from handcal.types import Alignment, Eye, Float64, Rig
+from handcal.types import Alignment, Eye, Float64
 
 MAX_ALIGNMENT_BYTES = 16 * 2**20
 MAX_NOTES_CHARACTERS = 20_000

@@ -12,10 +12,10 @@ from typing import Any, Literal, TypeAlias
 from handcal.errors import FileError
 from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
 from handcal.rig.rig_file import write_rig
+from handcal.rig_types import Rig
 from handcal.session.journal import JOURNAL, Damage, Event, happens_now, journal_line
 from handcal.session.record import SessionRecord, alignment_path, read_session, sha256
 from handcal.session.state import SessionEvent, SessionState
-from handcal.types import Rig
 
 SessionHealth: TypeAlias = Literal["sound", "damaged", "none"]
 _REPLACED = (SessionEvent.CREATED, SessionEvent.UPGRADED, SessionEvent.NOTES_SAVED)

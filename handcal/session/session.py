@@ -41,6 +41,7 @@ from handcal.io.files import (
 )
 from handcal.io.lock import FileLock
 from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
+from handcal.rig_types import Rig
 from handcal.session.alignment_file import encode_alignment
 from handcal.session.facts import AlignmentFacts, SessionFacts, facts_json, with_facts
 from handcal.session.journal import (
@@ -56,7 +57,7 @@ from handcal.session.record import SessionRecord as SessionRecord
 from handcal.session.record import alignment_path, read_session, replay, sha256
 from handcal.session.state import Kind, SessionEvent, clean_wearer
 from handcal.session.trial import Trial, trial_json
-from handcal.types import Alignment, Eye, Rig
+from handcal.types import Alignment, Eye
 
 
 class Session(Closable):

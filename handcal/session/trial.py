@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike
 
 from handcal import statistics
 from handcal.display import arcmin_from_px, eye_projection, target_corners_m
+from handcal.frozen import freeze
 from handcal.geometry import project
+from handcal.rig_types import EyeDisplay
 from handcal.statistics import Summary
-from handcal.types import EYES, Eye, EyeDisplay, Float64, freeze
+from handcal.types import EYES, Eye, Float64
 
 _SHAPES: dict[str, tuple[int, ...]] = {
     "corners_E_m": (4, 3),

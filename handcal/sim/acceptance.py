@@ -13,10 +13,11 @@ from handcal.io.images import write_png
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
 from handcal.rig.tracked_file import write_tracked
+from handcal.rig_types import Rig
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import EYES, Rig
+from handcal.types import EYES
 
 _TURN_RAD, _PLACE_M = 0.02, 0.002
 _CANDIDATES = 40

@@ -31,13 +31,15 @@ from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_file import write_cube
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
+from handcal.rig_types import EyeDisplay, Rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter, draw_cube
 from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
-from handcal.sim.wearer import WearerSettings, draw_placement_error
-from handcal.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, UInt8
+from handcal.sim.wearer import draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
+from handcal.types import Eye, Float64, Intrinsics, UInt8
 
 POSITIONS = {
     "centre": (0.0, 0.0),

@@ -28,10 +28,12 @@ from handcal.link.endpoint import Channel
 from handcal.link.impair import UNIMPAIRED, Impairment
 from handcal.link.wire import VERSION, Packet, Slot, hkdf
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import EyeDisplay, Rig
 from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
-from handcal.sim.wearer import DisplayView, Wearer, WearerAction, WearerSettings
-from handcal.types import EYES, Eye, EyeDisplay, Float64, HeadsetIdentity, HeadsetView, Rig
+from handcal.sim.wearer import DisplayView, Wearer, WearerAction
+from handcal.sim.wearer_settings import WearerSettings
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView
 
 _FORMER_SHIFT_M = (0.006, 0.0, 0.0)
 

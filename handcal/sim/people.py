@@ -15,7 +15,8 @@ import numpy as np
 
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import PlacementError
-from handcal.sim.wearer import WearerSettings, draw_placement_error
+from handcal.sim.wearer import draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import Bool, Float64
 
 Variant: TypeAlias = Literal[

@@ -13,9 +13,10 @@ from handcal.io.images import write_png
 from handcal.rig.board import Board
 from handcal.rig.grid import Grid, draw_grid
 from handcal.rig.tracked_file import write_tracked
+from handcal.rig_types import Rig
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import EYES, Intrinsics, Rig, UInt8
+from handcal.types import EYES, Intrinsics, UInt8
 
 BOARD = Board(squares=(8, 6))
 # Small, to save time.

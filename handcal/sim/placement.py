@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from handcal.display import eye_projection, view_of_eye
 from handcal.geometry import invert, project, rigid, transform
+from handcal.rig_types import EyeDisplay
 from handcal.sim.hand import HandModel
-from handcal.types import EyeDisplay, Float64
+from handcal.types import Float64
 
 _MATCH_ITERATIONS = 30
 _OVERLAY_ITERATIONS = 8

@@ -65,7 +65,8 @@ def draw_hand(
         shear[1, 2] = (intrinsics.cy - (y0 + y1 - 1) / 2) / intrinsics.fy
         options = cv2.TriangleRasterizeSettings()
         options.setShadingType(cv2.RASTERIZE_SHADING_SHADED)
-        options.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
+        # The mesh is closed: what faces away is hidden by what faces the camera.
+        options.setCullingMode(cv2.RASTERIZE_CULLING_CW)
         colors = np.zeros_like(hand.vertices_m) if vertex_colors is None else vertex_colors
         cv2.triangleRasterize(
             hand.vertices_m[None],

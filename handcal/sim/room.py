@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.types import Float32, Float64, Intrinsics, UInt8, freeze
+from handcal.frozen import freeze
+from handcal.types import Float32, Float64, Intrinsics, UInt8
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,9 @@ from scipy.spatial import KDTree
 from handcal.display import arcmin_from_px, eye_projection, view_of_eye
 from handcal.geometry import invert, project, transform
 from handcal.link.nudges import NudgeSum, VerifyRequest
+from handcal.rig_types import EyeDisplay
 from handcal.sim.hand import HandModel
-from handcal.types import EyeDisplay, Float64
+from handcal.types import Float64
 
 _POINTS = 300
 _FEWEST_POINTS = 20

@@ -14,12 +14,13 @@ from handcal.geometry import invert
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.shape import ShapeChange, change_text
+from handcal.rig_types import Rig
 from handcal.session.facts import AlignmentFacts
 from handcal.station.delay import DelayMeter
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.station.hold import merge_hold
 from handcal.station.states import CalibrationSettings, Observation
-from handcal.types import EYES, Alignment, Eye, Float64, Rig
+from handcal.types import EYES, Alignment, Eye, Float64
 
 KEEP_PROMPT = "Keep your hand up."
 """Shown while the next cursor or verification follows at once."""

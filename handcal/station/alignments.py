@@ -18,6 +18,7 @@ from handcal.hand.shipped import make_finder
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.results import SolveSettings
+from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import MAX_ALIGNMENTS, NumberedItems
 from handcal.station.aligning import KEEP_PROMPT, Accepted, Aligning, Refused, align_prompt
@@ -37,7 +38,6 @@ from handcal.types import (
     Float64,
     Frame,
     HandCloud,
-    Rig,
 )
 
 

@@ -15,10 +15,11 @@ from scipy.spatial.transform import Rotation
 
 from handcal.camera.camera import Camera
 from handcal.errors import CameraError, CameraTimeoutError, HandcalError, PoseError
+from handcal.frozen import freeze
 from handcal.geometry import invert, rigid
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
-from handcal.types import LOOK_AROUND, Float64, freeze
+from handcal.types import LOOK_AROUND, Float64
 
 _MOST_S, _STEP_S = 0.3, 0.01
 _LEAST_SEEN = 30

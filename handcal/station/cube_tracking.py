@@ -24,6 +24,7 @@ from handcal.errors import (
 )
 from handcal.geometry import image_points, invert, transform
 from handcal.link.server import HeadsetServer
+from handcal.link.shapes import Shape
 from handcal.progress import Progress
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_file import read_cube
@@ -33,7 +34,7 @@ from handcal.rig.rig_file import read_rig
 from handcal.sim.cube_bench import simulated_wearer
 from handcal.station.drawing import Drawing
 from handcal.station.procedure import CalibrationSettings
-from handcal.types import EYES, Float64, Frame, Shape, UInt8
+from handcal.types import EYES, Float64, Frame, UInt8
 
 _WAITING = 30  # frames whose head pose has not arrived
 _RESEND_M = 0.0003

@@ -390,6 +390,17 @@ def _apart(
     start = background.points_C_m[:, :2] / background.points_C_m[:, 2:]
     apart = seen - (points_C_m[..., :2] / points_C_m[..., 2:] - start)
     # A point that is hidden by the hand moves with it.
-    off = np.linalg.norm(apart - np.nanmedian(apart, axis=1, keepdims=True), axis=2)
-    apart[~(off <= 2.5 * np.nanmedian(off, axis=1, keepdims=True))] = np.nan
+    off = np.linalg.norm(apart - _median(apart), axis=2)
+    apart[~(off <= 2.5 * _median(off))] = np.nan
     return np.asarray(np.nanmean(apart, axis=1))
+
+
+def _median(values: Float64) -> Float64:
+    """Return the median along the second axis, which is kept; NaN are left out.
+
+    Several times faster than `numpy.nanmedian`, which makes masked arrays.
+    """
+    ordered = np.sort(values, axis=1)  # NaN come last
+    count = np.count_nonzero(~np.isnan(ordered), axis=1, keepdims=True)
+    low = np.take_along_axis(ordered, (count - 1) // 2, axis=1)
+    return np.asarray(0.5 * (low + np.take_along_axis(ordered, count // 2, axis=1)))

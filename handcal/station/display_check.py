@@ -24,8 +24,9 @@ from handcal.rig.obey import (
     judge_display,
     shares_seen,
 )
+from handcal.rig_types import DisplayCheck, Rig
 from handcal.station.drawing import rig_name
-from handcal.types import EYES, DisplayCheck, Eye, HeadsetIdentity, Rig, UInt8
+from handcal.types import EYES, Eye, HeadsetIdentity, UInt8
 
 Show: TypeAlias = Callable[[Shown], None]
 """Has the headset show a probe, and waits until it does."""

@@ -28,6 +28,7 @@ from handcal.link.transport import UdpTransport
 from handcal.progress import Progress
 from handcal.rig.compare import compare_camera
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Rig
 from handcal.station.headset import (
     STAMP_ADVICE,
     headset_problem,
@@ -35,7 +36,7 @@ from handcal.station.headset import (
     run_pose_delay,
 )
 from handcal.station.procedure import CalibrationSettings
-from handcal.types import CameraIdentity, Intrinsics, Rig
+from handcal.types import CameraIdentity, Intrinsics
 
 _PACKAGES = (
     "numpy",

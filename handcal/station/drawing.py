@@ -11,7 +11,8 @@ from handcal.display import projection_matrix
 from handcal.link.drawn import drawn_digest
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
-from handcal.types import EYES, Eye, Float64, Projection, Rig
+from handcal.rig_types import Rig
+from handcal.types import EYES, Eye, Float64, Projection
 
 
 class Drawing:

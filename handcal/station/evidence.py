@@ -18,7 +18,8 @@ from scipy.spatial.transform import Rotation
 from handcal.geometry import invert
 from handcal.rig.compare import compare_camera
 from handcal.rig.report import depth_finding, display_finding
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, Rig
+from handcal.rig_types import Rig
+from handcal.types import CameraIdentity, Float64, Frame, Intrinsics
 
 FROZEN_FRAMES = 4
 """Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""

@@ -9,14 +9,15 @@ import numpy as np
 
 from handcal.display import view_of_eye
 from handcal.geometry import invert, transform
+from handcal.rig_types import Rig
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.simulation import Simulation
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.hands import PlacedHand
 from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import Eye, Float64, Rig
+from handcal.types import Eye, Float64
 
 _PERIOD_S = 0.1
 

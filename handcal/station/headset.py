@@ -13,10 +13,12 @@ from handcal.errors import CameraTimeoutError, HandcalError, HandError, PoseErro
 from handcal.geometry import transform
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
-from handcal.link.server import HeadsetServer, LinkStatistics
+from handcal.link.server import HeadsetServer
+from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION, Rejection
 from handcal.progress import Progress
-from handcal.types import EYES, Float64, HeadsetIdentity, Rig
+from handcal.rig_types import Rig
+from handcal.types import EYES, Float64, HeadsetIdentity
 
 _LEAST_RATE_HZ = 55.0
 _MOST_LOST = 0.1

@@ -14,10 +14,11 @@ from handcal.progress import Progress
 from handcal.register.fuse import observe_eye_distance
 from handcal.register.prior import LearnedPrior, Observed, PriorSettings, learn_prior
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Rig
 from handcal.session.facts import read_facts
 from handcal.session.journal import Event, read_journal
 from handcal.session.state import SessionEvent
-from handcal.types import EYES, EyeDistance, Float64, Rig
+from handcal.types import EYES, EyeDistance, Float64
 
 MAX_SESSIONS = 300
 """Only the newest sessions count: a headset's fit and a lab's wearers change."""

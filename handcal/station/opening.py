@@ -13,6 +13,7 @@ from handcal.errors import CameraError
 from handcal.io.settings import settings_json
 from handcal.register.prior import PriorSettings
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Rig
 from handcal.session.facts import SessionFacts
 from handcal.session.session import Session
 from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
@@ -23,7 +24,7 @@ from handcal.station.lab_prior import run_learn_prior
 from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.station.solve_again import stored_solve_settings
-from handcal.types import EYES, PlanName, Rig
+from handcal.types import EYES, PlanName
 
 
 def resume_or_create(settings: StationSettings, wearer: str, resume: Path | None) -> Session:

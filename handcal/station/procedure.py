@@ -31,6 +31,7 @@ from handcal.errors import HandcalError
 from handcal.link.reliable import Outgoing
 from handcal.link.server import HeadsetServer
 from handcal.register.results import Results, results_json, solve_session
+from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.station.states import MAX_HAND_SET_SHIFT_M as MAX_HAND_SET_SHIFT_M
 from handcal.station.states import CalibrationSettings as CalibrationSettings
@@ -39,7 +40,7 @@ from handcal.station.states import ProcedureError as ProcedureError
 from handcal.station.states import State as State
 from handcal.station.verifications import VerificationSteps
 from handcal.station.verifying import Verifying as Verifying
-from handcal.types import EYES, Eye, EyeDistance, Float64, PlanName, Rig
+from handcal.types import EYES, Eye, EyeDistance, Float64, PlanName
 
 _UNSETTLED = (State.ALIGN, State.VERIFY, State.APPLYING)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from handcal.camera.feed import CameraStatus
-from handcal.link.server import LinkStatistics
+from handcal.link.statistics import LinkStatistics
 from handcal.register.results import Results
 from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord

@@ -20,6 +20,7 @@ from handcal.io.closable import Closable
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
+from handcal.link.shapes import Target
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
@@ -44,7 +45,7 @@ from handcal.station.procedure import Calibration, Observation, ProcedureError, 
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot, read_procedure
 from handcal.station.verifying import skipped_eyes
-from handcal.types import Eye, Float64, Frame, HeadsetIdentity, Target
+from handcal.types import Eye, Float64, Frame, HeadsetIdentity
 
 _STORE_PERIOD_S = 1.0
 

@@ -10,6 +10,7 @@ from handcal.errors import HandError
 from handcal.geometry import transform
 from handcal.link.nudges import VerifyRequest
 from handcal.link.server import HeadsetServer, Nudge
+from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.station.alignments import AlignmentSteps
 from handcal.station.hands import PlacedHand
@@ -24,7 +25,7 @@ from handcal.station.verifying import (
     resumed,
     verify_prompt,
 )
-from handcal.types import EYES, Eye, Float64, Frame, Rig, Verification
+from handcal.types import EYES, Eye, Float64, Frame, Verification
 
 
 class VerificationSteps(AlignmentSteps, ABC):

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.display import arcmin_from_px, eye_projection
+from handcal.frozen import freeze
 from handcal.geometry import project
-from handcal.types import Eye, EyeDisplay, Float64, UInt8, freeze
+from handcal.rig_types import EyeDisplay
+from handcal.types import Eye, Float64, UInt8
 
 _NEAREST_M = 0.05
 _NO_TARGET_M = np.empty((0, 3))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
-from handcal.types import EYES, Eye, EyeDisplay, EyeShift, Rig, VerdictName
+from handcal.rig_types import EyeDisplay, Rig
+from handcal.types import EYES, Eye, EyeShift, VerdictName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import signed

@@ -12,7 +12,7 @@ import pytest
 
 from handcal.camera.feed import CameraStatus
 from handcal.geometry import rigid, transform
-from handcal.link.server import LinkStatistics
+from handcal.link.statistics import LinkStatistics
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.station.hands import PlacedHand

@@ -14,8 +14,9 @@ from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
 from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.views import ViewsError
+from handcal.rig_types import DepthCheck
 from handcal.sim.boards import BoardPainter, PictureSettings
-from handcal.types import DepthCheck, Frame
+from handcal.types import Frame
 from tests.board_frames import BOARD, COLOR, frames, poses
 
 COUNT = 6

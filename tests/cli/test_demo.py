@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
-import os
 import shutil
-import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,10 @@ from handcal.geometry import rigid
 from handcal.register.fuse import eye_position_m
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
-from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.sim.wearer import draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Eye, EyeDistance
-from tests.helpers import write_small_rig
+from tests.helpers import slow_simulator, write_small_rig
 
 SEED = 3
 
@@ -35,26 +36,43 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("demo")
 
 
-@pytest.fixture(scope="module")
-def run(folder: Path) -> subprocess.CompletedProcess[str]:
+@dataclass(frozen=True)
+class Run:
+    """A demonstration's exit code and what it printed."""
+
+    code: object
+    out: str
+    err: str
+
+
+def demonstrate(folder: Path, options: str) -> Run:
+    """Run ``handcal demo`` in a folder, with a small and slow camera."""
     write_small_rig(folder / "rig.yaml")
-    options = (
-        f"--rig rig.yaml --seed {SEED} --eyes each --loss 0.3 --reorder 0.2 --eye-distance headset"
-    )
-    files = "--output runs --json new/it.json"
-    return subprocess.run(
-        [sys.executable, "-m", "handcal", "demo", *options.split(), *files.split()],
-        cwd=folder,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=150,
-    )
+    out, err, code = io.StringIO(), io.StringIO(), None
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        slow_simulator(patch)
+        patch.chdir(folder)
+        patch.setattr(sys, "argv", ["handcal", "demo", "--rig", "rig.yaml", *options.split()])
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
+    return Run(code, out.getvalue(), err.getvalue())
 
 
 @pytest.fixture(scope="module")
-def result(run: subprocess.CompletedProcess[str], folder: Path) -> dict[str, Any]:
-    assert run.returncode == 0, run.stderr
+def run(folder: Path) -> Run:
+    options = f"--seed {SEED} --eyes each --loss 0.3 --reorder 0.2 --eye-distance headset"
+    return demonstrate(folder, f"{options} --output runs --json new/it.json")
+
+
+@pytest.fixture(scope="module")
+def result(run: Run, folder: Path) -> dict[str, Any]:
+    assert run.code is None, run.err
     found: dict[str, Any] = json.loads((folder / "new" / "it.json").read_text())
     return found
 
@@ -103,14 +121,14 @@ def test_the_result_is_as_good_as_it_says(result: dict[str, Any]) -> None:
 
 
 def test_the_headset_s_eye_distance_was_used(
-    run: subprocess.CompletedProcess[str], result: dict[str, Any], session: Path
+    run: Run, result: dict[str, Any], session: Path
 ) -> None:
     found = result["eye_distance"]
     assert found["used"]["source"] == "headset"
     # Given to the headset in millimetres.
     assert found["used"]["value_m"] == pytest.approx(_measure(SEED).value_m)
     assert EyeDistance(**found["used"]) == Session.open(session).facts.eye_distance
-    assert "mm (headset)" in run.stdout
+    assert "mm (headset)" in run.out
     errors_m = [_measure(seed).value_m - _true_m(seed) for seed in range(200)]
     assert np.std(errors_m) == pytest.approx(0.001, rel=0.15)
     assert np.mean(errors_m) == pytest.approx(0.0, abs=0.0003)
@@ -143,14 +161,12 @@ def test_the_link_was_bad_and_everything_arrived(result: dict[str, Any], session
     assert link["acked"] == result["link"]["acked"] >= 7
 
 
-def test_what_a_person_reads_tells_the_same(
-    run: subprocess.CompletedProcess[str], result: dict[str, Any]
-) -> None:
-    assert "100 % Alignment 2 of 2, the right eye: applied and acknowledged" in run.stdout
+def test_what_a_person_reads_tells_the_same(run: Run, result: dict[str, Any]) -> None:
+    assert "100 % Alignment 2 of 2, the right eye: applied and acknowledged" in run.out
     error = result["reprojection_arcmin"]
-    assert f"{error['before']:.1f}′ before, {error['after']:.1f}′ after" in run.stdout
-    assert f"Session: {result['session']}" in run.stdout
-    assert run.stderr == ""
+    assert f"{error['before']:.1f}′ before, {error['after']:.1f}′ after" in run.out
+    assert f"Session: {result['session']}" in run.out
+    assert run.err == ""
 
 
 def test_the_session_is_solved_again_to_the_last_bit(
@@ -236,21 +252,12 @@ def test_a_wrong_rig_is_judged_by_the_true_eyes() -> None:
     ],
 )
 def test_a_fault_is_named_and_never_accepted(fault: str, tmp_path: Path) -> None:
-    write_small_rig(tmp_path / "rig.yaml")
-    options = f"--rig rig.yaml --seed {SEED} --fault {fault} --output runs --json it.json"
-    run = subprocess.run(
-        [sys.executable, "-m", "handcal", "demo", *options.split()],
-        cwd=tmp_path,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        timeout=150,
-    )
-    assert run.returncode == 3, run.stderr
+    run = demonstrate(tmp_path, f"--seed {SEED} --fault {fault} --output runs --json it.json")
+    assert run.code == 3, run.err
     result = json.loads((tmp_path / "it.json").read_text())
     for eye in result["eyes"].values():
         assert (eye["verdict"], eye["evidence"]) == ("contradicted", [fault])
-        assert eye["reason"] in run.stdout.replace("\n", " ")
+        assert eye["reason"] in run.out.replace("\n", " ")
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from handcal.cli.main import main, parse
-from tests.helpers import ROOT
+from tests.helpers import ROOT, slow_simulator
 
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text("utf-8")
 
@@ -31,6 +31,7 @@ def test_every_command_runs_on_rendered_images_and_the_simulator(
 ) -> None:
     """A whole offline calibration and a wearer, as a reader would do it; 20 views as written."""
     monkeypatch.chdir(tmp_path)
+    slow_simulator(monkeypatch)
     for command in commands("bash"):
         command = command.replace("--views 20", f"--views {views}")
         if "SESSION" in command:

@@ -32,10 +32,20 @@ WIDE = Intrinsics(480, 480, 230.0, 230.0, 239.5, 239.5)
 HELD_UP = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
 
 
-def run(name: str, *words: object, code: int = 0) -> str:
-    """Run an example; return what it prints."""
+# What costs most is the frames.
+SLOWLY = """
+import runpy, sys
+from handcal.sim.camera import CAMERA_FAULTS, SyntheticSettings
+CAMERA_FAULTS[""] = SyntheticSettings(rate_hz=10.0)
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def run(name: str, *words: object, code: int = 0, slowly: bool = False) -> str:
+    """Run an example, on request before a slow simulated camera; return what it prints."""
     done = subprocess.run(
-        [sys.executable, EXAMPLES / name, *map(str, words)],
+        [sys.executable, *(["-c", SLOWLY] if slowly else []), EXAMPLES / name, *map(str, words)],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
         capture_output=True,
@@ -103,7 +113,7 @@ def test_a_rig_is_built(tmp_path: Path) -> None:
 
 @pytest.mark.flaky(reruns=1)  # the wearer lives in real time
 def test_a_station_is_driven(tmp_path: Path) -> None:
-    said = run("06_drive_a_station.py", "--output", tmp_path)
+    said = run("06_drive_a_station.py", "--output", tmp_path, slowly=True)
     assert "consistent, 1 alignment: left φ = (" in said
     assert said.endswith("applied: True, finished: True\n")
     (folder,) = tmp_path.iterdir()
@@ -183,7 +193,8 @@ def test_a_calibration_is_followed_by_bridges(tmp_path: Path) -> None:
     pytest.importorskip("pylsl")
     pytest.importorskip("pyigtl")
     rig = write_small_rig(tmp_path / "rig.yaml")
-    said = run("09_bridges.py", "--sessions", tmp_path, "--rig", rig, "--port", 47947)
+    words = ("--sessions", tmp_path, "--rig", rig, "--port", 47947)
+    said = run("09_bridges.py", *words, slowly=True)
     assert '"event":"session"' in said
     events = re.findall(r'"event":"(\w+)"', said)
     assert events.count("confirmed") == 1

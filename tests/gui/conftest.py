@@ -24,10 +24,12 @@ from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.io.closable import Closable
 from handcal.io.settings import settings_json
 from handcal.link.client import HeadsetClient, HeadsetState
-from handcal.link.server import LinkStatistics
+from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
+from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
@@ -46,9 +48,9 @@ from handcal.types import (
     Float64,
     Frame,
     HeadsetIdentity,
-    Rig,
     UInt8,
 )
+from tests.helpers import write_small_rig
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -279,8 +281,14 @@ class Studio:
 
 
 @pytest.fixture(scope="session")
-def frames(rig: Rig) -> dict[str, Frame]:
+def small_rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_small_rig(tmp_path_factory.mktemp("rig") / "rig.yaml")
+
+
+@pytest.fixture(scope="session")
+def frames(small_rig: Path) -> dict[str, Frame]:
     """Return the frames that the camera can show, by name."""
+    rig = read_rig(small_rig)
     world = World(make_hand(1), make_room(1))
     poses = {"cursor": T_D_CURSOR, "live": T_D_LIVE, "turned": T_D_TURNED}
     return {name: _render(rig, world, T) for name, T in {**poses, "nothing": None}.items()}
@@ -288,7 +296,10 @@ def frames(rig: Rig) -> dict[str, Frame]:
 
 @pytest.fixture
 def studio(
-    rig: Rig, frames: Mapping[str, Frame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    small_rig: Path,
+    frames: Mapping[str, Frame],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Studio]:
     """Return the parts of a station to be opened with their settings and the pairing key `KEY`."""
     camera = Camera(frames)
@@ -298,6 +309,7 @@ def studio(
         address = probe.getsockname()
     settings = StationSettings(
         source="realsense",
+        rig=str(small_rig),
         headset="network",
         host=address[0],
         port=address[1],

@@ -254,7 +254,8 @@ def test_a_technician_calibrates_two_wearers_with_the_keyboard_alone(
         time.sleep(0.2)
 
 
-@pytest.mark.parametrize("arrangement", ["panels", pytest.param("station", marks=pytest.mark.slow)])
+@pytest.mark.slow  # tests/gui/program/test_plan.py presses the same keys, without the X server
+@pytest.mark.parametrize("arrangement", ["panels", "station"])
 def test_three_presses_lead_from_the_start_page_to_a_verified_result(
     display: Display,
     tmp_path: Path,

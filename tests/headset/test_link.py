@@ -17,8 +17,9 @@ from handcal.link.impair import UNIMPAIRED, Impairment
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
+from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection, Shape, Target
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 from tests.headset.mono_client import MonoClient
 from tests.headset.relay import Relay
 from tests.helpers import eventually

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Iterator
+from typing import Any
 
+import numpy as np
 import pytest
 
+from handcal.display import target_corners_m
 from handcal.link import greetings, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer
+from handcal.link.shapes import Target
 from handcal.link.transport import Address
 from handcal.link.wire import Keys, Packet, Welcome
+from handcal.types import Float64, HeadsetIdentity, Projection
 
 KEY = b"a pairing key of the tests"
 DEVICE = 0x1234
@@ -164,3 +169,15 @@ def raw_server() -> Iterator[RawServer]:
     server = RawServer()
     yield server
     server.socket.close()
+
+
+IDENTITY = HeadsetIdentity("0000000000001234", name="Lab 1", runtime="tests", app="tests 1")
+TARGET = Target("left", target_corners_m(0.5))
+
+
+def hand(seed: int = 0, count: int = 5000) -> Float64:
+    return np.random.default_rng(seed).normal([0.0, 0.0, 0.5], 0.05, (count, 3))
+
+
+def projection(eye: Any, value: float) -> Projection:
+    return Projection(eye, np.full((3, 4), value), 1268, 720)

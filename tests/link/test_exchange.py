@@ -9,7 +9,7 @@ from handcal.link import exchange, greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.client import HeadsetClient
 from handcal.link.exchange import MAX_ATTEMPTS, PRIME, VALUE_BYTES, Exchange
-from handcal.link.messages import MalformedError
+from handcal.link.fields import MalformedError
 from handcal.link.pair_by_digits import pair_by_digits
 from handcal.link.pairing import OFFER_S, Pairings, new_device_id
 from handcal.link.server import HeadsetServer

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link.fields import MalformedError
 from handcal.link.handshake import MAX_ANSWERS, PERIOD_S, Caller, Limiter, Reception
 from handcal.link.pairing import MAX_DEVICES, Pairing, Pairings
 from handcal.link.transport import Address
@@ -147,7 +148,7 @@ def test_strangers_cannot_have_every_key_tried_for_long() -> None:
     "envelope", [pb.Envelope(), pb.Envelope(bye=pb.Bye()), greetings.hello(b"short", 1, b"", "")]
 )
 def test_what_is_no_hello_is_malformed(desk: Desk, envelope: pb.Envelope) -> None:
-    with pytest.raises(messages.MalformedError):
+    with pytest.raises(MalformedError):
         desk.hear(greetings.seal(desk.keys.to_pc, DEVICE, envelope))
 
 

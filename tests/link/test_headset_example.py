@@ -14,7 +14,7 @@ import pytest
 from handcal.display import target_corners_m
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.server import Confirmation, HeadsetServer
-from handcal.types import Target
+from handcal.link.shapes import Target
 from tests.helpers import ROOT
 
 PATIENCE_S = 20.0

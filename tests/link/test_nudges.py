@@ -12,8 +12,8 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, nudges
 from handcal.link.client import HeadsetClient
 from handcal.link.drawn import DIGEST_BYTES
+from handcal.link.fields import MalformedError
 from handcal.link.impair import Impairment
-from handcal.link.messages import MalformedError
 from handcal.link.nudges import MAX_NUDGE_ARCMIN, MAX_NUDGE_SIZE, NudgeSum, VerifyRequest
 from handcal.link.server import HeadsetServer, Nudge
 from handcal.types import EYES, HeadsetIdentity, Projection

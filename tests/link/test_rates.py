@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from handcal.link.rates import LinkRates, link_rates
-from handcal.link.server import LinkStatistics
+from handcal.link.statistics import LinkStatistics
 
 START = LinkStatistics(
     connected=True,

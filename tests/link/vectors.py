@@ -19,8 +19,9 @@ from handcal.link.invitation import Invitation
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.reliable import Receipt
+from handcal.link.shapes import Shape, Target
 from handcal.link.wire import Keys, Packet, Slot, Welcome
-from handcal.types import Eye, HeadsetIdentity, HeadsetView, Projection, Shape, Target
+from handcal.types import Eye, HeadsetIdentity, HeadsetView, Projection
 from tests.helpers import ROOT
 
 PATH = ROOT / "docs/protocol_vectors.json"

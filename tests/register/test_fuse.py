@@ -17,19 +17,11 @@ from handcal.register.prior import PriorSettings
 from handcal.register.solve import solve_alignment
 from handcal.register.surface import describe_surface
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
+from handcal.rig_types import DepthCheck
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import overlay_hand, view_through
 from handcal.sim.raster import visible_points
-from handcal.types import (
-    EYES,
-    Alignment,
-    DepthCheck,
-    Eye,
-    EyeDistance,
-    EyeShift,
-    Float64,
-    Verification,
-)
+from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verification
 
 RIG = example_rig()
 SETTINGS = FuseSettings()

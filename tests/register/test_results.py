@@ -21,7 +21,7 @@ from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.register.verdict import VerdictSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.procedure import CalibrationSettings
 from handcal.types import EYES, METHODS, Alignment, EyeDistance, Method
 

@@ -10,9 +10,10 @@ from handcal.rig.display import DisplayHomography
 from handcal.rig.example import example_rig
 from handcal.rig.viewpoint import TrackedView
 from handcal.rig.views import ViewsError
+from handcal.rig_types import Rig
 from handcal.sim.boards import board_poses, board_view
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
-from handcal.types import EYES, Eye, Float64, Rig
+from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 PHI_M = np.array([0.002, -0.001, 0.003])

@@ -12,7 +12,8 @@ from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import ViewsError, WorstView
-from handcal.types import CameraIdentity, DepthCheck, Intrinsics
+from handcal.rig_types import DepthCheck
+from handcal.types import CameraIdentity, Intrinsics
 
 RIG = example_rig()
 MADE = "2026-11-21T16:00:00+00:00"

@@ -7,7 +7,8 @@ import pytest
 from handcal.geometry import rigid
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
-from handcal.types import Float64, Rig
+from handcal.rig_types import Rig
+from handcal.types import Float64
 
 
 def with_display(**changes: object) -> Rig:

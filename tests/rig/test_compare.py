@@ -8,7 +8,8 @@ from handcal.camera.recordings import open_recording
 from handcal.geometry import rigid
 from handcal.rig.compare import compare_camera, compare_rigs
 from handcal.rig.example import example_rig
-from handcal.types import CameraIdentity, Rig
+from handcal.rig_types import Rig
+from handcal.types import CameraIdentity
 
 RIG = example_rig()
 

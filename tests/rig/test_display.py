@@ -23,9 +23,10 @@ from handcal.rig.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose
 from handcal.rig.views import ViewsError
+from handcal.rig_types import EyeDisplay
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA as CAMERA
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import EyeDisplay, Float64
+from handcal.types import Float64
 
 DISPLAY = example_rig().eyes["left"]
 SIZE = DISPLAY.width_px, DISPLAY.height_px

@@ -10,7 +10,8 @@ from handcal.io.resources import resource_path
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
-from handcal.types import EYES, EyeDisplay, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import EYES, Float64
 
 
 def viewpoint_in_H_m(display: EyeDisplay) -> Float64:

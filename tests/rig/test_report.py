@@ -5,15 +5,8 @@ import numpy as np
 from handcal.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.report import missing_parts, report_rig
-from handcal.types import (
-    RIG_PARTS,
-    CameraIdentity,
-    DepthCheck,
-    DisplayCheck,
-    HeadsetIdentity,
-    Origin,
-    Rig,
-)
+from handcal.rig_types import RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
+from handcal.types import CameraIdentity, HeadsetIdentity
 
 RIG = example_rig()
 

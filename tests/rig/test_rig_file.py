@@ -15,18 +15,8 @@ from handcal.geometry import rigid
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
-from handcal.types import (
-    EYES,
-    RIG_PARTS,
-    CameraIdentity,
-    DepthCheck,
-    EyeDisplay,
-    HeadsetIdentity,
-    HeadsetView,
-    Intrinsics,
-    Origin,
-    Rig,
-)
+from handcal.rig_types import RIG_PARTS, DepthCheck, EyeDisplay, Origin, Rig
+from handcal.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
 from tests.helpers import DATA
 
 FOCAL = st.floats(1.0, 1e5)

@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 
 from handcal.rig.example import example_rig
-from handcal.session.facts import (
-    AlignmentFacts,
-    CameraUsed,
-    SessionFacts,
-    facts_json,
-)
+from handcal.session.facts import AlignmentFacts, CameraUsed, SessionFacts, facts_json
 from handcal.session.session import Session
 from handcal.types import (
     Alignment,

@@ -21,6 +21,7 @@ from handcal.rig.cube_track import cube_corners_m
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid
+from handcal.rig_types import Rig
 from handcal.sim.cube_captures import (
     POSITIONS,
     CaptureSettings,
@@ -31,7 +32,7 @@ from handcal.sim.cube_captures import (
 from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.wearer import draw_placement_error
-from handcal.types import Float64, Intrinsics, Rig
+from handcal.types import Float64, Intrinsics
 
 CAMERA = Intrinsics(640, 360, 900.0, 898.5, 322.0, 177.5, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
 SETTINGS = CaptureSettings(positions=("left",), poses=1, points=1000, camera=CAMERA)

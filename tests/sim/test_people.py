@@ -14,7 +14,7 @@ from handcal.sim.people import (
     draw_perception,
     is_balanced,
 )
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from tests.helpers import ROOT
 
 USUAL = WearerSettings()

@@ -10,7 +10,8 @@ from handcal.geometry import invert, transform
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import D415, draw_hand, visible_points
-from handcal.sim.wearer import DisplayView, Wearer, WearerAction, WearerSettings, draw_eyes
+from handcal.sim.wearer import DisplayView, Wearer, WearerAction, draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()

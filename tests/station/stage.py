@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from handcal.display import projection_matrix
 from handcal.errors import PoseError
 from handcal.geometry import rigid
 from handcal.link.client import HeadsetClient, HeadsetState
@@ -22,21 +23,8 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.station.delay import DelaySettings
-from handcal.station.procedure import (
-    Calibration,
-    CalibrationSettings,
-    Observation,
-    State,
-)
-from handcal.types import (
-    EYES,
-    Eye,
-    Float64,
-    Frame,
-    HeadsetIdentity,
-    Intrinsics,
-    UInt16,
-)
+from handcal.station.procedure import Calibration, CalibrationSettings, Observation, State
+from handcal.types import EYES, Eye, Float64, Frame, HeadsetIdentity, Intrinsics, UInt16
 from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"
@@ -189,3 +177,17 @@ def connect(server: HeadsetServer) -> HeadsetClient:
 
 def events(session: Session) -> list[tuple[str, dict[str, Any]]]:
     return [(event.name, event.data) for event in Session.open(session.path).events]
+
+
+def shows_offline_projections(shown: HeadsetState) -> bool:
+    return all(shows_projection(shown, eye, np.zeros(3)) for eye in EYES)
+
+
+def shows_projection(shown: HeadsetState, eye: Eye, shift_m: Float64) -> bool:
+    """Return whether the newest projection, if one has arrived, is that of a shift."""
+    P = projection_matrix(RIG.eyes[eye], shift_m)
+    return eye in shown.projections and np.array_equal(shown.projections[eye].P, P)
+
+
+def shows(stage: Stage, eye: Eye, shift_m: Float64) -> bool:
+    return shows_projection(stage.shown(), eye, shift_m)

@@ -17,10 +17,11 @@ from handcal.rig.example import example_rig
 from handcal.rig.obey import Probe
 from handcal.rig.report import display_finding, report_rig
 from handcal.rig.rig_file import read_rig, write_rig
+from handcal.rig_types import DisplayCheck
 from handcal.sim.display import DISPLAY_MODES, DisplayMode, SimulatedDisplay
 from handcal.station.display_check import Answer, Show, by_camera, by_wearer, run_display_check
 from handcal.station.evidence import Evidence
-from handcal.types import DisplayCheck, Eye, HeadsetIdentity
+from handcal.types import Eye, HeadsetIdentity
 from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"

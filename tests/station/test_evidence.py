@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from handcal.rig.example import example_rig
+from handcal.rig_types import DepthCheck
 from handcal.station.evidence import FROZEN_FRAMES, Contradiction, Evidence
-from handcal.types import CameraIdentity, DepthCheck, Frame
+from handcal.types import CameraIdentity, Frame
 
 RIG = example_rig()
 IDENTITY = CameraIdentity("Intel RealSense D415", "1234")

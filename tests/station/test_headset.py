@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ import pytest
 from handcal.errors import HandcalError, PoseError
 from handcal.geometry import invert, rigid, transform
 from handcal.link.client import HeadsetClient
-from handcal.link.server import HeadsetServer, LinkStatistics
+from handcal.link.server import HeadsetServer
+from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION
 from handcal.rig.example import example_rig
+from handcal.rig_types import DisplayCheck
 from handcal.sim.camera import SyntheticCamera, SyntheticSettings
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
@@ -31,14 +34,7 @@ from handcal.station.headset import (
     headset_state,
     run_pose_delay,
 )
-from handcal.types import (
-    DisplayCheck,
-    Float64,
-    Frame,
-    HeadsetIdentity,
-    HeadsetView,
-    Intrinsics,
-)
+from handcal.types import Float64, Frame, HeadsetIdentity, HeadsetView, Intrinsics
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()
@@ -199,6 +195,8 @@ def test_wrong_stamps_are_found_over_the_link() -> None:
 @pytest.mark.process
 def test_the_doctor_reports_on_a_headset(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "_SETTLE_S", 0.5)
+    shorter = partial(run_pose_delay, duration_s=4.0)
+    monkeypatch.setattr(doctor, "run_pose_delay", shorter)
     with HeadsetServer(KEY) as server:
         (absent,) = examine_headset(server, None, None, 0.1)
     assert (absent.health, absent.what) == (Health.BROKEN, "Headset")

@@ -15,9 +15,10 @@ from handcal.register.fuse import eye_position_m
 from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
+from handcal.rig_types import Rig
 from handcal.session.session import Session
 from handcal.station.lab_prior import run_learn_prior
-from handcal.types import EYES, Alignment, EyeDistance, Rig
+from handcal.types import EYES, Alignment, EyeDistance
 
 RIG = example_rig()
 SETTINGS = PriorSettings()

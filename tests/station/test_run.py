@@ -29,7 +29,7 @@ from handcal.sim.scene import SceneState
 from handcal.station.run import RunSettings, run_calibration
 from handcal.station.settings import StationSettings
 from handcal.types import HeadsetIdentity
-from tests.helpers import write_small_rig
+from tests.helpers import slow_simulator, write_small_rig
 
 KEY = "a pairing key of the tests"
 DEVICE = "00000000000000aa"
@@ -39,7 +39,8 @@ pytestmark = pytest.mark.process
 
 
 @pytest.fixture
-def station(tmp_path: Path) -> StationSettings:
+def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StationSettings:
+    slow_simulator(monkeypatch)
     rig = write_small_rig(tmp_path / "rig.yaml")
     return StationSettings(rig=str(rig), sessions=str(tmp_path / "sessions"), seed=3)
 
@@ -123,7 +124,7 @@ def test_the_virtual_headset_is_calibrated(station: StationSettings) -> None:
 
 def test_the_recommended_plan_leads_itself(station: StationSettings) -> None:
     said: list[str] = []
-    settings = RunSettings(station, plan="recommended")
+    settings = RunSettings(station, plan="recommended", eyes="right")
     result = run_calibration(settings, Progress(lambda what, _: said.append(what)))
     assert result["plan"] == "recommended"
     assert result["alignments"] >= 1

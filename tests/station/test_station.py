@@ -20,7 +20,8 @@ from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
-from handcal.sim.wearer import WearerSettings, draw_eyes
+from handcal.sim.wearer import draw_eyes
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.delay import DelaySettings
 from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings
@@ -30,7 +31,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.station.verifying import SKIPPED
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
-from tests.helpers import Patience, eventually
+from tests.helpers import Patience, eventually, slow_simulator, write_small_rig
 
 NAIVE_SEED = 3
 PATIENCE_S = 50.0
@@ -43,9 +44,13 @@ CALIBRATION = CalibrationSettings(
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> StationSettings:
+def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StationSettings:
+    slow_simulator(monkeypatch)
     return StationSettings(
-        seed=NAIVE_SEED, sessions=str(tmp_path / "sessions"), calibration=CALIBRATION
+        seed=NAIVE_SEED,
+        rig=str(write_small_rig(tmp_path / "rig.yaml")),
+        sessions=str(tmp_path / "sessions"),
+        calibration=CALIBRATION,
     )
 
 

@@ -11,6 +11,7 @@ from handcal.errors import CameraEndError, FileError, HandcalError
 from handcal.geometry import transform
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
+from handcal.link.shapes import Shape
 from handcal.register.results import SolveSettings, solve_session
 from handcal.rig.cube import Cube
 from handcal.rig.cube_track import TrackedCube, cube_corners_m
@@ -18,11 +19,12 @@ from handcal.session.session import Session
 from handcal.sim.cube_bench import CubeBench, simulated_wearer
 from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
+from handcal.sim.wearer import draw_eyes, draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.station import user_test
 from handcal.station.cube_tracking import CubeTracker, run_cube_tracking
 from handcal.station.user_test import TrialSettings, run_user_trials
-from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics, Shape
+from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics
 from tests.helpers import ROOT
 
 TRUE_M: dict[Eye, Float64] = {

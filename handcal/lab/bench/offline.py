@@ -31,10 +31,11 @@ from handcal.rig.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.viewpoint import viewpoint_from_stereo
 from handcal.rig.views import BoardImage, board_image
+from handcal.rig_types import Rig
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 from handcal.statistics import MeanInterval
-from handcal.types import EYES, Eye, Float64, Intrinsics, Rig
+from handcal.types import EYES, Eye, Float64, Intrinsics
 
 HEADSET_CAMERA = Intrinsics(
     1280, 720, 1010.0, 1008.0, 645.0, 356.0, (0.06, -0.13, 0.0006, -0.0004, 0.04)

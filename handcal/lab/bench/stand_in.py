@@ -9,10 +9,12 @@ from handcal.lab.bench.trials import run_trials, trial_hand
 from handcal.progress import Progress
 from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment
+from handcal.rig_types import Rig
 from handcal.sim.overlay import overlay_by_eye
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
+from handcal.sim.wearer import draw_eyes, draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.statistics import MeanInterval, mean_interval
-from handcal.types import EYES, Float64, Rig
+from handcal.types import EYES, Float64
 
 _POINTS = 3000
 _DEPTH_SIGMA_M = 0.001

@@ -39,8 +39,8 @@ from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid, grid_on
 from handcal.rig.rig_file import read_rig
 from handcal.rig.warp import RotationWarp
+from handcal.rig_types import Rig
 from handcal.sim.cube_captures import CaptureSettings, write_captures
-from handcal.types import Rig
 
 # Shares of the time.
 _READING, _RENDERING, _SEGMENTING = 0.7, 0.49, 0.95

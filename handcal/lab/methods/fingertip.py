@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.lab.methods.points import check_pairs
-from handcal.types import EyeDisplay, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import Float64
 
 FEWEST_ALIGNMENTS = 2
 """Each gives two equations for three unknowns."""

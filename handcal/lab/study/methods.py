@@ -24,7 +24,7 @@ from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearers import StudyWearer, align_cube, align_hand, align_points, draw_wearer
 from handcal.register.fuse import FuseSettings, fuse_alignments
 from handcal.register.solve import solve_alignment
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Alignment, Eye, EyeShift, Float64
 
 Projections: TypeAlias = Mapping[Eye, Float64]

@@ -20,7 +20,8 @@ from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import PlacementError
-from handcal.sim.wearer import WearerSettings, draw_eyes, draw_placement_error
+from handcal.sim.wearer import draw_eyes, draw_placement_error
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, METHODS, Float64, Intrinsics, Method
 
 FLOOR = "known pairs"

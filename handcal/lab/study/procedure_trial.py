@@ -29,7 +29,7 @@ from handcal.sim.people import (
 )
 from handcal.sim.placement import apply_placement_error, overlay_hand, view_through
 from handcal.sim.raster import visible_points
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import (
     EYES,
     Alignment,

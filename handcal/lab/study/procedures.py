@@ -27,7 +27,7 @@ from handcal.register.benefit import depth_error_m
 from handcal.register.placement import PlacementSettings
 from handcal.register.prior import LearnedPrior, learn_prior
 from handcal.sim.people import VARIANTS, Variant, begin_sitting
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Eye, Float64, Intrinsics
 
 EARLIER_SESSIONS = 20

@@ -22,7 +22,8 @@ from handcal.geometry import project
 from handcal.lab.methods.fingertip import solve_eye_from_points
 from handcal.lab.methods.indica import solve_indica_full, solve_indica_recycled, split_projection
 from handcal.lab.methods.spaam import solve_spaam
-from handcal.types import EyeDisplay, Float64
+from handcal.rig_types import EyeDisplay
+from handcal.types import Float64
 
 BASE = "Base"
 _LARGEST_BYTES = 1_000_000

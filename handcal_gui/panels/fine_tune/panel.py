@@ -21,9 +21,10 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
+from handcal.rig_types import Rig
 from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Eye, Rig
+from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from handcal.link.rates import LinkRates
-from handcal.link.server import LinkStatistics
+from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

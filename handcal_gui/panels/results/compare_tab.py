@@ -15,7 +15,8 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.register.results import Results
-from handcal.types import METHODS, Method, Rig
+from handcal.rig_types import Rig
+from handcal.types import METHODS, Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox

@@ -9,8 +9,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
+from handcal.rig_types import Rig
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Rig
+from handcal.types import EYES, Alignment
 from handcal_gui.keys import add_action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot

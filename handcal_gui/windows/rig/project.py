@@ -13,7 +13,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import read_json
 from handcal.rig.rig_file import read_rig
-from handcal.types import Rig
+from handcal.rig_types import Rig
 from handcal_gui.translation import tr
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.solve import SolvedPart

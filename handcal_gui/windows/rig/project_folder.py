@@ -16,7 +16,7 @@ from handcal.rig.camera import LensChoice
 from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.steps import DisplayInputs
-from handcal.types import Rig
+from handcal.rig_types import Rig
 from handcal_gui.translation import tr
 
 Distance: TypeAlias = Literal["measured", "solved"]

@@ -12,7 +12,8 @@ from handcal.rig.camera import CameraCalibration
 from handcal.rig.compare import compare_rigs
 from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration
 from handcal.rig.stereo import StereoCalibration
-from handcal.types import EYES, Eye, Float64, Rig
+from handcal.rig_types import Rig
+from handcal.types import EYES, Eye, Float64
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.number_table import Row

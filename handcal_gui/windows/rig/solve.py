@@ -24,7 +24,8 @@ from handcal.rig.steps import (
 from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import BoardImage, WorstView
-from handcal.types import Eye, Rig
+from handcal.rig_types import Rig
+from handcal.types import Eye
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.project_folder import (

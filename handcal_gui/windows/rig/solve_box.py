@@ -8,8 +8,8 @@ from typing import Any
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from handcal.progress import Progress
+from handcal.rig_types import Origin
 from handcal.station.doctor import Finding, Health
-from handcal.types import Origin
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import main_button, paragraph

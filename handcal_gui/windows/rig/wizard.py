@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.types import RIG_PARTS, RigPart
+from handcal.rig_types import RIG_PARTS, RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner

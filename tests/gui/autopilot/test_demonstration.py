@@ -16,7 +16,7 @@ from handcal_gui.autopilot import autopilot, demonstration, tour
 from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
-from tests.helpers import Patience, write_small_rig
+from tests.helpers import Patience, slow_simulator, write_small_rig
 
 PATIENCE_S = 60.0
 # A busy computer gives few frames a second, and the wearer's answer lies between two.
@@ -33,6 +33,7 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     monkeypatch.setattr(demonstration, "QApplication", application)
     monkeypatch.setattr(autopilot, "_LOOK_S", 0.05)
     monkeypatch.setattr(tour, "_LOOK_MS", 60)
+    slow_simulator(monkeypatch)
     preferences = tmp_path / "preferences.json"
     preferences.write_text(json.dumps({"export": {"formats": ["report", "csv"]}}))
     program = Program(PreferencesFile(preferences), remembers=False)

@@ -21,7 +21,8 @@ from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer
-from handcal.types import HeadsetIdentity, Rig
+from handcal.rig_types import Rig
+from handcal.types import HeadsetIdentity
 from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.widgets.qr_code import QrCode
 from tests.gui.helpers import child, text

@@ -8,7 +8,8 @@ import pytest
 
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.types import EYES, Alignment, EyeDistance, EyeShift, Rig
+from handcal.rig_types import Rig
+from handcal.types import EYES, Alignment, EyeDistance, EyeShift
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,

@@ -17,11 +17,12 @@ from handcal.rig.cube import Cube
 from handcal.rig.cube_file import write_cube
 from handcal.rig.example import example_rig
 from handcal.rig.formats import write_intrinsics
+from handcal.rig_types import Rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.cube_captures import CaptureSettings
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA
-from handcal.types import EYES, Rig
+from handcal.types import EYES
 
 
 @pytest.fixture

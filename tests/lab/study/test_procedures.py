@@ -23,7 +23,7 @@ from handcal.lab.study.wearers import draw_wearer
 from handcal.register.placement import PlacementSettings
 from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.people import begin_sitting
-from handcal.sim.wearer import WearerSettings
+from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, Eye
 
 MODEL = ProcedureModel(points=500)

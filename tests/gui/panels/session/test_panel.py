@@ -19,11 +19,12 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
+from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import EyeDistance, Rig
+from handcal.types import EyeDistance
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.record_table import RecordTable
 from tests.gui.helpers import button, child, show, text

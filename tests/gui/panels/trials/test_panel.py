@@ -11,11 +11,12 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QPushButton, QToolButton, QW
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
+from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.types import Eye, Rig
+from handcal.types import Eye
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.widgets.number_table import NumberTable

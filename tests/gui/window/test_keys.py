@@ -1,9 +1,8 @@
+"""Keys and the focus in the main window."""
+
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from pathlib import Path
-from typing import Literal
+from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
@@ -19,182 +18,22 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
-    QScrollArea,
     QTabWidget,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
 
 from handcal.link.nudges import NudgeSum
-from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.verifying import VerifyingView
 from handcal_gui.keys import keys_by_group, keys_html
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
-from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
-from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.window import MainWindow
-from tests.gui.views import all_views
-
-TABBED = ("wearer_view", "results", "trials", "session", "link")
-
-
-@pytest.fixture
-def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
-    program = Program(PreferencesFile(tmp_path / "preferences.json"))
-    qtbot.addWidget(program.window)
-    program.window.resize(1280, 800)
-    program.window.show()
-    yield program
-    program.window.close()
-
-
-@pytest.fixture
-def window(program: Program) -> MainWindow:
-    return program.window
-
-
-def main_button(window: MainWindow) -> QPushButton:
-    found = window.findChild(QPushButton, "wizardMain")
-    assert isinstance(found, QPushButton)
-    return found
-
-
-def offer_solve(window: MainWindow) -> None:
-    bar = window.findChild(ActionBar)
-    assert isinstance(bar, ActionBar)
-    bar.show_view(WizardView(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
-
-
-def shown(window: MainWindow) -> set[str]:
-    return {name for name, dock in window.docks.items() if not dock.isHidden()}
-
-
-def test_every_page_has_its_docks(window: MainWindow) -> None:
-    assert shown(window) == set()
-    window.show_page("live")
-    assert shown(window) == set(window.docks)
-    window.show_page("review")
-    assert shown(window) == {"cloud", "results", "trials", "session"}
-    assert not window.docks["camera"].toggleViewAction().isEnabled()
-    window.show_page("start")
-    assert shown(window) == set()
-
-
-def test_a_dock_closed_stays_closed_on_its_page_until_the_layout_is_reset(
-    window: MainWindow,
-) -> None:
-    window.show_page("live")
-    window.docks["link"].close()
-    window.show_page("review")
-    window.show_page("live")
-    assert "link" not in shown(window)
-    window.reset_layout()
-    assert shown(window) == set(window.docks)
-
-
-def test_layouts_are_remembered_for_each_page(
-    program: Program, qtbot: QtBot, tmp_path: Path
-) -> None:
-    program.window.show_page("live")
-    program.window.docks["camera"].close()
-    program.window.show_page("review")
-    program.window.docks["cloud"].close()
-    program.window.close()
-    again = Program(PreferencesFile(tmp_path / "preferences.json"))
-    qtbot.addWidget(again.window)
-    again.window.show_page("live")
-    assert shown(again.window) == set(again.window.docks) - {"camera"}
-    again.window.show_page("review")
-    assert shown(again.window) == {"results", "trials", "session"}
-    again.window.close()
-
-
-def test_one_key_leaves_the_guide_alone_and_this_is_remembered(
-    qtbot: QtBot, program: Program, tmp_path: Path
-) -> None:
-    window = program.window
-    window.show_page("live")
-    window.docks["link"].close()
-    window.activateWindow()
-    qtbot.waitActive(window)
-    press(window, Qt.Key.Key_F11)
-    assert shown(window) == set()
-    window.bring_up("results")
-    window.go_to("results")
-    window.show_page("review")
-    assert shown(window) == {"cloud", "results", "trials", "session"}
-    window.show_page("live")
-    assert shown(window) == set()
-    again = Program(PreferencesFile(tmp_path / "preferences.json"))
-    qtbot.addWidget(again.window)
-    again.window.show_page("live")
-    assert shown(again.window) == set()
-    again.window.close()
-    press(window, Qt.Key.Key_F11)
-    assert shown(window) == set(window.docks) - {"link"}
-
-
-def test_the_guide_is_the_largest_thing_in_the_window(window: MainWindow) -> None:
-    for size_px in ((960, 510), (1280, 690), (1366, 738), (1920, 1050), (3840, 2160)):
-        window.show_page("start")
-        window.resize(*size_px)
-        window.show_page("live")
-        window.reset_layout()
-        QApplication.processEvents()
-        assert window.size().toTuple() == size_px
-        guide = window.centralWidget()
-        assert guide is not None
-        for name in shown(window):
-            dock = window.docks[name]
-            if is_in_front(window, name):
-                assert dock.width() * dock.height() < guide.width() * guide.height()
-
-
-@pytest.mark.parametrize("arrangement", ["panels", "station"])
-@pytest.mark.parametrize("size_px", [(960, 510), (1280, 690), (1366, 738)])
-def test_no_step_needs_scrolling(
-    program: Program,
-    snapshot: Maker,
-    size_px: tuple[int, int],
-    arrangement: Literal["panels", "station"],
-) -> None:
-    window, guide = program.window, program.wizard_panel
-    window.show_page("start")
-    window.resize(*size_px)
-    window.use_arrangement(arrangement)
-    window.show_page("live")
-    window.reset_layout()
-    viewport = guide.parent()
-    assert viewport is not None
-    area = viewport.parent()
-    assert isinstance(area, QScrollArea)
-    states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED)
-    for state in states:
-        seen = snapshot(state)
-        guide.show_snapshot(seen)
-        guide.picture.show_snapshot(seen)
-        for _ in range(3):
-            QApplication.processEvents()
-        assert window.size().toTuple() == size_px
-        bars = area.horizontalScrollBar(), area.verticalScrollBar()
-        assert [bar.maximum() for bar in bars] == [0, 0], state
-    card = guide.findChild(ResultCard)
-    assert isinstance(card, ResultCard)
-    assert card.visibleRegion().boundingRect() == card.rect()
-    assert main_button(window).visibleRegion().boundingRect() == main_button(window).rect()
-
-
-@pytest.mark.parametrize("text", ["", "garbage", "AAAA"])
-def test_a_layout_that_does_not_fit_is_left_out(window: MainWindow, text: str) -> None:
-    window.restore_layouts({"live": text})
-    window.show_page("live")
-    assert shown(window) == set(window.docks)
+from tests.gui.window.conftest import Maker, main_button, offer_solve, press, say
 
 
 def test_space_asks_for_what_comes_next_and_escape_closes_the_message(
@@ -254,25 +93,6 @@ def test_no_key_is_taken_twice(window: MainWindow) -> None:
         assert len(keys) == len(set(keys))
 
 
-def has_title(window: MainWindow, name: str) -> bool:
-    return window.docks[name].titleBarWidget() is None
-
-
-def is_in_front(window: MainWindow, name: str) -> bool:
-    return not window.docks[name].visibleRegion().isEmpty()
-
-
-def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: MainWindow) -> None:
-    window.show_page("live")
-    assert [name for name in window.docks if not has_title(window, name)] == list(TABBED)
-    window.docks["link"].setFloating(True)
-    qtbot.waitUntil(lambda: has_title(window, "link"))
-    assert not has_title(window, "trials")
-    for name in ("wearer_view", "trials", "session"):
-        window.docks[name].hide()
-    qtbot.waitUntil(lambda: has_title(window, "results"))
-
-
 def test_the_space_bar_is_the_wizards_in_a_dock_of_its_own_too(
     qtbot: QtBot, window: MainWindow
 ) -> None:
@@ -285,121 +105,6 @@ def test_the_space_bar_is_the_wizards_in_a_dock_of_its_own_too(
     window.banner.show_message("Could not solve")
     QTest.keyClick(dock.widget(), Qt.Key.Key_Escape)
     assert window.banner.text == ""
-
-
-def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:
-    window.show_page("live")
-    wizard = window.centralWidget()
-    assert wizard is not None
-    assert wizard.height() > wizard.sizeHint().height()
-    assert window.docks["camera"].width() >= 350
-
-
-def test_a_step_brings_up_its_panel_but_not_over_work(qtbot: QtBot, window: MainWindow) -> None:
-    window.show_page("live")
-    window.bring_up("session")
-    qtbot.waitUntil(lambda: is_in_front(window, "session"))
-    window.go_to("trials")
-    qtbot.waitUntil(lambda: is_in_front(window, "trials"))
-    window.bring_up("results")
-    assert is_in_front(window, "trials")
-
-
-def test_panels_are_reached_by_keys(qtbot: QtBot, window: MainWindow) -> None:
-    window.show_page("live")
-    window.activateWindow()
-    qtbot.waitActive(window)
-    QTest.keyClick(window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
-    qtbot.waitUntil(lambda: is_in_front(window, "trials"))
-    assert window.panels.trials.hasFocus()
-    window.show_page("start")
-    QTest.keyClick(window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
-    assert not is_in_front(window, "trials")
-
-
-LONG = "The hand is cut by the image border, and the headset does not answer. " * 6
-_NONE = Qt.KeyboardModifier.NoModifier
-SIZES_PX = ((1280, 720), (1366, 768), (1920, 1080))
-Maker = Callable[..., Snapshot]
-
-
-class Saying(Wizard):
-    """A wizard that says what it is given."""
-
-    said: WizardView
-
-    def view(self, _snapshot: Snapshot) -> WizardView:
-        return self.said
-
-
-def say(program: Program, snapshot: Snapshot, view: WizardView) -> None:
-    program.wizard_panel.wizard = wizard = Saying()
-    wizard.said = view
-    program.wizard_panel.show_snapshot(snapshot)
-
-
-def corner_px(window: MainWindow) -> tuple[int, int]:
-    """Return how far the main button's lower right corner is from the window's."""
-    for _ in range(3):  # a layout may ask for another
-        QApplication.processEvents()
-    main = main_button(window)
-    assert main.isVisible()
-    corner = main.mapTo(window, main.rect().bottomRight())
-    return window.width() - corner.x(), window.height() - corner.y()
-
-
-@pytest.mark.parametrize("size_px", SIZES_PX)
-def test_nothing_moves_the_main_button(
-    program: Program, snapshot: Maker, record: SessionRecord, size_px: tuple[int, int]
-) -> None:
-    window, now = program.window, snapshot()
-    window.show_page("live")
-    window.resize(*size_px)
-    places = {corner_px(window)}
-
-    def look() -> None:
-        places.add(corner_px(window))
-        assert window.size().toTuple() == size_px
-        assert window.statusBar().width() == window.width()
-
-    for panel in window.panels.all():
-        panel.show_snapshot(now)
-    look()
-    for view in all_views(snapshot, record):
-        checks = tuple(replace(check, text=LONG) for check in view.checks)
-        for shown in (view, replace(view, sentence=LONG, note=LONG, checks=checks)):
-            say(program, now, shown)
-            look()
-    window.banner.show_message(LONG)
-    look()
-    window.banner.clear()
-    for condition in (LONG, ""):
-        window.banner.show_condition(condition)
-        look()
-    for name, dock in window.docks.items():
-        for is_floating in (True, False):
-            dock.setFloating(is_floating)
-            look()
-        dock.close()
-        look()
-        if name != "link":
-            dock.show()
-    bottom = Qt.DockWidgetArea.BottomDockWidgetArea
-    window.addDockWidget(bottom, window.docks["results"])
-    look()
-    for dock in window.docks.values():
-        dock.close()
-        look()
-    window.reset_layout()
-    look()
-    for show in (window.showMaximized, window.showNormal):
-        show()
-        places.add(corner_px(window))
-    window.show_page("review")
-    window.show_page("live")
-    window.resize(*size_px)
-    look()
-    assert len(places) == 1
 
 
 def focusable(window: MainWindow) -> Iterator[QWidget]:
@@ -445,11 +150,6 @@ def show_buttons(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> l
     for table in window.findChildren(RecordTable):
         table.selectRow(0)
     return asked
-
-
-def press(window: MainWindow, key: Qt.Key, modifiers: Qt.KeyboardModifier = _NONE) -> None:
-    """Press a key as the window system does."""
-    QTest.keyClick(window.windowHandle(), key, modifiers)
 
 
 def watch_clicks(window: MainWindow) -> list[QAbstractButton]:

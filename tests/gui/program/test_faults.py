@@ -1,0 +1,150 @@
+"""The program when hand, headset, camera, disk or engine fail."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
+
+from handcal.session.session import Session
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal.station.station import Station
+from handcal_gui import launch
+from handcal_gui.pages.wizard.view import Action, Step
+from tests.gui.program.technician import (
+    Technician,
+    align,
+    can_start,
+    is_turned,
+    make_cursor,
+    shown_checks,
+)
+
+
+def test_a_hand_lost_is_said_and_nothing_can_be_made_of_it(live: Technician, studio: Any) -> None:
+    studio.camera.shows = "cursor"
+    live.press_space_for(Action.NEXT)
+    live.press_space_for(Action.NEXT)
+    live.wait(lambda: live.can(Action.MAKE_CURSOR))
+    studio.camera.shows = "nothing"
+    live.wait(lambda: not live.can(Action.MAKE_CURSOR))
+    shown = live.program.wizard_panel.shown
+    assert shown is not None
+    assert shown.step is Step.MAKE_CURSOR
+    assert "hand" in shown.checks[0].text
+    assert not shown.checks[0].holds
+    assert not live.child(QPushButton, "wizardMain").isEnabled()
+    QTest.keyClick(live.program.window, Qt.Key.Key_Space)
+    live.qtbot.wait(200)
+    assert live.snapshot.procedure.state is State.SHOW_HAND
+
+
+def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> None:
+    make_cursor(live, studio)
+    studio.camera.shows = "turned"
+    live.wait(
+        lambda: live.snapshot.observation is not None and live.snapshot.observation.is_over_limit
+    )
+    studio.headset.confirm()
+    live.wait(lambda: live.snapshot.procedure.refused == 1)
+    assert "more than 9°" in live.child(QLabel, "wizardNote").text()
+    assert live.record.alignments == {}
+    studio.camera.shows = "live"
+    live.wait(
+        lambda: (
+            live.snapshot.observation is not None and not live.snapshot.observation.is_over_limit
+        )
+    )
+    live.qtbot.wait(300)
+    studio.headset.confirm()
+    live.wait_for_state(State.ALIGNED)
+    live.wait(lambda: len(live.record.alignments) == 1)
+    assert live.child(QLabel, "wizardNote").text() == ""
+
+
+def test_a_silent_headset_is_reported_and_sending_repeated(live: Technician, studio: Any) -> None:
+    align(live, studio)
+    live.press_space_for(Action.SOLVE)
+    live.wait(lambda: live.can(Action.APPLY))
+    studio.headset.fall_silent()
+    live.press_space_for(Action.APPLY)
+    live.wait_for_state(State.APPLYING)
+    live.wait_for_state(State.SOLVED)
+    live.wait(lambda: "no headset is connected" in live.snapshot.link_problem)
+    assert "acknowledge" in live.banner
+    assert "acknowledge" in live.child(QLabel, "wizardNote").text()
+    live.program.window.docks["link"].raise_()
+    state = live.child(QLabel, "link-state")
+    live.wait(lambda: state.text().startswith("Not connected"))
+    studio.headset.come_back()
+    live.wait(lambda: state.text() == "Connected")
+    live.wait(lambda: not live.snapshot.link_problem)
+    live.press_space_for(Action.APPLY)
+    live.wait_for_state(State.APPLIED)
+    live.wait(lambda: live.banner == "")
+
+
+def test_a_camera_unplugged_comes_back_to_the_same_session(live: Technician, studio: Any) -> None:
+    make_cursor(live, studio)
+    studio.camera.is_plugged = False
+    live.wait(lambda: "unplugged" in live.banner or "plug one in" in live.banner)
+    studio.camera.is_plugged = True
+    live.wait(lambda: live.banner == "")
+    assert live.snapshot.procedure.state is State.ALIGN
+    studio.camera.shows = "live"
+    live.wait(lambda: live.snapshot.observation is not None)
+    live.qtbot.wait(300)
+    studio.headset.confirm()
+    live.wait_for_state(State.ALIGNED)
+
+
+def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio: Any) -> None:
+    make_cursor(live, studio)
+    path = live.snapshot.session_path
+    away = path.with_name("away")
+    path.rename(away)  # as good as a full disk
+    studio.camera.shows = "live"
+    live.wait(lambda: is_turned(live))
+    studio.headset.confirm()
+    live.wait_for_state(State.ALIGNED)
+    live.wait(lambda: "cannot write" in live.banner)
+    live.press_space_for(Action.SOLVE)
+    live.wait_for_state(State.SOLVED)
+    assert live.snapshot.record.alignments == {}
+    live.wait(lambda: "1 alignment confirmed" in shown_checks(live))
+    away.rename(path)
+    live.wait(lambda: live.banner == "")
+    live.wait(lambda: live.snapshot.record.is_solved)
+    assert len(live.record.alignments) == 1
+
+
+def test_notes_outlive_an_engine_that_breaks_down(
+    live: Technician, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = live.snapshot.session_path
+    live.program.window.docks["session"].raise_()
+    live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
+    live.child(QPlainTextEdit, "").setPlainText("wears glasses")
+
+    def break_down(_station: Station) -> Snapshot:
+        raise ZeroDivisionError("oh")
+
+    monkeypatch.setattr(Station, "step", break_down)
+    live.wait_for_page("start")
+    assert "unexpected error" in live.banner
+    assert Session.open(path).notes == "wears glasses"
+
+
+def test_an_unexpected_error_is_logged_and_shown(
+    technician: Technician, caplog: pytest.LogCaptureFixture
+) -> None:
+    error = ZeroDivisionError("oh")
+    launch._report_error(technician.program, type(error), error, error.__traceback__)
+    assert "ZeroDivisionError: oh" in technician.banner
+    assert "unexpected error" in caplog.text
+    technician.program.show_start()
+    technician.wait(lambda: can_start(technician))

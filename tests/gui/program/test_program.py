@@ -1,0 +1,288 @@
+"""The whole program opened, closed and resumed; its dialogs, and what is changed by hand."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDoubleSpinBox,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QWidget,
+)
+
+from handcal.errors import LinkError
+from handcal.session.session import Session, SessionRecord
+from handcal.station.procedure import State
+from handcal.station.station import Station
+from handcal_gui.control.conditions import Conditions
+from handcal_gui.pages.wizard.view import Action
+from handcal_gui.preferences import PreferencesFile
+from tests.gui.helpers import child, text
+from tests.gui.program.technician import (
+    PATIENCE_MS,
+    Technician,
+    align,
+    can_start,
+    make_cursor,
+    solve_and_apply,
+)
+
+
+def test_damaged_pairing_keys_are_said_and_left_alone(
+    open_program: Callable[[], Technician], file: PreferencesFile
+) -> None:
+    path = file.path.with_name("pairing.key")
+    path.write_bytes(b'{"devices": [')
+    assert "pairing.key are damaged" in open_program().banner
+    assert path.read_bytes() == b'{"devices": ['
+
+
+def test_the_dialogs_of_the_menus_end_with_the_program(
+    open_program: Callable[[], Technician], file: PreferencesFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal_gui.dialogs.connect.Announcement", _no_network)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    station = {"sessions": str(file.path.parent), "host": "127.0.0.1", "port": port}
+    file.path.write_text(json.dumps({"station": station}))
+    technician = open_program()
+    program = technician.program
+    first = program.connect_headset()
+    assert first is not None
+    first.accept()
+    assert program.connect_headset() is not None  # the port is free again
+    assert program.show_library().isVisible()
+    assert program.make_support_bundle().isVisible()
+
+
+def test_connect_shows_the_headset_of_a_calibration_and_leaves_it_alone(live: Technician) -> None:
+    dialog = live.program.connect_headset()
+    assert dialog is not None
+    live.wait(lambda: text(dialog, "headsetFound").startswith("Headset of the tests"))
+    assert text(dialog, "digits") == ""
+    child(dialog, QPushButton, "square-left").click()
+    live.wait(lambda: child(dialog, QCheckBox, "squareSeen-left").isEnabled())
+    dialog.accept()
+    number = live.snapshot.number
+    live.wait(lambda: live.snapshot.number > number + 2)
+    assert live.snapshot.link.connected
+
+
+def _no_network(_address: object) -> None:
+    raise LinkError("no multicast")
+
+
+def test_alignments_are_deleted_and_restored(live: Technician, studio: Any) -> None:
+    align(live, studio)
+    solve_and_apply(live)
+    session = live.program.window.panels.session
+    session.delete_requested.emit("alignment", 1)
+    live.wait(lambda: live.snapshot.record.alignments == {})
+    assert live.snapshot.procedure.results is None
+    session.restore_requested.emit("alignment", 1)
+    live.wait(lambda: len(live.snapshot.record.alignments) == 1)
+    live.press_space_for(Action.SOLVE)
+    live.wait_for_state(State.SOLVED)
+    session.delete_requested.emit("alignment", 7)
+    live.wait(lambda: live.banner.startswith("Could not delete the alignment: "))
+    QTest.keyClick(live.program.window, Qt.Key.Key_Escape)
+    assert live.banner == ""
+
+
+def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
+    live: Technician, studio: Any
+) -> None:
+    align(live, studio)
+    solve_and_apply(live)
+    window = live.program.window
+    solved_m = live.snapshot.procedure.applied_shift_m["left"]
+    before = studio.headset.shown.projections["left"].P
+    window.docks["fine_tune"].raise_()
+    panel = window.panels.fine_tune
+    panel.setFocus()
+    live.wait(lambda: panel.isVisible() and "In the headset" in live.child(QLabel, "status").text())
+    # The picture moves to the left, the eye to the right.
+    for _ in range(3):
+        QTest.keyClick(panel, Qt.Key.Key_Left)
+    step_m = 3.0 * panel.step_m
+    live.wait(
+        lambda: np.allclose(
+            live.snapshot.procedure.applied_shift_m["left"] - solved_m, [step_m, 0, 0]
+        )
+    )
+    live.wait(lambda: not np.array_equal(studio.headset.shown.projections["left"].P, before))
+    live.wait(lambda: live.snapshot.record.fine_tuned is not None)
+    tuned = live.snapshot.record.fine_tuned
+    assert tuned is not None
+    np.testing.assert_allclose(tuned["left"], solved_m + np.array([step_m, 0.0, 0.0]))
+    assert sum(event.name == "fine_tuned" for event in live.record.events) == 1
+
+    [shows_target] = window.panels.trials.findChildren(QCheckBox)
+    shows_target.click()
+    live.wait(lambda: studio.headset.shown.target is not None)
+    target = studio.headset.shown.target
+    assert target.eye == "left"
+
+    QTest.keyClick(window, Qt.Key.Key_T)
+    live.wait(lambda: len(live.snapshot.record.trials) == 1)
+    (trial,) = live.snapshot.record.trials.values()
+    t_C0_V_m = live.snapshot.record.rig.eyes["left"].t_C0_V_m
+    np.testing.assert_allclose(target.corners_V_m + t_C0_V_m, trial.corners_E_m)
+    # It would be the right eye's turn, which has not been aligned.
+    live.wait(lambda: studio.headset.shown.target is None)
+    np.testing.assert_allclose(trial.adjusted_shift_m - trial.calibrated_shift_m, [step_m, 0, 0])
+    assert trial.eye == "left"
+    assert trial.error_px.min() > 0.0
+
+
+def test_fine_tuning_that_comes_into_sight_begins_with_what_the_headset_has(
+    live: Technician, studio: Any
+) -> None:
+    align(live, studio)
+    solve_and_apply(live)
+    applied_mm = 1e3 * live.snapshot.procedure.applied_shift_m["left"]
+    live.program.window.go_to("fine_tune")
+    editor = live.child(QWidget, "leftEditor")  # at once: no snapshot has come since
+    shown_mm = [field.value() for field in editor.findChildren(QDoubleSpinBox)]
+    np.testing.assert_allclose(shown_mm, applied_mm, atol=0.006)
+    assert np.abs(applied_mm).max() > 0.1
+
+
+def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio: Any) -> None:
+    path = live.snapshot.session_path
+    window = live.program.window
+    window.docks["session"].raise_()
+    live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
+    live.child(QPlainTextEdit, "").setPlainText("wears glasses")
+    window.docks["fine_tune"].raise_()
+    panel = window.panels.fine_tune
+    live.wait(lambda: panel.isVisible() and panel.isEnabled())
+    live.wait(lambda: "In the headset" in live.child(QLabel, "status").text())
+    panel.setFocus()
+    QTest.keyClick(panel, Qt.Key.Key_Left)
+    window.close()
+    record = Session.open(path)
+    assert record.notes == "wears glasses"
+    assert record.fine_tuned is not None
+    np.testing.assert_allclose(record.fine_tuned["left"], [panel.step_m, 0.0, 0.0])
+
+
+def test_on_a_slow_computer_every_panel_comes_to_its_turn(
+    live: Technician, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller, panels = live.program.live, live.program.window.panels
+    monkeypatch.setattr(Conditions, "_watch_rate", lambda *_: None)
+    controller._conditions.is_slow = True  # after three seconds with few frames
+    live.program.window.resize(1600, 1000)
+    live.program.window.reset_layout()
+    shown: Counter[str] = Counter()
+    for name in ("cloud", "rotation", "camera"):
+        monkeypatch.setattr(
+            getattr(panels, name), "show_snapshot", lambda _, name=name: shown.update([name])
+        )
+    live.wait(lambda: min(shown[name] for name in ("cloud", "rotation", "camera")) >= 2)
+    assert shown["rotation"] >= shown["camera"], "guidance comes first"
+
+
+def test_a_session_in_use_elsewhere_cannot_be_resumed(
+    technician: Technician, studio: Any, record: SessionRecord
+) -> None:
+    with Session(record.path):
+        technician.program.resume_session(record.path)
+        technician.wait(lambda: "in use by process" in technician.banner)
+        assert technician.program.window.page == "start"
+        technician.wait(lambda: can_start(technician))
+
+
+def test_opening_a_station_can_be_cancelled(
+    technician: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_open = threading.Event()
+
+    def open_slowly(*arguments: Any, **options: Any) -> Station:
+        assert may_open.wait(PATIENCE_MS / 1000)
+        return Station(*arguments, **options)
+
+    monkeypatch.setattr("handcal_gui.program.Station", open_slowly)
+    start = technician.program.start
+    technician.wait(lambda: can_start(technician))
+    technician.program.start_calibration(studio.settings, "Ada")
+    assert not can_start(technician)
+    QTest.keyClick(start.new, Qt.Key.Key_Return)  # the second of two in a hurry
+    QTest.keyClick(start.new, Qt.Key.Key_Escape)
+    assert not technician.child(QPushButton, "cancelOpening").isEnabled()
+    may_open.set()
+    technician.wait(lambda: can_start(technician))
+    assert technician.program.window.page == "start"
+    assert not technician.child(QPushButton, "cancelOpening").isVisible()
+    technician.program.start_calibration(studio.settings, "Ada")
+    technician.wait_for_page("live")
+
+
+def test_an_interrupted_session_is_offered_and_resumed(
+    open_program: Callable[[], Technician], studio: Any
+) -> None:
+    first = open_program()
+    first.program.start_calibration(studio.settings, "Ada")
+    first.wait_for_page("live")
+    first.wait(lambda: first.snapshot.link.connected)
+    align(first, studio)
+    path = first.snapshot.session_path
+    first.program.window.close()
+
+    second = open_program()
+    second.wait(second.child(QWidget, "resume").isVisible)
+    second.program.start.resume_requested.emit(path)
+    second.wait_for_page("live")
+    assert second.snapshot.session_path == path
+    assert second.snapshot.procedure.state is State.ALIGNED
+    second.wait(lambda: second.snapshot.link.connected)
+    solve_and_apply(second)
+    assert second.record.is_applied
+
+
+@pytest.mark.parametrize(
+    "moment",
+    ["start page", "opening", "connect", "align", "applying", "review", "opening a session"],
+)
+def test_the_window_can_be_closed_at_any_moment(
+    technician: Technician, studio: Any, record: SessionRecord, moment: str
+) -> None:
+    program = technician.program
+    if moment in ("opening", "connect", "align", "applying"):
+        program.start_calibration(studio.settings, "Ada")
+    if moment in ("connect", "align", "applying"):
+        technician.wait_for_page("live")
+        technician.wait(lambda: technician.snapshot.link.connected)
+    if moment == "align":
+        make_cursor(technician, studio)
+    if moment == "applying":
+        align(technician, studio)
+        technician.press_space_for(Action.SOLVE)
+        technician.wait(lambda: technician.can(Action.APPLY))
+        studio.headset.fall_silent()
+        technician.press_space_for(Action.APPLY)
+        technician.wait_for_state(State.APPLYING)
+    if moment in ("review", "opening a session"):
+        program.open_session(record.path)
+    if moment == "review":
+        technician.wait_for_page("review")
+    program.window.close()
+    assert [t.name for t in threading.enumerate() if t.name.startswith("handcal")] == []
+    assert not program.window.isVisible()
+    for path in Path(studio.settings.sessions).glob("session-*"):
+        Session(path).close()  # free, and not damaged

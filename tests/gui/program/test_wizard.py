@@ -1,0 +1,154 @@
+"""The program led by the wizard, by keys and by itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton, QWidget
+
+from handcal.station.procedure import State
+from handcal_gui.pages.wizard import steps
+from handcal_gui.pages.wizard.view import Action, Step
+from handcal_gui.preferences import PreferencesFile
+from tests.gui.program.technician import Technician, align, is_turned, shown_checks, solve_and_apply
+
+
+def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
+    live: Technician, studio: Any, file: PreferencesFile
+) -> None:
+    align(live, studio)
+    assert studio.headset.shown.eyes == ("left",)
+    solve_and_apply(live)
+    live.wait(lambda: live.can(Action.ANOTHER))
+    align(live, studio, Action.ANOTHER)
+    assert studio.headset.shown.eyes == ("right",)
+    solve_and_apply(live)
+    for _ in ("left", "right"):
+        live.wait(lambda: live.can(Action.VERIFY))
+        live.child(QPushButton, "wizardOther0").click()  # skip
+    live.wait(lambda: live.can(Action.ANOTHER))  # not accepted, so it does not fit
+    live.child(QPushButton, "wizardOther0").click()
+    live.press_space_for(Action.FINISH)
+    live.wait(lambda: live.can(Action.NEXT_WEARER))
+    record = live.record
+    assert record.is_finished
+    assert record.wearer == "Ada"
+    assert [alignment.eyes for alignment in record.alignments.values()] == [("left",), ("right",)]
+    for eye in ("left", "right"):
+        P = studio.headset.shown.projections[eye].P
+        assert not np.allclose(P, live.snapshot.record.rig.eyes[eye].K @ np.eye(3, 4))
+    assert live.banner == ""
+    live.press_space_for(Action.NEXT_WEARER)
+    assert live.program.window.page == "start"
+    stored, complaint = file.load()
+    assert complaint == ""
+    assert "Ada" not in file.path.read_text()  # only in the session
+    assert stored.sessions == (str(record.path),)
+    assert stored.station == studio.settings
+
+
+def test_steps_run_by_themselves_after_one_press(
+    live: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for wait in ("_SHOWN_S", "_STILL_S", "_READ_S"):
+        monkeypatch.setattr(steps, wait, 0.3)
+    QTest.keyClick(live.program.window, Qt.Key.Key_H)  # the station is held at first
+    live.press_space_for(Action.NEXT)
+    for eye in ("left", "right"):
+        studio.camera.shows = "cursor"
+        live.wait_for_state(State.ALIGN)
+        assert live.snapshot.procedure.eyes == (eye,)
+        live.wait(lambda: studio.headset.shown.cursor_W_m is not None)
+        studio.camera.shows = "live"
+        live.wait(lambda: is_turned(live))
+        studio.headset.confirm()
+        live.wait_for_state(State.APPLIED)
+    assert [one.eyes for one in live.record.alignments.values()] == [("left",), ("right",)]
+    assert live.banner == ""
+
+
+def test_an_eye_is_verified_by_keys_and_the_error_found_is_shown(
+    technician: Technician, studio: Any
+) -> None:
+    technician.program.start_calibration(studio.settings, "Ada")
+    technician.wait_for_page("live")
+    technician.wait(lambda: technician.snapshot.link.connected)
+    plan = technician.child(QComboBox, "wizardPlan")
+    plan.setCurrentText("Left eye only")
+    align(technician, studio)
+    solve_and_apply(technician)
+    technician.press_space_for(Action.VERIFY)
+    technician.wait_for_state(State.VERIFY)
+    technician.wait(lambda: technician.can(Action.VERIFIED))
+    before_m = technician.snapshot.procedure.applied_shift_m["left"]
+    for _ in range(3):
+        QTest.keyClick(technician.program.window, Qt.Key.Key_Right)
+    technician.wait(lambda: "3.0′ right" in technician.child(QLabel, "wizardFact").text())
+    technician.child(QPushButton, "wizardOther0").click()  # undo
+    technician.wait(lambda: "2.0′ right" in technician.child(QLabel, "wizardFact").text())
+    assert technician.snapshot.procedure.applied_shift_m["left"][0] != before_m[0]
+    technician.press_space_for(Action.VERIFIED)
+    technician.wait(lambda: "left" in technician.snapshot.procedure.verifications)
+    technician.wait_for_state(State.APPLIED)
+    results = technician.snapshot.procedure.results
+    assert results is not None
+    found, _ = results.measured_arcmin["left"]
+    live_text = technician.program.wizard_panel.picture.result
+    technician.wait(lambda: f"Check found: {found:.1f}′" in live_text.text())
+    assert technician.record.facts.verified["left"].nudge_arcmin == (2.0, 0.0)
+
+
+def test_back_and_a_key_hold_the_steps_that_run_by_themselves(
+    live: Technician, studio: Any, file: PreferencesFile
+) -> None:
+    ring = live.child(QWidget, "wizardRing")
+    QTest.keyClick(live.program.window, Qt.Key.Key_H)
+    assert file.load()[0].runs_itself
+    live.press_space_for(Action.NEXT)  # no hand is shown yet
+    live.wait(lambda: ring.share == 0.0)
+    live.child(QPushButton, "wizardOther0").click()
+    live.wait(lambda: live.can(Action.NEXT))
+    studio.camera.shows = "cursor"
+    live.press_space_for(Action.NEXT)
+    live.wait(lambda: "Hand found" in shown_checks(live))
+    live.qtbot.wait(1000)
+    assert live.program.wizard_panel.shown is not None
+    assert live.program.wizard_panel.shown.step is Step.SHOW_HAND
+    assert ring.share is None
+    assert file.load()[0].runs_itself  # going back is for this wearer only
+    QTest.keyClick(live.program.window, Qt.Key.Key_H)
+    live.wait_for_state(State.ALIGN)
+
+
+def test_space_never_discards_wherever_tab_leads(live: Technician, studio: Any) -> None:
+    window = live.program.window
+    handle = window.windowHandle()
+    align(live, studio)
+    live.wait(lambda: live.can(Action.SOLVE))
+    live.wait(live.child(QPushButton, "wizardOther0").isEnabled)
+    live.child(QPushButton, "wizardMain").setEnabled(False)  # as when there is no hand
+    for _ in range(40):
+        QTest.keyClick(handle, Qt.Key.Key_Tab)
+        if live.program.window.focusWidget() is not live.child(QPlainTextEdit, ""):
+            QTest.keyClick(handle, Qt.Key.Key_Space)
+    live.qtbot.wait(300)
+    assert live.snapshot.procedure.state is State.ALIGNED
+    assert len(live.record.alignments) == 1
+    live.child(QPushButton, "wizardMain").setEnabled(True)
+    QTest.keyClick(handle, Qt.Key.Key_Space)
+    live.wait_for_state(State.SOLVED)
+
+
+def test_an_alignment_is_discarded_by_its_own_key_only(live: Technician, studio: Any) -> None:
+    align(live, studio)
+    live.wait(lambda: live.can(Action.SOLVE))
+    live.wait(live.child(QPushButton, "wizardOther0").isEnabled)
+    QTest.keyClick(
+        live.program.window.windowHandle(), Qt.Key.Key_D, Qt.KeyboardModifier.AltModifier
+    )
+    live.wait_for_state(State.SHOW_HAND)
+    live.wait(lambda: not live.record.alignments)

@@ -1,0 +1,71 @@
+"""The program's window without a station."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal.station.snapshot import Snapshot
+from handcal_gui.pages.wizard.action_bar import ActionBar
+from handcal_gui.pages.wizard.steps import Wizard
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+from handcal_gui.window import MainWindow
+
+
+@pytest.fixture
+def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
+    program = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(program.window)
+    program.window.resize(1280, 800)
+    program.window.show()
+    yield program
+    program.window.close()
+
+
+@pytest.fixture
+def window(program: Program) -> MainWindow:
+    return program.window
+
+
+def main_button(window: MainWindow) -> QPushButton:
+    found = window.findChild(QPushButton, "wizardMain")
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def offer_solve(window: MainWindow) -> None:
+    bar = window.findChild(ActionBar)
+    assert isinstance(bar, ActionBar)
+    bar.show_view(WizardView(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
+
+
+_NONE = Qt.KeyboardModifier.NoModifier
+Maker = Callable[..., Snapshot]
+
+
+class Saying(Wizard):
+    """A wizard that says what it is given."""
+
+    said: WizardView
+
+    def view(self, _snapshot: Snapshot) -> WizardView:
+        return self.said
+
+
+def say(program: Program, snapshot: Snapshot, view: WizardView) -> None:
+    program.wizard_panel.wizard = wizard = Saying()
+    wizard.said = view
+    program.wizard_panel.show_snapshot(snapshot)
+
+
+def press(window: MainWindow, key: Qt.Key, modifiers: Qt.KeyboardModifier = _NONE) -> None:
+    """Press a key as the window system does."""
+    QTest.keyClick(window.windowHandle(), key, modifiers)

@@ -1,0 +1,267 @@
+"""Pages, docks and layout of the main window."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QScrollArea
+from pytestqt.qtbot import QtBot
+
+from handcal.session.session import SessionRecord
+from handcal.station.procedure import State
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+from handcal_gui.widgets.result_card import ResultCard
+from handcal_gui.window import MainWindow
+from tests.gui.views import all_views
+from tests.gui.window.conftest import Maker, main_button, press, say
+
+TABBED = ("wearer_view", "results", "trials", "session", "link")
+
+
+def shown(window: MainWindow) -> set[str]:
+    return {name for name, dock in window.docks.items() if not dock.isHidden()}
+
+
+def test_every_page_has_its_docks(window: MainWindow) -> None:
+    assert shown(window) == set()
+    window.show_page("live")
+    assert shown(window) == set(window.docks)
+    window.show_page("review")
+    assert shown(window) == {"cloud", "results", "trials", "session"}
+    assert not window.docks["camera"].toggleViewAction().isEnabled()
+    window.show_page("start")
+    assert shown(window) == set()
+
+
+def test_a_dock_closed_stays_closed_on_its_page_until_the_layout_is_reset(
+    window: MainWindow,
+) -> None:
+    window.show_page("live")
+    window.docks["link"].close()
+    window.show_page("review")
+    window.show_page("live")
+    assert "link" not in shown(window)
+    window.reset_layout()
+    assert shown(window) == set(window.docks)
+
+
+def test_layouts_are_remembered_for_each_page(
+    program: Program, qtbot: QtBot, tmp_path: Path
+) -> None:
+    program.window.show_page("live")
+    program.window.docks["camera"].close()
+    program.window.show_page("review")
+    program.window.docks["cloud"].close()
+    program.window.close()
+    again = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(again.window)
+    again.window.show_page("live")
+    assert shown(again.window) == set(again.window.docks) - {"camera"}
+    again.window.show_page("review")
+    assert shown(again.window) == {"results", "trials", "session"}
+    again.window.close()
+
+
+def test_one_key_leaves_the_guide_alone_and_this_is_remembered(
+    qtbot: QtBot, program: Program, tmp_path: Path
+) -> None:
+    window = program.window
+    window.show_page("live")
+    window.docks["link"].close()
+    window.activateWindow()
+    qtbot.waitActive(window)
+    press(window, Qt.Key.Key_F11)
+    assert shown(window) == set()
+    window.bring_up("results")
+    window.go_to("results")
+    window.show_page("review")
+    assert shown(window) == {"cloud", "results", "trials", "session"}
+    window.show_page("live")
+    assert shown(window) == set()
+    again = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(again.window)
+    again.window.show_page("live")
+    assert shown(again.window) == set()
+    again.window.close()
+    press(window, Qt.Key.Key_F11)
+    assert shown(window) == set(window.docks) - {"link"}
+
+
+def test_the_guide_is_the_largest_thing_in_the_window(window: MainWindow) -> None:
+    for size_px in ((960, 510), (1280, 690), (1366, 738), (1920, 1050), (3840, 2160)):
+        window.show_page("start")
+        window.resize(*size_px)
+        window.show_page("live")
+        window.reset_layout()
+        QApplication.processEvents()
+        assert window.size().toTuple() == size_px
+        guide = window.centralWidget()
+        assert guide is not None
+        for name in shown(window):
+            dock = window.docks[name]
+            if is_in_front(window, name):
+                assert dock.width() * dock.height() < guide.width() * guide.height()
+
+
+@pytest.mark.parametrize("arrangement", ["panels", "station"])
+@pytest.mark.parametrize("size_px", [(960, 510), (1280, 690), (1366, 738)])
+def test_no_step_needs_scrolling(
+    program: Program,
+    snapshot: Maker,
+    size_px: tuple[int, int],
+    arrangement: Literal["panels", "station"],
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.show_page("start")
+    window.resize(*size_px)
+    window.use_arrangement(arrangement)
+    window.show_page("live")
+    window.reset_layout()
+    viewport = guide.parent()
+    assert viewport is not None
+    area = viewport.parent()
+    assert isinstance(area, QScrollArea)
+    states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED)
+    for state in states:
+        seen = snapshot(state)
+        guide.show_snapshot(seen)
+        guide.picture.show_snapshot(seen)
+        for _ in range(3):
+            QApplication.processEvents()
+        assert window.size().toTuple() == size_px
+        bars = area.horizontalScrollBar(), area.verticalScrollBar()
+        assert [bar.maximum() for bar in bars] == [0, 0], state
+    card = guide.findChild(ResultCard)
+    assert isinstance(card, ResultCard)
+    assert card.visibleRegion().boundingRect() == card.rect()
+    assert main_button(window).visibleRegion().boundingRect() == main_button(window).rect()
+
+
+@pytest.mark.parametrize("text", ["", "garbage", "AAAA"])
+def test_a_layout_that_does_not_fit_is_left_out(window: MainWindow, text: str) -> None:
+    window.restore_layouts({"live": text})
+    window.show_page("live")
+    assert shown(window) == set(window.docks)
+
+
+def has_title(window: MainWindow, name: str) -> bool:
+    return window.docks[name].titleBarWidget() is None
+
+
+def is_in_front(window: MainWindow, name: str) -> bool:
+    return not window.docks[name].visibleRegion().isEmpty()
+
+
+def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: MainWindow) -> None:
+    window.show_page("live")
+    assert [name for name in window.docks if not has_title(window, name)] == list(TABBED)
+    window.docks["link"].setFloating(True)
+    qtbot.waitUntil(lambda: has_title(window, "link"))
+    assert not has_title(window, "trials")
+    for name in ("wearer_view", "trials", "session"):
+        window.docks[name].hide()
+    qtbot.waitUntil(lambda: has_title(window, "results"))
+
+
+def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:
+    window.show_page("live")
+    wizard = window.centralWidget()
+    assert wizard is not None
+    assert wizard.height() > wizard.sizeHint().height()
+    assert window.docks["camera"].width() >= 350
+
+
+def test_a_step_brings_up_its_panel_but_not_over_work(qtbot: QtBot, window: MainWindow) -> None:
+    window.show_page("live")
+    window.bring_up("session")
+    qtbot.waitUntil(lambda: is_in_front(window, "session"))
+    window.go_to("trials")
+    qtbot.waitUntil(lambda: is_in_front(window, "trials"))
+    window.bring_up("results")
+    assert is_in_front(window, "trials")
+
+
+def test_panels_are_reached_by_keys(qtbot: QtBot, window: MainWindow) -> None:
+    window.show_page("live")
+    window.activateWindow()
+    qtbot.waitActive(window)
+    QTest.keyClick(window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
+    qtbot.waitUntil(lambda: is_in_front(window, "trials"))
+    assert window.panels.trials.hasFocus()
+    window.show_page("start")
+    QTest.keyClick(window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
+    assert not is_in_front(window, "trials")
+
+
+LONG = "The hand is cut by the image border, and the headset does not answer. " * 6
+SIZES_PX = ((1280, 720), (1366, 768), (1920, 1080))
+
+
+def corner_px(window: MainWindow) -> tuple[int, int]:
+    """Return how far the main button's lower right corner is from the window's."""
+    for _ in range(3):  # a layout may ask for another
+        QApplication.processEvents()
+    main = main_button(window)
+    assert main.isVisible()
+    corner = main.mapTo(window, main.rect().bottomRight())
+    return window.width() - corner.x(), window.height() - corner.y()
+
+
+@pytest.mark.parametrize("size_px", SIZES_PX)
+def test_nothing_moves_the_main_button(
+    program: Program, snapshot: Maker, record: SessionRecord, size_px: tuple[int, int]
+) -> None:
+    window, now = program.window, snapshot()
+    window.show_page("live")
+    window.resize(*size_px)
+    places = {corner_px(window)}
+
+    def look() -> None:
+        places.add(corner_px(window))
+        assert window.size().toTuple() == size_px
+        assert window.statusBar().width() == window.width()
+
+    for panel in window.panels.all():
+        panel.show_snapshot(now)
+    look()
+    for view in all_views(snapshot, record):
+        checks = tuple(replace(check, text=LONG) for check in view.checks)
+        for shown in (view, replace(view, sentence=LONG, note=LONG, checks=checks)):
+            say(program, now, shown)
+            look()
+    window.banner.show_message(LONG)
+    look()
+    window.banner.clear()
+    for condition in (LONG, ""):
+        window.banner.show_condition(condition)
+        look()
+    for name, dock in window.docks.items():
+        for is_floating in (True, False):
+            dock.setFloating(is_floating)
+            look()
+        dock.close()
+        look()
+        if name != "link":
+            dock.show()
+    bottom = Qt.DockWidgetArea.BottomDockWidgetArea
+    window.addDockWidget(bottom, window.docks["results"])
+    look()
+    for dock in window.docks.values():
+        dock.close()
+        look()
+    window.reset_layout()
+    look()
+    for show in (window.showMaximized, window.showNormal):
+        show()
+        places.add(corner_px(window))
+    window.show_page("review")
+    window.show_page("live")
+    window.resize(*size_px)
+    look()
+    assert len(places) == 1

@@ -1,0 +1,330 @@
+"""Sessions that survive other writers, kills, a full disk, and damaged files."""
+
+import contextlib
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from handcal.errors import FileError
+from handcal.rig.example import example_rig
+from handcal.session.journal import happens_now, journal_line
+from handcal.session.session import Session, SessionRecord
+from handcal.session.state import SessionEvent
+from handcal.types import Alignment
+from tests.session.conftest import RESULTS, SETTINGS
+
+# Writes alignments that tell their own number, deletes and restores them, and says when each round
+# is safe.
+WRITER = """
+import sys
+from pathlib import Path
+import numpy as np
+from handcal.session.session import Session
+from handcal.session.trial import make_trial
+from handcal.types import Alignment
+
+path = Path(sys.argv[1])
+record = Session.open(path)
+number = len(record.alignments) + len(record.deleted_alignments)
+trial = make_trial(record.rig.eyes["left"], "left", 0.5, np.zeros(3), np.full(3, 0.001))
+with Session(path) as session:
+    while True:
+        cloud_m = np.full((2000, 3), number)
+        cut = np.zeros(2000, bool)
+        number = session.save_alignment(
+            Alignment(cloud_m, cloud_m, cut, cut, {"left": np.eye(4)}, ("left",), np.zeros(3), 0, 1)
+        )
+        session.delete("alignment", number)
+        session.save_trial(trial)
+        session.save_notes("x" * number)
+        session.restore("alignment", number)
+        session.save_results({"number": number})
+        session.save_fine_tuned({"left": np.full(3, 1e-3 * number)})
+        session.record("ready", text="x" * 1000)
+        print(number, flush=True)
+"""
+
+
+def test_a_removed_folder_is_reported(session: Session, alignment: Alignment) -> None:
+    shutil.rmtree(session.path)
+    with pytest.raises(FileError, match="cannot write"):
+        session.record("event")
+    with pytest.raises(FileError, match="cannot write"):
+        session.save_alignment(alignment)
+    with pytest.raises(FileError, match="cannot write"):
+        session.save_results({})
+
+
+def test_a_second_writer_is_found_before_anything_is_written(
+    tmp_path: Path, session: Session, alignment: Alignment
+) -> None:
+    (session.path / "lock").unlink()
+    with Session(session.path) as second:
+        second.save_alignment(alignment)
+        before = (session.path / "journal.jsonl").read_bytes()
+        for write in (
+            lambda: session.record("event"),
+            lambda: session.save_alignment(replace(alignment, t_b_ns=2)),
+            lambda: session.save_notes("mine"),
+        ):
+            with pytest.raises(FileError, match=r"its lock was deleted, so another program"):
+                write()
+        session.close()
+        assert (session.path / "journal.jsonl").read_bytes() == before
+        second.save_alignment(alignment)
+    record = Session.open(session.path)
+    assert (len(record.alignments), record.notes, record.damaged) == (2, "", ())
+
+
+def test_a_folder_that_was_restored_under_the_program_is_found(
+    tmp_path: Path, session: Session
+) -> None:
+    copy = shutil.copytree(session.path, tmp_path / "copy")
+    session.record("event")
+    journal = session.path / "journal.jsonl"
+    journal.write_bytes((copy / "journal.jsonl").read_bytes())
+    with pytest.raises(FileError, match="changed or replaced by another program"):
+        session.record("event")
+    session.close()
+    with Session(session.path) as again:
+        again.path.rename(tmp_path / "aside")
+        shutil.copytree(copy, again.path)
+        with pytest.raises(FileError, match="replaced or restored"):
+            again.record("event")
+
+
+def test_leftovers_of_killed_writers_are_removed(session: Session) -> None:
+    session.close()
+    for name in (".notes.txt.0123456789abcdef", "alignments/.1.npz.0123456789abcdef"):
+        (session.path / name).touch()
+    Session(session.path).close()
+    assert not list(session.path.rglob(".*"))
+
+
+@contextlib.contextmanager
+def disk_ends_at(size: int) -> Iterator[None]:
+    """Let no file grow beyond `size` bytes: a write up to there is done, the rest fails."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_full_disk_loses_nothing_and_the_session_goes_on(
+    session: Session, alignment: Alignment
+) -> None:
+    session.record("first")
+    journal = session.path / "journal.jsonl"
+    with disk_ends_at(journal.stat().st_size + 10):
+        with pytest.raises(FileError, match=r"cannot write .*journal"):
+            session.record("second")
+        with pytest.raises(FileError, match=r"cannot write .*1\.npz"):
+            session.save_alignment(alignment)
+        torn = Session.open(session.path)
+        assert torn.torn_bytes == 10
+        assert [event.name for event in torn.events] == ["created", "first"]
+    session.record("third")
+    whole = Session.open(session.path)
+    assert whole.torn_bytes == 0
+    assert [event.name for event in whole.events] == ["created", "first", "third"]
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("seed", range(6))
+def test_a_session_survives_kill_9(tmp_path: Path, seed: int) -> None:
+    Session.create(tmp_path, example_rig(), SETTINGS, name="killed").close()
+    path = tmp_path / "killed"
+    for _ in range(1 + seed // 3):  # some are resumed after the kill, and killed again
+        before = Session.open(path)
+        command = [sys.executable, "-c", WRITER, str(path)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE) as writer:
+            assert writer.stdout is not None
+            said = writer.stdout.readline()
+            time.sleep(random.Random(seed).uniform(0.0, 0.04))
+            os.kill(writer.pid, signal.SIGKILL)
+            said += writer.stdout.read()
+        rounds, safe = len(said.split()), int(said.split()[-1])
+        record = Session.open(path)
+        stored = {**record.alignments, **record.deleted_alignments}
+        assert safe <= len(stored) <= safe + 1
+        assert set(record.deleted_alignments) <= {safe + 1, *before.deleted_alignments}
+        for number, alignment in stored.items():
+            assert (alignment.hand_m == number - 1).all()
+            assert alignment.hand_m.shape == (2000, 3)
+        assert rounds <= len(record.trials) - len(before.trials) <= rounds + 1
+        assert safe <= len(record.notes) <= safe + 1
+        if len(stored) == safe:
+            assert record.results == {"number": safe}
+            assert record.is_solved
+        assert record.applied_shift_m["left"][0] in (1e-3 * safe, 1e-3 * (safe + 1))
+
+
+FILES = [
+    "journal.jsonl",
+    "rig.yaml",
+    "settings.json",
+    "results.json",
+    "alignments/1.npz",
+    "alignments/2.npz",
+]
+
+
+@given(st.sampled_from(FILES), st.floats(0, 1))
+@settings(deadline=None)
+def test_a_truncated_file_gives_the_data_or_a_file_error(
+    tmp_path_factory: pytest.TempPathFactory,
+    finished: SessionRecord,
+    name: str,
+    fraction: float,
+) -> None:
+    path = tmp_path_factory.mktemp("copy") / "session"
+    shutil.copytree(finished.path, path)
+    length = int(fraction * (path / name).stat().st_size)
+    os.truncate(path / name, length)
+    try:
+        record = Session.open(path)
+    except FileError:
+        return
+    assert record.settings == SETTINGS
+    assert record.results == RESULTS or (name == "journal.jsonl" and record.results is None)
+    # The line break after JSON holds nothing.
+    whole = (finished.path / name).stat().st_size - name.endswith(".json")
+    assert record.damaged or length >= whole
+    assert record.events == finished.events[: len(record.events)]
+    assert record.journal_bytes + record.torn_bytes == (path / "journal.jsonl").stat().st_size
+    for stored, original in zip(
+        record.alignments.values(), finished.alignments.values(), strict=False
+    ):
+        assert stored.hand_m.tobytes() == original.hand_m.tobytes()
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name != "results.json"])
+def test_a_missing_file_is_named(tmp_path: Path, finished: SessionRecord, name: str) -> None:
+    path = tmp_path / "session"
+    shutil.copytree(finished.path, path)
+    (path / name).unlink()
+    if name == "journal.jsonl":
+        with pytest.raises(FileError, match=name):
+            Session.open(path)
+    else:
+        assert [damage.file for damage in Session.open(path).damaged] == [name]
+
+
+@pytest.mark.parametrize("name", ["rig.yaml", "alignments/1.npz", "alignments/2.npz"])
+def test_a_changed_file_is_noticed(tmp_path: Path, finished: SessionRecord, name: str) -> None:
+    path = tmp_path / "session"
+    shutil.copytree(finished.path, path)
+    content = bytearray((path / name).read_bytes())
+    content[len(content) // 2] ^= 1
+    (path / name).write_bytes(content)
+    record = Session.open(path)
+    assert [damage.file for damage in record.damaged] == [name]
+    assert record.rig.eyes["left"].K.tobytes() == finished.rig.eyes["left"].K.tobytes()
+    lost = {"rig.yaml": set(), "alignments/1.npz": {1}, "alignments/2.npz": {2}}[name]
+    assert set(record.alignments) == {1, 2} - lost
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"version": 4}, "has version 4, not one of 1 to 3"),
+        ({"number": 7}, "does not have its checksum"),
+        ({"event": "made_up"}, "does not have its checksum"),
+        ({"version": 2}, "does not have its checksum"),
+        ({"time": "2026-11-22T00:00:00+00:00"}, "does not have its checksum"),
+        (None, "is not an event of a session"),
+    ],
+)
+def test_a_changed_line_costs_only_itself(
+    tmp_path: Path, finished: SessionRecord, change: dict[str, object] | None, problem: str
+) -> None:
+    path = tmp_path / "session"
+    shutil.copytree(finished.path, path)
+    journal = path / "journal.jsonl"
+    lines = journal.read_text().splitlines()
+    lines[1] = "[1, 2]" if change is None else json.dumps(json.loads(lines[1]) | change)
+    journal.write_text("\n".join(lines) + "\n")
+    record = Session.open(path)
+    assert [(damage.file, damage.line) for damage in record.damaged] == [("journal.jsonl", 2)]
+    assert problem in record.damaged[0].what
+    assert record.events == (finished.events[0], *finished.events[2:])
+    assert numbers_of(record) == numbers_of(finished)
+
+
+def test_a_newer_version_is_refused_as_a_whole(
+    tmp_path: Path, finished: SessionRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "session"
+    shutil.copytree(finished.path, path)
+    journal = path / "journal.jsonl"
+    monkeypatch.setattr("handcal.session.journal.JOURNAL_VERSION", 4)
+    line = journal_line(happens_now(13, "later", {}))
+    monkeypatch.undo()
+    journal.write_bytes(journal.read_bytes() + line)
+    with pytest.raises(FileError, match="has version 4, not one of 1 to 3"):
+        Session.open(path)
+
+
+def test_a_journal_without_its_beginning_is_refused(
+    tmp_path: Path, finished: SessionRecord
+) -> None:
+    path = tmp_path / "session"
+    shutil.copytree(finished.path, path)
+    (path / "journal.jsonl").write_text("")
+    with pytest.raises(FileError, match="does not begin as the journal of a session"):
+        Session.open(path)
+
+
+def numbers_of(record: SessionRecord) -> tuple[list[int], ...]:
+    """Return the numbers of all items of a session."""
+    alignments = list(record.alignments), list(record.deleted_alignments)
+    return *alignments, list(record.trials), list(record.deleted_trials)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5),
+    lambda part: (
+        st.lists(part, max_size=4) | st.dictionaries(st.text(max_size=5), part, max_size=3)
+    ),
+    max_leaves=8,
+)
+FIELDS = ["number", "sha256", "rig_sha256", "wearer", "trial", "shift_m"]
+
+
+@given(st.sampled_from(list(SessionEvent)), st.dictionaries(st.sampled_from(FIELDS), JSON))
+@settings(deadline=None)
+def test_a_strange_event_is_refused_or_harmless(
+    tmp_path_factory: pytest.TempPathFactory,
+    finished: SessionRecord,
+    event: SessionEvent,
+    data: dict[str, object],
+) -> None:
+    path = tmp_path_factory.mktemp("copy") / "session"
+    shutil.copytree(finished.path, path)
+    line = {"version": 2, "number": 13, "event": event, "data": data}
+    line["time"] = "2026-11-21T12:00:00+00:00"
+    with (path / "journal.jsonl").open("a") as journal:
+        journal.write(json.dumps(line) + "\n")
+    try:
+        record = Session.open(path)
+    except FileError as error:
+        assert "has version" in str(error)  # noqa: PT017
+        return
+    assert record.damaged
+    assert set(record.alignments) | set(record.deleted_alignments) <= {1, 2}
+    assert record.trials or record.deleted_trials
