@@ -189,7 +189,7 @@ def can_start(technician: Technician) -> bool:
     return bool(technician.child(QPushButton, "start").isEnabled())
 
 
-def test_on_a_slow_computer_every_panel_comes_to_its_turn(
+def test_on_a_slow_computer_every_panel_is_shown(
     live: Technician, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     controller, panels = live.program.live, live.program.window.panels
