@@ -312,7 +312,7 @@ class CalibrationController(QObject):
         always = panels.fine_tune, panels.trials
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
-        # On a slow computer, too, every panel comes to its turn.
+        # Otherwise, on a slow computer, some panels would never have a turn.
         shows = not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
         if shows:
             self._turns.rotate()

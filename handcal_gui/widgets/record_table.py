@@ -33,7 +33,7 @@ class RecordColumn:
     tooltip: str
     is_number: bool = True
     rank: int = 0
-    """Where not all columns fit, those of the highest rank are hidden first."""
+    """Columns of the highest rank are hidden first if not all fit."""
 
 
 class RecordTable(QTableView):

@@ -88,7 +88,7 @@ SEEN_BY = {
     "tritanopes": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
                    [0.004733, 0.691367, 0.303900]],
 }  # fmt: skip
-"""What people see, in linear red, green and blue (Machado, Oliveira and Fernandes 2009, "A
+"""Colours that people see, in linear red, green and blue (Machado, Oliveira and Fernandes 2009, "A
 physiologically-based model for simulation of color vision deficiency", severity 1.0)."""
 TOLD_APART = (
     ("good", "warning"), ("good", "red"), ("warning", "red"), ("muted", "good"),

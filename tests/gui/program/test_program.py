@@ -181,7 +181,7 @@ def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio:
     np.testing.assert_allclose(record.fine_tuned["left"], [panel.step_m, 0.0, 0.0])
 
 
-def test_on_a_slow_computer_every_panel_comes_to_its_turn(
+def test_on_a_slow_computer_every_panel_is_shown(
     live: Technician, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     controller, panels = live.program.live, live.program.window.panels
