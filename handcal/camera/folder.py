@@ -180,7 +180,11 @@ def _write_frames(folder: Path, frames: Iterable[Frame], is_posed: bool) -> int:
     """Write images in several threads, as compression takes longer than a frame lasts."""
     number = 0
     waiting: deque[tuple[Frame, Future[None]]] = deque()
-    with (folder / LIST).open("x", encoding="ascii") as file, ThreadPoolExecutor(_WRITERS) as pool:
+    # Without newline, Windows would end lines otherwise than they are read.
+    with (
+        (folder / LIST).open("x", encoding="ascii", newline="\n") as file,
+        ThreadPoolExecutor(_WRITERS) as pool,
+    ):
 
         def list_oldest() -> None:
             frame, written = waiting.popleft()
@@ -219,7 +223,8 @@ def _image_paths(folder: Path, number: int) -> tuple[Path, Path]:
 def _read_list(path: Path) -> list[_Listed]:
     """Read the list of frames; an incomplete last line, as after a crash, is ignored."""
     text = read_limited(path, _MAX_LIST_BYTES).decode("ascii", errors="replace")
-    columns, *lines = text.split("\n")[:-1] or [""]
+    # An editor on Windows ends lines with two characters.
+    columns, *lines = text.replace("\r\n", "\n").split("\n")[:-1] or [""]
     if columns not in (_COLUMNS, _POSED_COLUMNS):
         raise FileError(f"{path} must begin with the line {_COLUMNS} or {_POSED_COLUMNS}")
     if len(lines) > _MOST_FRAMES:

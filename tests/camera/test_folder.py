@@ -107,6 +107,13 @@ def test_an_unfinished_line_is_left_out(folder: Path) -> None:
         assert len(list(read_all(camera))) == 11
 
 
+def test_lines_may_end_as_on_windows(folder: Path) -> None:
+    listing = folder / LIST
+    listing.write_bytes(listing.read_bytes().replace(b"\n", b"\r\n"))
+    with FolderCamera(folder) as camera:
+        assert len(list(read_all(camera))) == 12
+
+
 def test_nothing_is_written_over(folder: Path, make_frames: MakeFrames) -> None:
     before = {path: path.read_bytes() for path in folder.iterdir()}
     with pytest.raises(FileError, match="is not empty; choose a new folder"):
