@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -195,8 +194,6 @@ def test_wrong_stamps_are_found_over_the_link() -> None:
 @pytest.mark.process
 def test_the_doctor_reports_on_a_headset(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "_SETTLE_S", 0.5)
-    shorter = partial(run_pose_delay, duration_s=4.0)
-    monkeypatch.setattr(doctor, "run_pose_delay", shorter)
     with HeadsetServer(KEY) as server:
         (absent,) = examine_headset(server, None, None, 0.1)
     assert (absent.health, absent.what) == (Health.BROKEN, "Headset")
