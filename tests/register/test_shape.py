@@ -4,7 +4,6 @@ import json
 import re
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -15,12 +14,9 @@ from hypothesis import strategies as st
 from handcal.geometry import invert, rigid, transform
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
-from handcal.register import shape
 from handcal.register.guard import GuardSettings, RotationGuard
 from handcal.register.rcicp import best_rigid
-from handcal.register.rigid import Rows, register_rigid, registration_rows
-from handcal.register.shape import ShapeChange, change_text, measure_shape_change
-from handcal.register.surface import describe_surface
+from handcal.register.shape import ShapeChange, change_text
 from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.raster import visible_points
 from handcal.types import Bool, Float64, Frame, Intrinsics
@@ -49,25 +45,6 @@ def test_a_hand_that_keeps_its_shape_has_not_changed(seed: int) -> None:
     hand_m, is_cut = seen(seed, 0.05)
     moved_m = transform(rigid([0.05, -0.08, 0.06], [0.03, -0.02, 0.04]), hand_m)
     assert RotationGuard(*seen(seed, 0.03)).shape_change(moved_m, is_cut).rms_m < 0.0008
-
-
-def test_pairs_are_searched_for_again_only_for_a_bent_hand(monkeypatch: pytest.MonkeyPatch) -> None:
-    cursor, still, bent = (
-        describe_surface(*cloud, 700)
-        for cloud in (seen(1, 0.03), seen(1, 0.05), seen(1, 0.05, curl_more_rad=0.15))
-    )
-    searches = []
-
-    def counted(*given: Any) -> Rows:
-        searches.append(given)
-        return registration_rows(*given)
-
-    monkeypatch.setattr(shape, "registration_rows", counted)
-    for hand, expected in ((still, 0), (bent, 1)):
-        fit = register_rigid(cursor, hand)
-        searches.clear()
-        measure_shape_change(cursor, hand, fit.T_target_source, rows=fit.rows)
-        assert len(searches) == expected
 
 
 @pytest.mark.parametrize("seed", [1, 2])
