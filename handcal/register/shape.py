@@ -112,12 +112,12 @@ def measure_shape_change(
         normal = measured.copy()
         for i in range(3):
             normal[i::3, i::3] += len(toward) / count * stiffness
-        inverse = _inverse(normal) if step == _STEPS - 1 else None
-        solution = lapack.dposv(normal, wanted)[1] if inverse is None else inverse @ wanted
-        moved = solution.reshape(-1, 3)
+        factor = _factor(normal)
+        moved = lapack.dpotrs(factor, wanted)[0].reshape(-1, 3)
     point_moved = np.einsum("nk,nkd->nd", share, moved[node])
     left_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - before_m
     variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
+    inverse = _inverse(factor)
     scatter = np.sum((inverse @ measured) * inverse)
     cut_m = points[cursor.near_cut]
     T_moved = best_rigid(nodes, nodes + moved)
@@ -176,17 +176,18 @@ def _normal_equation(
     return normal.reshape(3 * count, 3 * count), wanted.ravel()
 
 
-def _inverse(normal: Float64) -> Float64:
-    """Return the inverse of a symmetric positive definite matrix, by Cholesky's factors.
-
-    LinAlgError if it is not positive definite.
-    """
+def _factor(normal: Float64) -> Float64:
+    """Return Cholesky's factor, in the upper triangle; LinAlgError unless positive definite."""
     factor, failed_at = lapack.dpotrf(normal)
     if failed_at:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
+    return np.asarray(factor)
+
+
+def _inverse(factor: Float64) -> Float64:
+    """Return the inverse of the matrix of Cholesky's factor."""
     upper = np.triu(lapack.dpotri(factor)[0])
-    inverse: Float64 = upper + np.triu(upper, 1).T
-    return inverse
+    return np.asarray(upper + np.triu(upper, 1).T)
 
 
 def change_text(change: ShapeChange, R_D: Float64) -> str:
