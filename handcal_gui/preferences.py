@@ -130,8 +130,8 @@ class PreferencesFile:
         with suppress(OSError):
             shutil.copyfile(self.path, kept)
         return tr(
-            "The preferences are of a newer version of handcal. Settings that this one "
-            "does not know are left out; they are kept in {}."
+            "The preferences are from a newer version of handcal. Settings that this version "
+            "does not know are ignored; they are kept in {}."
         ).format(kept)
 
     def pairings(self) -> Pairings:

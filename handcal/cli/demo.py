@@ -61,7 +61,7 @@ class DemoSettings:
     former: str = ""
     """Path of a stored session with whose φ to begin; empty: the offline calibration."""
     slipped: bool = False
-    """True if the headset sits otherwise than in the session `former`, by a movement drawn from the
+    """True if the headset has slipped since the session `former`, by a movement drawn from the
     seed."""
     side: Side | None = None
     """The hand that is raised; None: as the seed has it."""

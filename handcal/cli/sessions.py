@@ -123,7 +123,7 @@ def export(arguments: argparse.Namespace) -> None:
 
 @command(arg("session", type=Path, help="session folder"), json=True)
 def check(arguments: argparse.Namespace) -> None:
-    """Check every part of a session; exit code 1 if any is damaged, 2 if it is no session."""
+    """Check every part of a session; exit code 1 if any is damaged, 2 if it is not a session."""
     from handcal.session.repair import check_session
 
     found = check_session(arguments.session)

@@ -199,7 +199,7 @@ class PlannedWizard(Wizard):
             text = tr("The wearer has verified the result. Finish, or check an eye again.")
             main = ButtonSpec(Action.NEXT, tr("Finish"))
         else:
-            text = tr("Nobody has verified every eye. Finish, or check an eye again.")
+            text = tr("Not every eye has been verified. Finish, or check an eye again.")
         return WizardView(
             Step.VERIFY,
             text if checks else f"{sentence(planned.text)}.",
@@ -233,4 +233,6 @@ def _drawn_otherwise(procedure: Procedure) -> str:
     solved_m = results.rendered_shift_m
     if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
         return ""
-    return tr("The headset draws with another φ than this result: gone back, or set by hand.")
+    return tr(
+        "The headset draws with another φ than this result's: an earlier or a fine-tuned one."
+    )

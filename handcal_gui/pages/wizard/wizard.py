@@ -51,7 +51,7 @@ _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
 }
 """Name and keys of each nudge; its movement right and down in arcminutes, and its growth."""
 _GO_BACK = {
-    "former": (tr("Draw with φ before the newest, or with the newest again"), "G"),
+    "former": (tr("Draw with the previous φ, or with the newest again"), "G"),
     "offline": (tr("Draw with the offline calibration"), "Shift+G"),
 }
 """Name and key of each φ that the headset can go back to."""
@@ -101,7 +101,7 @@ class WizardPanel(QWidget):
         self._hold = self._hold_action()
         self._nudges = self._nudge_actions()
         self._undo = add_action(
-            self, tr("Move of the outline"), "", lambda: self.asked.emit(Action.UNDO_NUDGE)
+            self, tr("Movement of the outline"), "", lambda: self.asked.emit(Action.UNDO_NUDGE)
         )
         self._undo.setObjectName("undo")
         self._undo.setEnabled(False)
