@@ -247,7 +247,7 @@ def parse_packet(stream: Stream, data: bytes) -> Packet:
 
 
 def time_of(stream: Stream, data: bytes) -> int:
-    """Return the time of a packet on the headset's clock, ns; CameraError if it is none."""
+    """Return the time of a packet on the headset's clock, ns; CameraError if it is not one."""
     ticks = int(_HEADER.unpack_from(data)[0])
     if ticks * _TICK_NS >= 2**62:
         raise foreign(stream, "a time beyond all clocks")
@@ -260,7 +260,7 @@ def pose_of(stream: Stream, data: bytes) -> Float64 | None:
     Raises
     ------
     CameraError
-        If it is no pose.
+        If it is not a pose.
     """
     T_world_rig = np.frombuffer(data[-_POSE_BYTES:], "<f4").astype(np.float64).reshape(4, 4).T
     if not T_world_rig.any():

@@ -11,7 +11,7 @@ Preset: TypeAlias = Literal["default", "hand", "high_accuracy", "high_density", 
 
 @dataclass(frozen=True, slots=True)
 class RealSenseSettings:
-    """Settings of a RealSense camera; None leaves an option as the device has it.
+    """Settings of a RealSense camera; None leaves an option as set on the device.
 
     Depth is never decimated, as its pixels would no longer match the rig's calibration.
     """

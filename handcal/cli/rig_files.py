@@ -232,7 +232,7 @@ def _with_identity(rig: Rig, arguments: argparse.Namespace) -> Rig:
     """Return the rig with the identity of its depth camera; HandcalError if it is another one."""
     with open_source(arguments.camera, realsense_of(arguments)) as camera:
         if not camera.identity.serial_number:
-            raise HandcalError(f"{camera.name} does not tell its serial number; use another source")
+            raise HandcalError(f"{camera.name} reports no serial number; use another source")
         _require_own(rig, camera)
         return replace(rig, depth_camera=camera.identity)
 

@@ -21,7 +21,7 @@ _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
 _RIG = arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)")
 _HAND = arg(
-    "--hand", choices=("left", "right"), help="the raised hand (default: as the seed has it)"
+    "--hand", choices=("left", "right"), help="the raised hand (default: drawn from the seed)"
 )
 _LINK = (
     arg("--loss", type=_SHARE, metavar="P", default=0.0, help="share of datagrams lost"),

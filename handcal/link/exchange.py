@@ -22,7 +22,7 @@ DIGITS = 8
 MAX_ATTEMPTS = 5
 """Attempts that are answered; one of them succeeds by chance with 5 in 10⁸."""
 PUBLIC_KEYS = wire.Keys(to_headset=b"handcal pair to headset", to_pc=b"handcal pair to pc")
-"""Keys of the datagrams, known to everyone: they only tell that a datagram is whole."""
+"""Keys of the datagrams, known to everyone: they only show that a datagram is intact."""
 PROOF_BYTES = 16
 PRIME = int(
     "FFFFFFFFFFFFFFFFC90FDAA22168C234C4C6628B80DC1CD129024E088A67CC74"
@@ -87,7 +87,7 @@ def agree(
     Raises
     ------
     MalformedError
-        If the other's public value is none.
+        If the other's public value is invalid.
     """
     other = headset_value if is_pc else pc_value
     if len(other) != VALUE_BYTES or not 1 < (value := int.from_bytes(other, "big")) < PRIME - 1:

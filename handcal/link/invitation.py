@@ -52,11 +52,11 @@ def read_invitation(text: str) -> Invitation:
     Raises
     ------
     LinkError
-        If it is none.
+        If it is not an invitation.
     """
     found = _TEXT.fullmatch(text.strip().upper())
     if found is None or not 0 < int(found["port"]) < 65536:
-        raise LinkError("this is no invitation of handcal; scan the QR code of handcal pair")
+        raise LinkError("this is not an invitation from handcal; scan the QR code of handcal pair")
     return Invitation((found["ipv6"] or found["host"]).lower(), int(found["port"]), found["code"])
 
 

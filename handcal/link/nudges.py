@@ -1,8 +1,7 @@
 """Messages of a verification: the eye that is verified, and the wearer's nudges.
 
-The wearer moves what one eye draws until the hand's outline covers the hand. A nudge tells all of
-the movement since the verification and the link's session began, so that the newest message is
-enough.
+The wearer moves what one eye draws until the hand's outline covers the hand. A nudge holds all
+movement since the verification and the link's session began, so that the newest message is enough.
 """
 
 from __future__ import annotations

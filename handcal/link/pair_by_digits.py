@@ -30,7 +30,7 @@ def pair_by_digits(
     LinkError
         If no PC answers, the digits are wrong, or the PC takes no more attempts.
     ValueError
-        If there are not 8 digits, or the identity is none.
+        If there are not 8 digits, or the identity is invalid.
     """
     digits = exchange.read_digits(digits)
     device = device_number(device_id)

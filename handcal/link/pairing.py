@@ -212,7 +212,7 @@ class Pairings:
             self._change(edit)
 
     def rename(self, device_id: str, name: str) -> None:
-        """Give a device another name, for people to read.
+        """Give a device another name, which is only for display.
 
         Raises
         ------

@@ -86,7 +86,7 @@ def next_alignment(
     """Return a plan's next alignment, or None if none is needed now or the most were made.
 
     Of ``paper``: both eyes, the cursor where the hand is. Of ``recommended``: left, right and both
-    in turn, each cursor where it tells most. None is needed while an eye is to be verified
+    in turn, each cursor where it is most informative. None is needed while an eye is to be verified
     (`next_check`), nor once every eye is accepted or keeps its offline calibration.
 
     Parameters
@@ -106,7 +106,7 @@ def next_alignment(
         φ that the cursor will be drawn with.
     plan : {"recommended", "paper"}
     usable_eyes : tuple of eye
-        One eye for a wearer who sees with one.
+        Only one for a wearer who sees with one eye.
     settings : PlacementSettings
     solve : SolveSettings
         Its prior and precision of a wearer count before the first alignment.

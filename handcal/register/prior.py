@@ -1,7 +1,7 @@
 """The prior on where a wearer's eyes are, as default and as learned from earlier sessions.
 
 [φ_left; φ_right] is Gaussian. By default its mean is zero, each φ lies in the eye box, and the two
-eyes differ little. A lab's finished sessions with one rig tell more: how far its headset sits from
+eyes differ little. A lab's finished sessions with one rig show more: how far its headset sits from
 the viewpoint on average, and how much wearers differ. Mean and covariance are estimated by
 expectation maximisation, as every session measures φ with an error of its own, and a single
 alignment with both eyes open measures three of the six numbers. The default prior takes part as

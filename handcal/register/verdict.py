@@ -27,7 +27,7 @@ from handcal.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
 MOST_ALIGNMENTS = 10
 # More than this are not worth it where the offline calibration is within the target.
 _FEW_ALIGNMENTS = 2
-# Each eye in turn, then both, which a wearer sees best and which tells the eyes' common part.
+# Each eye in turn, then both, which a wearer sees best and which determines the eyes' common part.
 _IN_TURN: tuple[tuple[Eye, ...], ...] = ("left",), ("right",), EYES
 
 
@@ -185,7 +185,7 @@ def judge(
         Sentences of evidence from outside the solver against the result.
     measured : mapping of eye to (before, after)
         Errors in arcmin by the wearer's verification, as `measured_arcmin` gives them. They are
-        part of `fused`, and so of the verdict; here they are told.
+        part of `fused`, and so of the verdict; here they are added to the reason.
     """
     apart_m = eye_distance_m(rig, fused.shifts)
     if contradictions:

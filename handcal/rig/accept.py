@@ -271,7 +271,7 @@ def _or_shifted(turn_rad: Float64, found: EyeAcceptance) -> str:
     shift_m = float(np.linalg.norm(turn_rad)) * found.image_distance_m
     if shift_m > LARGEST_SHIFT_M:
         return ""
-    return f" or shifted by {1e3 * shift_m:.0f} mm (EYE/tracked.json would tell which)"
+    return f" or shifted by {1e3 * shift_m:.0f} mm (EYE/tracked.json would show which)"
 
 
 def _middle_m(T_C_B: Float64, seen: BoardView) -> float:

@@ -206,7 +206,7 @@ def _judge(
     ):
         return CalibrationVerdict(
             "bad",
-            "all views show the board at nearly one angle, which does not tell the focal length: "
+            "all views show the board at nearly one angle, which leaves the focal length open: "
             "tilt it by 20° to 45° to every side",
         )
     seen_area = coverage(found.values())

@@ -130,7 +130,7 @@ def find_square(dark: tuple[UInt8, UInt8], seen: UInt8) -> tuple[Float64, int]:
     if np.count_nonzero(mask) < _LEAST_PIXELS:
         raise UnseenError(
             "the camera does not see the square that the headset draws; darken the room, and put "
-            "the camera before this eye's display"
+            "the camera behind this eye's display"
         )
     y, x = np.nonzero(mask)
     weights = np.abs(added[mask])
@@ -154,7 +154,7 @@ def shares_seen(found: Mapping[Shown, tuple[Float64, int]]) -> dict[Probe, float
     pixels = [count for _, count in found.values()]
     if max(pixels) > _AREA_RATIO * min(pixels):
         raise UnseenError(
-            "something else than the square moved or was lit, or the square left the picture; keep "
+            "something other than the square moved or lit up, or the square left the picture; keep "
             "the camera and everything before it still, and check again"
         )
     control = found["control"][0] - found["rest"][0]

@@ -33,7 +33,7 @@ class RigFinding:
     expected: str = ""
     """Empty where anything is."""
     is_known: bool = True
-    """False if the file does not tell it: neither fine nor doubtful."""
+    """False if the file does not contain it: neither fine nor doubtful."""
 
 
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
@@ -193,7 +193,7 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
 
 
 def _not_told(what: str) -> RigFinding:
-    return RigFinding(what, "not told in this file", is_known=False)
+    return RigFinding(what, "not in this file", is_known=False)
 
 
 def _origin_finding(rig: Rig, part: str) -> RigFinding:

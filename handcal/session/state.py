@@ -241,7 +241,7 @@ class SessionState:
         if "rig" in data:
             rig, settings = data["rig"], data["settings"]
             if not isinstance(settings, dict):
-                raise TypeError("the settings are no object")
+                raise TypeError("the settings are not an object")
             self.rig_sha256 = hashlib.sha256(rig.encode()).hexdigest()
             self.rig, self.settings = rig, settings
             self.notes_sha256 = ("",)
@@ -258,7 +258,7 @@ def _number(data: Mapping[str, Any]) -> int:
     """Return the number in an event, which must be an int: true and 1.0 equal 1 too."""
     number = data["number"]
     if type(number) is not int:
-        raise ValueError(f"a number is whole, not {number!r}")
+        raise ValueError(f"a number must be whole, not {number!r}")
     return number
 
 

@@ -255,7 +255,7 @@ def cube_prior(settings: CaptureSettings) -> PriorSettings:
 
 
 def some_cube_pose(display: EyeDisplay, depth_m: float, rng: np.random.Generator) -> Float64:
-    """Return T_E_T of a cube before the display's centre with three visible faces, at random."""
+    """Return a random T_E_T of a cube on the display's axis with three visible faces."""
     middle_px = [(display.width_px - 1) / 2, (display.height_px - 1) / 2, 1.0]
     ray = np.linalg.solve(eye_projection(display)[:, :3], middle_px)
     aside_m = rng.uniform(-_ASIDE_M, _ASIDE_M, 2)

@@ -66,7 +66,7 @@ class SimulatedDisplay(ViewpointCamera):
         self._R_E_C = rigid(self._rng.normal(0.0, 0.02, 3))[:3, :3]
 
     def place(self, eye: Eye) -> None:
-        """Put the camera before the display of an eye."""
+        """Put the camera behind the display of an eye."""
         self.eye = eye
 
     def read(self) -> tuple[UInt8, int]:

@@ -78,7 +78,7 @@ class HeadsetSettings:
     eye_distance_m: float | None = None
     """Eye distance that it reports; None: it measures none."""
     side: Side | None = None
-    """The hand that is raised; None: as the seed has it."""
+    """The hand that is raised; None: drawn from the seed."""
     has_wearer: bool = True
     """False: a device at rest, without a simulated wearer."""
 

@@ -1,4 +1,4 @@
-"""One alignment while it is made: the live hand against the cursor, and the judging of it."""
+"""One alignment in progress: compares the live hand with the cursor, and judges confirmations."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from handcal.station.states import CalibrationSettings, Observation
 from handcal.types import EYES, Alignment, Eye, Float64
 
 KEEP_PROMPT = "Keep your hand up."
-"""Shown while the next cursor or verification follows at once."""
+"""Shown if the next cursor or verification follows at once."""
 # The prompt says what to balance when the hand is turned.
 _MOVE = "Move your hand under the cursor, finger tips and wrist alike, then confirm."
 ADVISE_EVERY_NS = 1_000_000_000
-"""Least time between two pieces of advice, to be read."""
+"""Least time between two pieces of advice, so that each can be read."""
 # The advice does not come and go at its limit.
 _STILL_TURNED = 0.7
 _SHAPE_EVERY_NS = 250_000_000
@@ -44,12 +44,12 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """A confirmation that makes no alignment."""
+    """A confirmation that was refused."""
 
     prompt: str
-    """The reason, and what the wearer is to do."""
+    """The reason, and what the wearer should do."""
     reason: str
-    """In the journal's words."""
+    """The reason as the journal names it."""
     angle_deg: float | None = None
     is_by_guard: bool = False
     """True if the hand was turned or had changed its shape."""
@@ -128,7 +128,7 @@ class Aligning:
         )
 
     def advise(self, observation: Observation) -> str | None:
-        """Return a new prompt for the wearer, to turn the hand back or no more; None if none."""
+        """Return a new prompt for the wearer, to turn the hand back or to stop; else None."""
         hand, rotation_rad = observation.hand, observation.rotation_rad
         if hand is None or rotation_rad is None:
             return None

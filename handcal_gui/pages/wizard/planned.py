@@ -38,7 +38,7 @@ _STATES = {
     State.VERIFY: Step.VERIFY,
 }
 _FOLLOWS = Step.SHOW_HAND
-"""The guide's own place while the plan goes on."""
+"""The guide's own step while the plan continues."""
 _CHECKS: dict[Eye, ButtonSpec] = {
     "left": ButtonSpec(Action.CHECK_LEFT, tr("Check l&eft eye")),
     "right": ButtonSpec(Action.CHECK_RIGHT, tr("Check &right eye")),

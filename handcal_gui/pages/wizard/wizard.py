@@ -197,7 +197,7 @@ class WizardPanel(QWidget):
         return actions
 
     def _ask_to_go_back(self, to: str) -> None:
-        self.hold(True)  # or a plan would go on, and send another φ
+        self.hold(True)  # or a plan would continue, and send another φ
         self.went_back.emit(to)
 
     def _choose_hold(self, is_held: bool) -> None:

@@ -186,7 +186,7 @@ def _finding(sight: CubeSight) -> Finding:
 
 
 def _pose_rows(sight: CubeSight) -> list[Row]:
-    """Return the filtered pose in the world, and the measured one before the camera."""
+    """Return the filtered pose in the world, and the measured one relative to the camera."""
     rows = []
     if sight.tracked is not None:
         T_W_T = sight.tracked.T_W_T
