@@ -54,7 +54,7 @@ class DepthFormat(NamedTuple):
     group: int
     media: int
     divisor: int
-    """Every so many images are sent, so that 15 a second arrive."""
+    """One of this many images is sent, so that 15 per second arrive."""
 
 
 class HoloLens2RealSense(Closable):

@@ -45,7 +45,7 @@ class HoloLens2Settings:
     port: int | None = None
     """Port of the stream; None for hl2ss's own."""
     divisor: int = 3
-    """Every so many images of the headset's own camera are sent: AHAT makes 45 a second, too many
+    """One of this many images of the headset's own camera is sent: AHAT makes 45 per second, too many
     for Wi-Fi."""
     has_color: bool = False
     """Send the pictures of the front colour camera, too, in place of the depth camera's grey."""

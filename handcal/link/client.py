@@ -207,7 +207,7 @@ class HeadsetClient(Endpoint):
     def nudge(
         self, t_headset_ns: int, state: HeadsetState, moved: NudgeSum, fits: bool = False
     ) -> Outgoing:
-        """Tell reliably how far the wearer has moved the drawing since `state.verify` began.
+        """Send reliably how far the wearer has moved the drawing since `state.verify` began.
 
         Raises
         ------

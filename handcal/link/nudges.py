@@ -21,10 +21,10 @@ MAX_NUDGE_SIZE = 0.3
 
 @dataclass(frozen=True, slots=True)
 class VerifyRequest:
-    """The eye whose drawing the wearer is to move."""
+    """The eye whose drawing the wearer should move."""
 
     verify_id: int
-    """Another one for each verification; not 0."""
+    """Different for each verification; not 0."""
     eye: Eye
     step_arcmin: float = 1.0
     step_size: float = 0.002

@@ -90,7 +90,7 @@ class Pairing:
     device_id: str = ""
     """Empty until a device connects with this key; then it belongs to that device."""
     name: str = ""
-    """The device's name when it connected first."""
+    """The device's name when it first connected."""
 
     def __post_init__(self) -> None:
         count = len(self.key.encode())
@@ -131,7 +131,7 @@ class Pairings:
 
     @classmethod
     def read(cls, path: Path) -> Pairings:
-        """Read a file: JSON, or a bare key as version 1 wrote it. A missing one is no pairing.
+        """Read a file: JSON, or a bare key as version 1 wrote it. A missing file means no pairing.
 
         Raises
         ------

@@ -55,7 +55,7 @@ class PriorSettings:
     """The prior on φ of both eyes."""
 
     eye_box_sigma_m: float = 0.004
-    """Standard deviation of each component of φ where nothing is known about the wearers."""
+    """Standard deviation of each component of φ if nothing is known about the wearers."""
     eye_difference_sigma_m: tuple[float, float, float] = (0.0022, 0.0008, 0.0008)
     """Standard deviation of the right φ minus the left. x is the difference of the wearer's eye
     distance from the rig's: 2 mm if the headset is adjusted to the wearer; 3.6 mm among adults

@@ -51,7 +51,7 @@ class VerdictSettings:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """The alignments that would lead to *accept*, as far as can be foreseen."""
+    """The alignments that would lead to *accept*, as far as can be predicted."""
 
     eyes: tuple[Eye, ...]
     """Eyes to keep open in each of them; empty if they follow a plan."""
@@ -156,7 +156,7 @@ def advise(
 
 
 def _is_better_advice(one: Advice, other: Advice) -> bool:
-    """Return whether advice leads further, or as far with fewer alignments, or then closer."""
+    """Return whether advice leads further, or as far with fewer alignments or a smaller error."""
     steps = one.is_accepted - other.is_accepted or one.meets_target - other.meets_target
     if steps or not other.meets_target:
         return steps > 0 or (steps == 0 and one.after_arcmin < other.after_arcmin)

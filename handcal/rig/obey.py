@@ -1,9 +1,9 @@
 """Check that a display obeys: what is drawn must move as the projections sent to it say.
 
-A square is drawn for one eye. Moved in V by a known angle, it says how far that is in the picture
+A square is drawn for one eye. Moved in V by a known angle, it shows how far that is in the picture
 (the control). Then the square stays and the projection changes: by a shift of the image, by an eye
 that has moved, and by a shift of the other eye's projection. The share of the expected movement
-that is seen tells which part of the headset's software undoes it: an app that submits the
+that is seen shows which part of the headset's software undoes it: an app that submits the
 calibrated view to its runtime asks it to show everything where the runtime's own view would. The
 camera needs no calibration, and need not be at the rig's viewpoint.
 """

@@ -31,7 +31,7 @@ class RigFinding:
     found: str
     is_fine: bool = True
     expected: str = ""
-    """Empty where anything is."""
+    """The expected value; empty if any value is."""
     is_known: bool = True
     """False if the file does not contain it: neither fine nor doubtful."""
 

@@ -26,7 +26,7 @@ FROZEN_FRAMES = 4
 _REFUSALS = 2
 _COMPARED = 20
 _APART_M, _APART_RAD = 0.02, np.radians(2.0)
-"""Poses of one rig in one world agree better at least once in so many frames, also while the head
+"""Poses of one rig in one world agree better at least once in this many frames, even while the head
 moves."""
 
 
