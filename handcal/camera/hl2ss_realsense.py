@@ -2,7 +2,7 @@
 
 Written from hl2ss's own sources (https://github.com/jdibenes/hl2ss), server and client, which call
 the streams Extended Video and Extended Depth. On the port of the first the client sends u8 = 2, and
-is sent a u32 and so many bytes of UTF-16: the list of cameras, in JSON. On the port of the second
+is sent a u32 and that many bytes of UTF-16: the list of cameras, in JSON. On the port of the second
 it selects a group, a source and a profile of that list, as the front colour camera is started with
 options of mixed reality capture (`handcal.camera.hl2ss_color`): opacity, width and height, three
 f32, are the three numbers. The request is mode u8 = 0 (without pose), divisor u8, depth profile

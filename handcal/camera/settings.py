@@ -45,8 +45,8 @@ class HoloLens2Settings:
     port: int | None = None
     """Port of the stream; None for hl2ss's own."""
     divisor: int = 3
-    """One of this many images of the headset's own camera is sent: AHAT makes 45 per second, too many
-    for Wi-Fi."""
+    """One of this many images of the headset's own camera is sent: AHAT makes 45 per second, too
+    many for Wi-Fi."""
     has_color: bool = False
     """Send the pictures of the front colour camera, too, in place of the depth camera's grey."""
     color_port: int | None = None

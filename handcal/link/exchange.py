@@ -1,8 +1,8 @@
 """Agreement on a pairing key by a few digits (SPEKE: IEEE 1363.2, ISO/IEC 11770-4).
 
 Both ends raise the same secret generator, derived from the digits, to a random power modulo the
-2,048-bit prime of RFC 3526. Without the digits, neither listening nor taking part helps to try digits
-afterwards: every guess costs one attempt with the PC, which allows only a few.
+2,048-bit prime of RFC 3526. Without the digits, neither listening nor taking part helps to try
+digits afterwards: every guess costs one attempt with the PC, which allows only a few.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Acceptance of a rig without a wearer: a camera in the eye's place sees what would be drawn.
 
 The viewpoint camera stands behind a display. A picture of the display's grid gives the display's
-pixel for each pixel of the camera. Then it sees a board at several distances, which the depth camera
-sees too. The depth camera's picture gives the place of the board and, with the viewpoint camera's,
+pixel for each of the camera's. Then it sees a board at several distances, which the depth camera
+sees, too. The depth camera's picture gives the place of the board and, with the viewpoint camera's,
 the camera's own place φ. The pixels at which the rig draws the board's corners for an eye at φ are
 compared with those at which the camera sees them. Nothing is fitted.
 
@@ -261,7 +261,7 @@ def likely_cause(found: Sequence[EyeAcceptance], move: CameraMove | None = None)
             "calibrate its pose again (handcal rig stereo, rig make)"
         )
     return (
-        "each eye's errors are those of a rotation of its own: calibrate the displays again "
+        "each eye's errors are those of a different rotation: calibrate the displays again "
         "(handcal rig display), and see with handcal rig compare what has changed"
     )
 

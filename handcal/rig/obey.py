@@ -155,7 +155,7 @@ def shares_seen(found: Mapping[Shown, tuple[Float64, int]]) -> dict[Probe, float
     if max(pixels) > _AREA_RATIO * min(pixels):
         raise UnseenError(
             "something other than the square moved or lit up, or the square left the picture; keep "
-            "the camera and everything before it still, and check again"
+            "the camera and everything in front of it still, and check again"
         )
     control = found["control"][0] - found["rest"][0]
     length = float(control @ control)

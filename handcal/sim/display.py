@@ -1,4 +1,4 @@
-"""A simulated headset before a viewpoint camera, whose compositor may undo what the app draws."""
+"""A simulated headset seen by a viewpoint camera; its compositor may undo what the app draws."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SimulatedDisplay(ViewpointCamera):
     Attributes
     ----------
     eye : eye
-        The eye before which the camera is.
+        The eye behind whose display the camera is.
     """
 
     name = "Simulated viewpoint camera"

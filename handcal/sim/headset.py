@@ -1,4 +1,4 @@
-"""The virtual headset: a process of its own that speaks the real datagrams.
+"""The virtual headset: a separate process that exchanges the real datagrams.
 
 It hosts the simulated wearer, shows what the PC sends, and reports poses and confirmations on its
 own clock, as a real headset does. The true poses go only to the simulated camera, as light. Without

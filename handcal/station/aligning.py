@@ -151,8 +151,8 @@ class Aligning:
         """Accept or refuse a confirmation; None while the pose of its time is not yet known."""
         if confirmation.problem:
             return Refused(
-                "The headset does not show what it should. Confirm again; if this is repeated, "
-                "restart the headset's app.",
+                "The headset does not show what it should. Confirm again; if this keeps "
+                "happening, restart the headset's app.",
                 "drawn otherwise",
             )
         try:
@@ -212,7 +212,7 @@ class Aligning:
             )
         if self._has_changed(shape):
             return Refused(
-                "Your hand has changed its shape since the cursor was made: "
+                "The shape of your hand has changed since the cursor was made: "
                 f"{change_text(shape, R_D_W)}. "
                 "Hold it as it was and confirm again, or make the cursor again.",
                 "shape changed",

@@ -107,7 +107,7 @@ class Evidence:
         return Contradiction(
             "late-camera",
             f"the camera's pictures arrive {1e3 * delay_s:.0f} ms after their exposure, more than "
-            f"{1e3 * limit_s:.0f} ms; end other programs, and connect the camera directly",
+            f"{1e3 * limit_s:.0f} ms; close other programs, and connect the camera directly",
         )
 
     def see_delivery(self, is_lost: bool) -> Contradiction | None:
@@ -136,7 +136,7 @@ class Evidence:
         return Contradiction(
             "other-world",
             f"the camera is {1e3 * apart_m:.0f} mm and {np.degrees(turn_rad):.0f}° from where the "
-            "headset's app and the rig file have it; let the app use the world of hl2ss, and "
+            "headset's app and the rig file place it; let the app use the world of hl2ss, and "
             "measure the camera's pose again (handcal rig make --factory)",
         )
 

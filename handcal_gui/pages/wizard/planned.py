@@ -64,7 +64,7 @@ class PlannedWizard(Wizard):
 
     @property
     def holds_plan(self) -> bool:
-        """True if the plan is to be held."""
+        """True if the plan should be held."""
         return self.is_held or self._free is not _FOLLOWS
 
     def step(self, snapshot: Snapshot) -> Step:

@@ -41,7 +41,7 @@ DISTANCE = tr("at forearm's length, 40 to 60 cm from the eyes")
 _LEAST_ALIGN_NS = 1_500_000_000
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _SHOWN_S, _STILL_S, _READ_S, _ADVICE_S = 0.6, 1.2, 1.5, 3.0
-"""Waiting times of steps that run by themselves: for the hand, and to read a text or an advice."""
+"""Waiting times of steps that run by themselves: for the hand, and to read a text or advice."""
 _MOST_BY_ITSELF = 2
 """Most further alignments of an eye that are begun without asking."""
 _SENDS_UNUSABLE = tr("Draws with a result that should not be used")

@@ -74,10 +74,10 @@ class WizardPanel(QWidget):
     hold_changed : Signal(bool)
         A person has chosen whether every step waits for a person.
     nudged : Signal(float, float, float)
-        The outline of a verification is to move to the right and down, in arcminutes, and to grow
+        The outline of a verification should move to the right and down, in arcminutes, and to grow
         by a share.
     went_back : Signal(str)
-        The headset is to draw with the φ before the newest, ``"former"``, or with the offline
+        The headset should draw with the φ before the newest, ``"former"``, or with the offline
         calibration, ``"offline"``.
     step_changed : Signal(Step)
         Another step is shown.

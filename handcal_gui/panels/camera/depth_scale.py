@@ -25,7 +25,7 @@ class DepthColors:
     Parameters
     ----------
     gate_m : (float, float)
-        Range of depths in which a hand is searched.
+        Range of depths in which a hand is looked for.
     """
 
     def __init__(self, gate_m: tuple[float, float]) -> None:

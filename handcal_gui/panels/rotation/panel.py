@@ -29,7 +29,7 @@ _HISTORY_LIMITS = 2.0
 _STRAIGHT_RAD = np.radians(2.0)
 """Rotations below this need no correction: hardly more than the guard's own error."""
 _SHAPE_M = 0.0015
-"""A smaller change of shape, rms, is not worth a word."""
+"""A smaller change of shape, rms, is not mentioned."""
 _NO_CURSOR = tr("The hand's rotation from the cursor will be shown here.")
 _TAKEN = tr("The alignment is confirmed.")
 _NO_HAND = tr("Hold the hand in view of the camera.")

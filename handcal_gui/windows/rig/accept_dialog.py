@@ -43,7 +43,7 @@ _TAKE = {"grid": tr("Take grid"), "board": tr("Take board")}
 
 
 class AcceptDialog(QDialog):
-    """Takes the images of an acceptance, and shows if the rig passes.
+    """Takes the images of an acceptance, and shows whether the rig passes.
 
     Parameters
     ----------
