@@ -1393,7 +1393,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Send the projections to the headset; {} keeps the offline calibration.</source>
+        <source>Send the projections to the headset, those of {} offline.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

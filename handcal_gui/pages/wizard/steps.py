@@ -41,7 +41,7 @@ DISTANCE = tr("at forearm's length, 40 to 60 cm from the eyes")
 _LEAST_ALIGN_NS = 1_500_000_000
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _SHOWN_S, _STILL_S, _READ_S, _ADVICE_S = 0.6, 1.2, 1.5, 3.0
-"""Waiting times of steps that run by themselves: for the hand, and to read a text or advice."""
+"""Waiting times of steps that run by themselves: for the hand, and to read a text or an advice."""
 _MOST_BY_ITSELF = 2
 """Most further alignments of an eye that are begun without asking."""
 _SENDS_UNUSABLE = tr("Draws with a result that should not be used")
@@ -274,9 +274,9 @@ class Wizard:
             instruction = tr("Keep the offline calibration of {}.").format(eye_names(kept))
             send = ButtonSpec(Action.APPLY, tr("Keep offline"))
         elif kept:
-            instruction = tr(
-                "Send the projections to the headset; {} keeps the offline calibration."
-            ).format(eye_names(kept))
+            instruction = tr("Send the projections to the headset, those of {} offline.").format(
+                eye_names(kept)
+            )
         return WizardView(
             Step.SOLVE,
             instruction,
