@@ -254,8 +254,9 @@ def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSet
     ):
         return Verdict(
             "keep",
-            f"the offline calibration has an expected error of only {gain.without_arcmin:.1f}′; "
-            f"this result, with {gain.after_arcmin:.1f}′, is only {sure} sure to be better",
+            f"the offline calibration is expected to err by only {gain.without_arcmin:.1f}′ here; "
+            f"this result, expected at {gain.after_arcmin:.1f}′, is only {sure} sure to be "
+            "better",
         )
     more = _further_text(advice, eye)
     now = f"expected error {gain.after_arcmin:.1f}′, {sure} sure to be better than none"
