@@ -93,7 +93,7 @@ def _mostly_covered() -> UInt8:
         (
             draw_board(CHECKERBOARD, SQUARE_PX),
             Board(kind="checkerboard", squares=(8, 7)),
-            "goes on|is seen, not one of 8×7",
+            "continues|is seen, not one of 8×7",
         ),
         (
             draw_board(CHECKERBOARD, SQUARE_PX),

@@ -57,7 +57,7 @@ def test_the_study_takes_its_wearers_errors_from_here(folder: Path) -> None:
         ("3/eye_positions.txt", None, "is missing"),
         ("3/eye_positions.txt", "1 2\n", "3 finite numbers in each line"),
         ("3/eye_positions.txt", "1 2 3\n", "two clusters"),
-        ("3/MarkerSPAAM_DataSPAAM2D.txt", "here there", "no table of numbers"),
+        ("3/MarkerSPAAM_DataSPAAM2D.txt", "here there", "not a table of numbers"),
         ("3/MarkerSPAAM_DataSPAAM3D.txt", "1 2 nan\n", "finite"),
         ("3/SPAAM_calibration.calib", "22 serialization", "Ubitrack"),
         ("3/SPAAM_calibration.calib", "1 2 3", "must end with 12"),
