@@ -161,7 +161,7 @@ def _bench_window(frames: int, rate_hz: int, progress: Progress) -> dict[str, An
         assert process.stdout is not None
         assert process.stderr is not None
         minutes = frames / rate_hz / 60
-        progress.at(0.0, f"{frames:,} frames, {minutes:.1f} minutes at {rate_hz} frames a second")
+        progress.at(0.0, f"{frames:,} frames, {minutes:.1f} minutes at {rate_hz} frames per second")
         for line in process.stderr:
             last = line.strip() or last
             if (seen := last.removeprefix("frames seen: ")) != last:

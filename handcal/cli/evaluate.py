@@ -40,7 +40,7 @@ from handcal.io.files import make_folder, require_suffix
         "--hand-height",
         type=number(float, 0.05, 1.0),
         metavar="SHARE",
-        help="show each photograph in a gray 640x480 image, with its first hand of this height",
+        help="show each photograph in a grey 640x480 image, with its first hand of this height",
     ),
     arg(
         "--glove",

@@ -1,4 +1,4 @@
-"""A session in a window of Open3D, which is a process of its own.
+"""A session in a window of Open3D, which runs in its own process.
 
 ``python -m handcal.export.window_3d`` is that process: it reads what to show from its standard
 input. An OpenGL driver that crashes ends this process only.

@@ -175,7 +175,7 @@ def letterbox(color: UInt8, pixels: int) -> tuple[UInt8, float]:
     Returns
     -------
     canvas : (H, W, 3) uint8
-        The rest is gray.
+        The rest is grey.
     scale : float
         Scale of the image in the canvas.
     """

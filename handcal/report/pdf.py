@@ -32,7 +32,7 @@ def write_pdf(path: Path, report: Report, progress: Progress) -> None:
     path : Path
     report : Report
     progress : Progress
-        Told the share done many times a second.
+        Reports the share done many times per second.
     """
     pages = compose(report, progress.part(0.0, 0.4))
     stream = _CheckedStream(progress, 0.4)

@@ -23,7 +23,7 @@ def write_report(
         Created if needed.
     report : Report
     progress : Progress
-        Told the share done many times a second.
+        Reports the share done many times per second.
 
     Returns
     -------

@@ -101,7 +101,7 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
         raise FileError(f"{len(files)} images are more than the {MAX_VIEWS} allowed")
     name, count = Counter(file.name for file in files).most_common(1)[0]
     if count > 1:
-        raise FileError(f"{count} images are called {name}; give each a name of its own")
+        raise FileError(f"{count} images are called {name}; give each a different name")
     return files
 
 

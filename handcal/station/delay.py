@@ -68,7 +68,7 @@ class DelaySettings:
     limit_s: float = 0.12
     limit_frames: float = 0.15
     """Largest time from the exposure to the earliest arrival: the sum of both. A busy computer,
-    with few frames a second, is late by a share of the time between two frames, at most 0.3 s of
+    with few frames per second, is late by a share of the time between two frames, at most 0.3 s of
     which counts."""
     assumed_sigma_s: float = 0.03
     """Standard deviation of a delay that is not measured."""

@@ -35,7 +35,7 @@ class Conditions:
     Attributes
     ----------
     is_slow : bool
-        True if too few frames a second are processed.
+        True if too few frames per second are processed.
     """
 
     def __init__(self, *, is_usb: bool = False, is_virtual: bool = False) -> None:

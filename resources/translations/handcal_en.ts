@@ -2602,7 +2602,7 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show clouds, residuals, eyes and displays in a 3D window of their own (needs Open3D)</source>
+        <source>Show clouds, residuals, eyes and displays in a separate 3D window (needs Open3D)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2671,7 +2671,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>φ of the {} has not been touched since its last trial at this distance. Press T again if this is a trial of its own.</source>
+        <source>φ of the {} has not been touched since its last trial at this distance. Press T again if this is a separate trial.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

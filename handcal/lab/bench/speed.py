@@ -111,7 +111,7 @@ def noisy_frames(T_D_hand: Float64, count: int) -> list[Frame]:
 
 
 def following_ms(detector: Detector, frame: Frame) -> float:
-    """Return the mean processor time per frame for tracking a hand at 30 frames a second.
+    """Return the mean processor time per frame for tracking a hand at 30 frames per second.
 
     The detector's checks of the hand are included, but not its detection.
 

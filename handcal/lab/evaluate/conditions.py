@@ -29,7 +29,7 @@ class Conditions:
     brightness: float = 1.0
     """Factor on the pixels' values."""
     hand_height: float | None = None
-    """Height of the first hand's box as a share of a gray 640x480 image around the photograph."""
+    """Height of the first hand's box as a share of a grey 640x480 image around the photograph."""
     glove: Glove | None = None
     """Colour given to everything in the hands' boxes that is not white, with its shading."""
 
@@ -76,7 +76,7 @@ def shown(photo: Photo, conditions: Conditions) -> Shown:
 
 
 def _at_height(image: UInt8, box: Float64, share: float) -> Shown:
-    """Scale an image until a box has a height, and place the box in the middle of a gray image."""
+    """Scale an image until a box has a height, and place the box in the middle of a grey image."""
     height, width = _SHAPE
     scale = float(share * height / (box[3] - box[1]))
     size = [max(1, round(scale * side)) for side in image.shape[1::-1]]

@@ -187,10 +187,7 @@ class SessionPanel(QWidget):
         self._open_folder.setToolTip(tr("Show the session's folder in the file manager"))
         self._open_folder.clicked.connect(self._show_folder)
         self._inspect.setToolTip(
-            tr(
-                "Show clouds, residuals, eyes and displays in a 3D window of their own "
-                "(needs Open3D)"
-            )
+            tr("Show clouds, residuals, eyes and displays in a separate 3D window (needs Open3D)")
         )
         self._inspect.clicked.connect(self.inspect_requested)
         self._export.setToolTip(tr("Write a report, tables and calibration files"))

@@ -49,7 +49,7 @@ _HOW = tr(
 
 _UNTOUCHED = tr(
     "φ of the {} has not been touched since its last trial at this distance. "
-    "Press T again if this is a trial of its own."
+    "Press T again if this is a separate trial."
 )
 _ZERO = tr(
     "φ of the {} is still the solved one: the error would be 0 px. "
