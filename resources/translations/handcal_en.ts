@@ -4481,7 +4481,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Drawn and seen corners</source>
+        <source>Drawn against seen</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
