@@ -4481,7 +4481,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Drawn against seen</source>
+        <source>Drawn and seen corners</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

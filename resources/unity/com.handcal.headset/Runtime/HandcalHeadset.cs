@@ -18,7 +18,7 @@ namespace Handcal
     [AddComponentMenu("handcal/handcal headset")]
     public sealed class HandcalHeadset : MonoBehaviour
     {
-        [Tooltip("The text under the PC's QR code (handcal pair). Empty: as paired before, or call Pair.")]
+        [Tooltip("The text under the PC's QR code (handcal pair). Empty: connect as paired before, or call Pair.")]
         public string invitation = "";
 
         [Tooltip("Name by which the PC calls this headset. Empty: the device's own.")]
@@ -174,7 +174,7 @@ namespace Handcal
             views = new RuntimeViews(eyes);
             Application.onBeforeRender += SendPose;
             if (invitation.Length > 0 && !Pair(invitation))
-                Warn("The invitation is not one of handcal: copy the whole text under the QR code.");
+                Warn("The invitation is not from handcal: copy the whole text under the QR code.");
             else if (link == null) Connect();
         }
 
