@@ -166,10 +166,12 @@ class DelayMeter:
         self._frames += 1
         if not is_known or self._frames % _EVERY_FRAME_KNOWN == 0:
             self._follow(frame)
+        self._read_poses()  # those of 5 s at once would take longer than the time between frames
         if frame.t_host_ns < self._next_ns:
             return False
         self._next_ns = frame.t_host_ns + (_EVERY_KNOWN_NS if is_known else _EVERY_NS)
-        times_ns, poses = self._read_poses()
+        times_ns = np.array([t_ns for t_ns, _ in self._poses], dtype=np.int64)
+        poses = np.array([T for _, T in self._poses]).reshape(-1, 4, 4)
         self._is_still = _is_still(poses)
         if self._is_still:  # its movement would show nothing, after 30 ms of searching
             return False
@@ -246,8 +248,8 @@ class DelayMeter:
             return False
         return True
 
-    def _read_poses(self) -> tuple[_Int64, Float64]:
-        """Return times (N,), host ns, and poses T_W_H (N, 4, 4) since the first frame kept."""
+    def _read_poses(self) -> None:
+        """Keep the poses since the first frame kept, and those since the last call."""
         first_ns = self._backgrounds[0].times_ns[0] if self._backgrounds else self._newest_ns
         earliest_ns = self._clock.earliest_ns
         begin_ns = first_ns + earliest_ns - round(1e9 * _LARGEST_S) - 2 * _REACH_NS
@@ -263,8 +265,6 @@ class DelayMeter:
             except PoseError:
                 pass
             self._next_pose_ns += _STEP_NS
-        times_ns = np.array([t_ns for t_ns, _ in self._poses], dtype=np.int64)
-        return times_ns, np.array([T for _, T in self._poses]).reshape(-1, 4, 4)
 
 
 def _movement(poses: Float64) -> Float64:
