@@ -53,7 +53,9 @@ class Stream:
     def see(self, rotation_rad: float) -> Snapshot:
         """Let a frame with a hand so rotated arrive, and poll until the next could."""
         self._number += 1
-        frame = replace(self._make().frame, t_host_ns=self._now_ns)
+        made = self._make()
+        assert made.frame is not None
+        frame = replace(made.frame, t_host_ns=self._now_ns)
         seen = {"rotation_rad": np.array([0.0, 0.0, rotation_rad])}
         self._newest = self._make(
             observation=seen, frame=frame, number=self._number, t_host_ns=self._now_ns
