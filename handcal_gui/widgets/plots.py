@@ -15,6 +15,7 @@ pg.setConfigOptions(antialias=True)
 
 _LINE_PX = 2
 _SYMBOL_PX = 6
+_LEGEND_COLUMNS = 9
 
 
 class Plot(QWidget):
@@ -61,8 +62,13 @@ class Plot(QWidget):
         return QSize(300, 200)
 
     def show_legend(self) -> None:
-        """Show a legend in the upper right corner, with each name once."""
-        self.item.addLegend(offset=(-1, 1))
+        """Show a legend in a row above the plot, with each name once."""
+        legend = pg.LegendItem(colCount=_LEGEND_COLUMNS, verSpacing=0)
+        legend.layout.setContentsMargins(0, 0, 0, 0)
+        legend.setParentItem(self.item)
+        legend.anchor((1, 0), (1, 0))
+        self.item.legend = legend
+        self.item.layout.setRowFixedHeight(0, self.fontMetrics().height() + SPACING_PX // 2)
         self._recolor()
 
     def add_line(

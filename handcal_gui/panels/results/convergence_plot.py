@@ -48,6 +48,6 @@ class ConvergencePlot(Plot):
         longest = max(map(len, histories), default=1)
         largest_mm = 1e3 * max((float(np.sqrt(max(one))) for one in histories), default=1e-3)
         self.item.setXRange(1, 1.1 * longest)  # with space for the numbers
-        self.item.setYRange(0.0, 1.4 * largest_mm)  # and for the legend
+        self.item.setYRange(0.0, 1.1 * largest_mm)
         spacing = max(1, longest // 5)
         self.item.getAxis("bottom").setTickSpacing(spacing, spacing)

@@ -52,7 +52,7 @@ class TrendPlot(Plot):
                 known = [np.nan if error is None else error for error in errors]
                 line[eye].setData(numbers, np.array(known, dtype=np.float64))
         count = max(len(entries), 2)
-        self.item.setXRange(0.8, count + 0.2 + 0.3 * count)  # the legend is at the right
+        self.item.setXRange(0.8, count + 0.2)
         self.item.getAxis("bottom").setTicks([[(number, f"{number:g}") for number in numbers]])
 
 
