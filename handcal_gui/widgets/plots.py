@@ -24,7 +24,9 @@ class Plot(QWidget):
     Parameters
     ----------
     name : str
-        For screen readers and, in lower case with dashes, as object name.
+        Object name, the same in every language.
+    label : str
+        For screen readers.
     x_label, y_label : str
         With their units.
     parent : QWidget or None
@@ -36,11 +38,11 @@ class Plot(QWidget):
     """
 
     def __init__(
-        self, name: str, x_label: str, y_label: str, parent: QWidget | None = None
+        self, name: str, label: str, x_label: str, y_label: str, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self.setObjectName(name.lower().replace(" ", "-"))
-        self.setAccessibleName(name)
+        self.setObjectName(name)
+        self.setAccessibleName(label)
         self._lines: list[tuple[pg.PlotDataItem, str, bool]] = []
         self._texts: list[pg.TextItem] = []
         self._view = pg.PlotWidget()
@@ -51,9 +53,9 @@ class Plot(QWidget):
         self.item.hideButtons()
         self.item.setContentsMargins(*4 * (SPACING_PX // 2,))
         self.item.setMouseEnabled(x=False, y=False)
-        for side, label in (("bottom", x_label), ("left", y_label)):
+        for side, axis_label in (("bottom", x_label), ("left", y_label)):
             self.item.getAxis(side).enableAutoSIPrefix(False)
-            self.item.setLabel(side, label)
+            self.item.setLabel(side, axis_label)
         vbox(self._view, on=self, margins=0)
         follow_theme(self, self._recolor)
 

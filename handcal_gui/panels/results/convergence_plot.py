@@ -18,7 +18,9 @@ class ConvergencePlot(Plot):
     """Shows the distance between hand and cursor by iteration, for each alignment and eye."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(tr("Convergence"), tr("Iteration"), tr("RMS distance (mm)"), parent)
+        super().__init__(
+            "convergence", tr("Convergence"), tr("Iteration"), tr("RMS distance (mm)"), parent
+        )
         self.setToolTip(
             tr(
                 "RMS distance between matched points of hand and cursor at each iteration\n"

@@ -25,7 +25,11 @@ class TrialPlot(Plot):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
-            tr("Errors of trials"), tr("Distance of the target (m)"), tr("Error (′)"), parent
+            "errors-of-trials",
+            tr("Errors of trials"),
+            tr("Distance of the target (m)"),
+            tr("Error (′)"),
+            parent,
         )
         self.item.getAxis("bottom").setTicks([[(m, f"{m:g}") for m in TARGET_DEPTHS_M]])
         self.item.setXRange(min(TARGET_DEPTHS_M) - _MARGIN_M, max(TARGET_DEPTHS_M) + _MARGIN_M)

@@ -21,7 +21,11 @@ class TrendPlot(Plot):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
-            tr("Trend"), tr("Calibration of this wearer, oldest first"), tr("Error (′)"), parent
+            "trend",
+            tr("Trend"),
+            tr("Calibration of this wearer, oldest first"),
+            tr("Error (′)"),
+            parent,
         )
         self.show_legend()
         self._measured = {
