@@ -88,7 +88,7 @@ class HeadsetIdentity:
     device_id: str
     """Identity of this one device, in hexadecimal; it never changes."""
     name: str = ""
-    """Name given by its owner, for people to read."""
+    """Name given by its owner, only for display."""
     runtime: str = ""
     app: str = ""
     """Name and version of the headset's runtime, and of the app that speaks the link."""
@@ -153,8 +153,8 @@ class Frame:
     T_C_D: Float64 = field(default_factory=lambda: np.eye(4))
     """(4, 4); from the depth camera to the colour camera; identity for depth aligned to colour."""
     T_W_D: Float64 | None = None
-    """(4, 4); the camera's pose at the exposure, if it is the headset's own and tells it; None: it
-    follows from the headset's pose, which the app tells on the link."""
+    """(4, 4); the camera's pose at the exposure, if it is the headset's own and reports it; None:
+    follows from the headset's pose, which the app sends over the link."""
 
     __repr__ = brief
 

@@ -1,4 +1,4 @@
-"""The menu Edit: undo, redo, copy and delete, each by the action of the panel that it concerns."""
+"""The Edit menu: undo, redo, copy and delete, each by the action of the panel that it concerns."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _OTHERS = {
 
 
 def add_edit_menu(window: MainWindow, find: Callable[[], object]) -> None:
-    """Fill the menu Edit of a window.
+    """Fill the Edit menu of a window.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The menu Help: the manual, examples, keys, licences, and what the program is."""
+"""The Help menu: the manual, examples, keys, licences, and what the program is."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from handcal_gui.windows.manual import Manual
 
 
 def add_help_menu(window: MainWindow, manual: Manual, support: Callable[[], object]) -> None:
-    """Fill the menu Help of a window.
+    """Fill the Help menu of a window.
 
     Parameters
     ----------

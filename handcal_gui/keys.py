@@ -19,7 +19,7 @@ _NOT_ACTIONS = {
         (tr("Tab"), tr("Move to the next button or field")),
     ),
     tr("Fine-tune"): (
-        (tr("Arrows, PgUp, PgDown"), tr("Move what the chosen eye sees, as the key points")),
+        (tr("Arrows, PgUp, PgDown"), tr("Move what the chosen eye sees in the key's direction")),
     ),
 }
 """Keys that widgets handle themselves, as their meaning depends on the focus."""

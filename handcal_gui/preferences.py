@@ -101,7 +101,7 @@ class PreferencesFile:
             version = data.pop("version", 1)
             data.pop("wearers", None)  # names of wearers are only in the sessions
             if type(version) is not int or version < 1:
-                raise FileError(f"preferences.version is a whole number, not {version!r:.40}")
+                raise FileError(f"preferences.version must be a whole number, not {version!r:.40}")
             said = ""
             if version > PREFERENCES_VERSION:
                 data, said = _known(Preferences, data), self._keep_newer()
@@ -130,8 +130,8 @@ class PreferencesFile:
         with suppress(OSError):
             shutil.copyfile(self.path, kept)
         return tr(
-            "The preferences are of a newer version of handcal. Settings that this one "
-            "does not know are left out; they are kept in {}."
+            "The preferences are from a newer version of handcal. Settings that this version "
+            "does not know are ignored; they are kept in {}."
         ).format(kept)
 
     def pairings(self) -> Pairings:
@@ -165,7 +165,7 @@ def _default_path() -> Path:
 
 
 def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
-    """Return preferences of version 1 with the names of today.
+    """Return preferences of version 1 with today's names.
 
     A lab's own limit of the expected error becomes its target. The solver's settings, which the
     program never offered to change, take their present defaults.

@@ -1,4 +1,4 @@
-"""A bridge: passes what a station's snapshots tell to another program, in a thread of its own."""
+"""A bridge: passes a station's snapshots on to another program, in its own thread."""
 
 from __future__ import annotations
 

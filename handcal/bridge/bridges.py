@@ -24,7 +24,7 @@ class BridgeSettings:
 
     def __post_init__(self) -> None:
         if not 0 < self.slicer_port < 65536:
-            raise ValueError(f"slicer_port is from 1 to 65535, not {self.slicer_port}")
+            raise ValueError(f"slicer_port must be from 1 to 65535, not {self.slicer_port}")
 
 
 @contextmanager

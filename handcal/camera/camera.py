@@ -16,7 +16,7 @@ class Camera(Protocol):
 
     name: str
     identity: CameraIdentity
-    """Device that gives the frames, or gave them to a recording; empty where it is not known."""
+    """Device that delivers the frames, or delivered them to a recording; empty if unknown."""
     depth_intrinsics: Intrinsics
 
     def read(self, timeout_s: float = 1.0) -> Frame:

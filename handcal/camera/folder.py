@@ -180,7 +180,7 @@ def _write_frames(folder: Path, frames: Iterable[Frame], is_posed: bool) -> int:
     """Write images in several threads, as compression takes longer than a frame lasts."""
     number = 0
     waiting: deque[tuple[Frame, Future[None]]] = deque()
-    # Without newline, Windows would end lines otherwise than they are read.
+    # Without newline, Windows would write line ends that are not those read.
     with (
         (folder / LIST).open("x", encoding="ascii", newline="\n") as file,
         ThreadPoolExecutor(_WRITERS) as pool,

@@ -14,9 +14,9 @@ The calibration is an array of float32: x, then y of every pixel's ray in the pl
 the transform from rig node to camera, 16; units per metre of distance; AHAT only: the distance at
 which the phase wraps, in units; then a map and a matrix that are not used here.
 
-The other answers are packets without end: time u64 (100 ns), size of the payload u32, payload, and
+The other answers are endless packets: time u64 (100 ns), size of the payload u32, payload, and
 the transform from rig node to world, 16 float32, all 0 if the headset does not know where it is.
-Transforms are for row vectors, in WinRT's axes (x right, y up, z back) but for the camera's, which
+Transforms are for row vectors, in WinRT's axes (x right, y up, z back) except the camera's, which
 are OpenCV's. The payload of AHAT is two u32, 0 and the size of the images, distance u16 and
 brightness u16 by rows, and a time u64; that of long throw is a PNG of 4 channels, whose bytes are
 the same two images, and a time u64.
@@ -247,7 +247,7 @@ def parse_packet(stream: Stream, data: bytes) -> Packet:
 
 
 def time_of(stream: Stream, data: bytes) -> int:
-    """Return the time of a packet on the headset's clock, ns; CameraError if it is none."""
+    """Return the time of a packet on the headset's clock, ns; CameraError if it is not one."""
     ticks = int(_HEADER.unpack_from(data)[0])
     if ticks * _TICK_NS >= 2**62:
         raise foreign(stream, "a time beyond all clocks")
@@ -260,7 +260,7 @@ def pose_of(stream: Stream, data: bytes) -> Float64 | None:
     Raises
     ------
     CameraError
-        If it is no pose.
+        If it is not a pose.
     """
     T_world_rig = np.frombuffer(data[-_POSE_BYTES:], "<f4").astype(np.float64).reshape(4, 4).T
     if not T_world_rig.any():

@@ -1,8 +1,8 @@
 """The front colour camera of a HoloLens 2 (PV), as hl2ss sends it without encoding.
 
-The client first sends, on a connection of its own, mode u8 = 7 (start) and the options of mixed
+The client first sends, on a separate connection, mode u8 = 7 (start) and the options of mixed
 reality capture: seven u8, opacity, width and height f32, two u32. All are 0: plain pictures. To
-end, it sends mode u8 = 11. The request is mode u8 = 1, width u16, height u16, pictures a second u8,
+end, it sends mode u8 = 11. The request is mode u8 = 1, width u16, height u16, images per second u8,
 divisor u8, profile u8 = 255 (raw), level u8 = 255, bit rate u32 = 0, number of options u8 = 0.
 
 The payload is NV12 with rows of a multiple of 64 bytes, and 80 bytes: focal lengths and principal

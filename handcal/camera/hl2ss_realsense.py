@@ -2,7 +2,7 @@
 
 Written from hl2ss's own sources (https://github.com/jdibenes/hl2ss), server and client, which call
 the streams Extended Video and Extended Depth. On the port of the first the client sends u8 = 2, and
-is sent a u32 and so many bytes of UTF-16: the list of cameras, in JSON. On the port of the second
+is sent a u32 and that many bytes of UTF-16: the list of cameras, in JSON. On the port of the second
 it selects a group, a source and a profile of that list, as the front colour camera is started with
 options of mixed reality capture (`handcal.camera.hl2ss_color`): opacity, width and height, three
 f32, are the three numbers. The request is mode u8 = 0 (without pose), divisor u8, depth profile
@@ -41,7 +41,7 @@ _LIST_S = 4.0
 _RATE_HZ = 15
 _MOST_PADDING_PX = 256
 _MM_M = 1e-3
-"""Unit of depth of a D400 as it is delivered, but for the D405; hl2ss does not tell it."""
+"""Unit of depth of a D400 as it is delivered, except the D405; hl2ss does not report it."""
 _OTHER_UNIT = "405"
 _WINDOWS_NAME = re.compile(r"RealSense\(TM\) Depth Camera (\d+\w?) Depth$", re.ASCII)
 
@@ -54,15 +54,15 @@ class DepthFormat(NamedTuple):
     group: int
     media: int
     divisor: int
-    """Every so many images are sent, so that 15 a second arrive."""
+    """One of this many images is sent, so that 15 per second arrive."""
 
 
 class HoloLens2RealSense(Closable):
     """Depth of a RealSense on the headset's own port, streamed by hl2ss; implements `Camera`.
 
-    hl2ss tells neither lens nor unit of depth: the lens and the size of the images are those of a
+    hl2ss reports neither lens nor unit of depth: the lens and the size of the images are those of a
     rig file, the unit is the millimetre of a D400 as delivered. There is no colour, as a rig file
-    does not hold its lens. Frames do not tell a pose: it follows from the app's and the rig's, as
+    does not hold its lens. Frames carry no pose: it follows from the app's and the rig's, as
     for a RealSense on the computer. Written from hl2ss's sources and tested on a server of its
     format; not yet run on a device.
 
@@ -123,7 +123,7 @@ def find_depth(listed: bytes, lens: Intrinsics) -> DepthFormat:
     Raises
     ------
     CameraError
-        If `listed` is no list of cameras, or has no such images.
+        If `listed` is not a list of cameras, or has no such images.
     """
     try:
         groups = json.loads(listed.decode("utf-16-le"))
@@ -155,7 +155,7 @@ def find_depth(listed: bytes, lens: Intrinsics) -> DepthFormat:
         )
     found = min(formats)[1]
     if _OTHER_UNIT in found.camera:
-        raise CameraError(f"{found.camera} measures in a unit that hl2ss does not tell")
+        raise CameraError(f"{found.camera} measures in a unit that hl2ss does not report")
     return found
 
 
@@ -175,7 +175,7 @@ def _formats(source: Any, lens: Intrinsics) -> list[tuple[int, float]]:
 
 
 def _identity_of(name: str) -> CameraIdentity:
-    """Return librealsense's name of the model, as far as that of Windows tells it."""
+    """Return librealsense's name of the model, as far as Windows' name contains it."""
     model = _WINDOWS_NAME.search(name)
     return CameraIdentity(f"Intel RealSense D{model[1].upper()}" if model else "")
 

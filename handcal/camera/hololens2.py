@@ -1,4 +1,4 @@
-"""Frames from a HoloLens 2's own depth camera, which tell its pose."""
+"""Frames from a HoloLens 2's own depth camera, which carry its pose."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def open_live(source: str) -> Camera:
     Raises
     ------
     CameraError
-        If it is not there, or its package is not installed.
+        If it is not connected, or its package is not installed.
     """
     if (hololens2 := hololens2_settings(source)) is not None:
         return open_hololens2(hololens2)

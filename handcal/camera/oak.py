@@ -41,7 +41,7 @@ class OakCamera(Closable):
     Raises
     ------
     CameraError
-        If library or camera is missing, in use, or gives no frame to tell its lens.
+        If library or camera is missing, in use, or delivers no frame with its lens.
     """
 
     def __init__(self, device_id: str = "") -> None:

@@ -92,7 +92,7 @@ class PinholeView:
 
 
 def _look(image: Float32, place: Float32, how: int = cv2.INTER_LINEAR) -> Float32:
-    """Return an image's values at places (h, w, 2), in pixels; its border goes on outside."""
+    """Return an image's values at places (h, w, 2), in pixels; its border continues outside."""
     maps = np.ascontiguousarray(place[..., 0]), np.ascontiguousarray(place[..., 1])
     return np.asarray(cv2.remap(image, *maps, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
 

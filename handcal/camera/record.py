@@ -24,7 +24,7 @@ class RecordSettings:
     """Limits of a recording."""
 
     duration_s: float = 60.0
-    """In camera time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB a minute."""
+    """In camera time; a raw pair of 1280x720 images takes 4.6 MB, 8 GB per minute."""
     frames: int = 100_000
     silent_s: float = 5.0
     """A camera that sends no frame for this time has ended."""

@@ -201,7 +201,7 @@ class RosCamera(PlayedCamera):
         return found[dst]
 
     def _play(self) -> Iterator[Frame]:
-        """Yield frames, each when the colour after it has come."""
+        """Yield frames, each once the colour after it has arrived."""
         topics = [one for one in (self._depth_topic, self._color_topic) if one is not None]
         waiting: list[Any] = []
         colors: list[Any] = []

@@ -48,7 +48,7 @@ def record_db3(
     CameraError
         If librealsense is not installed or cannot write the file.
     ValueError
-        If there is no frame, frames differ in camera or tell its pose, or `path` does not end in
+        If there is no frame, frames differ in camera or carry its pose, or `path` does not end in
         ``.db3``.
     """
     if path.suffix != ".db3":

@@ -11,7 +11,7 @@ Preset: TypeAlias = Literal["default", "hand", "high_accuracy", "high_density", 
 
 @dataclass(frozen=True, slots=True)
 class RealSenseSettings:
-    """Settings of a RealSense camera; None leaves an option as the device has it.
+    """Settings of a RealSense camera; None leaves an option as set on the device.
 
     Depth is never decimated, as its pixels would no longer match the rig's calibration.
     """
@@ -45,8 +45,8 @@ class HoloLens2Settings:
     port: int | None = None
     """Port of the stream; None for hl2ss's own."""
     divisor: int = 3
-    """Every so many images of the headset's own camera are sent: AHAT makes 45 a second, too many
-    for Wi-Fi."""
+    """One of this many images of the headset's own camera is sent: AHAT makes 45 per second, too
+    many for Wi-Fi."""
     has_color: bool = False
     """Send the pictures of the front colour camera, too, in place of the depth camera's grey."""
     color_port: int | None = None

@@ -54,7 +54,7 @@ from handcal.types import EYES
     json=True,
 )
 def accept(arguments: argparse.Namespace) -> None:
-    """Check a rig without a wearer, by a camera in the eye's place; exit code 1 if it fails."""
+    """Check a rig without a wearer, with a camera in the eye's place; exit code 1 if it fails."""
     from handcal.rig.acceptance import AcceptanceSettings, run_acceptance, view_rows
 
     settings = AcceptanceSettings(

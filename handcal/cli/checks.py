@@ -34,7 +34,7 @@ if TYPE_CHECKING:
         type=int,
         choices=(30, 60, 90),
         default=30,
-        help="with --gui: frames per second of the replayed camera (default: 30)",
+        help="with --gui: frames per second of the replayed camera",
     ),
     json=True,
 )
@@ -66,8 +66,8 @@ def bench(arguments: argparse.Namespace) -> None:
     arg(
         "--stamps",
         metavar="SOURCE",
-        help="with --headset and --rig: also find pose stamps that are not the time the pose is "
-        "for, by the depth camera (realsense); the wearer holds a hand still and turns the head",
+        help="with --headset and --rig: also measure with the depth camera (realsense) how far the "
+        "stamps of poses are off; the wearer holds a hand still and turns the head",
     ),
     arg(
         "--patience-s",

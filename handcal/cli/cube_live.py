@@ -115,7 +115,7 @@ def track(arguments: argparse.Namespace) -> None:
         default="network",
         help="a paired headset that connects; or a simulated one, with the simulator's wearer",
     ),
-    arg("--eyes", choices=("both", *EYES), default="both", help="eyes with a trial each"),
+    arg("--eyes", choices=("both", *EYES), default="both", help="eyes to record trials for"),
     *_CUBE,
     *REALSENSE_OPTIONS,
     json=True,

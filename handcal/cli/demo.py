@@ -55,16 +55,16 @@ class DemoSettings:
     """Number of alignments of the paper's plan; of each eye, if `eyes` is ``"each"``. The
     recommended plan decides by itself."""
     eyes: EyePlan = "both"
-    """One eye for a wearer who sees with one."""
+    """Only one for a wearer who sees with one eye."""
     verify: bool = True
     """True if each eye is verified at the end of the recommended plan."""
     former: str = ""
-    """Path of a stored session with whose φ to begin; empty: the offline calibration."""
+    """Path of a stored session whose φ to start from; empty: the offline calibration."""
     slipped: bool = False
-    """True if the headset sits otherwise than in the session `former`, by a movement drawn from the
+    """True if the headset has slipped since the session `former`, by a movement drawn from the
     seed."""
     side: Side | None = None
-    """The hand that is raised; None: as the seed has it."""
+    """The hand that is raised; None: drawn from the seed."""
     loss: float = 0.0
     reorder: float = 0.0
     """Share of the link's datagrams lost, and reordered, in each direction."""
@@ -169,7 +169,7 @@ def run_demo(
 
 
 class ContradictedError(HandcalError):
-    """Evidence that forbids to go on."""
+    """Evidence that ends the calibration."""
 
     def __init__(self, contradiction: Contradiction) -> None:
         super().__init__(contradiction.text)
@@ -228,7 +228,7 @@ def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
     try:
         return EyeDistance(true_m + error * _RULER_SIGMA_M)
     except ValueError as problem:
-        raise HandcalError(f"the worn rig is not of a person: {problem}") from problem
+        raise HandcalError(f"the worn rig does not fit a person: {problem}") from problem
 
 
 def _is_automatic(settings: DemoSettings) -> bool:

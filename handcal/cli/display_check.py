@@ -32,7 +32,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
         "--headset",
         choices=("network", "virtual"),
         default="network",
-        help="a paired headset that connects; or a simulated one before a simulated camera",
+        help="a paired headset that connects; or a simulated one in front of a simulated camera",
     ),
     arg(
         "--viewpoint",
@@ -63,7 +63,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
     KEYS,
 )
 def obey(arguments: argparse.Namespace) -> None:
-    """Check that a connected headset draws what it is sent, and put that into a rig file."""
+    """Check that a connected headset draws what it is sent, and store the check in a rig file."""
     from handcal.rig.report import display_finding
     from handcal.rig.rig_file import read_rig, write_rig
     from handcal.station.display_check import run_display_check

@@ -99,15 +99,15 @@ _RIG: Mapping[str, Entry] = {
         "rig_displays",
     ),
     "make": Entry(
-        "Write the depth camera's pose, by stereo calibration or the factory, into a rig file.",
+        "Write the depth camera's pose, from stereo calibration or the factory, into a rig file.",
         "rig_files",
     ),
     "depth": Entry(
-        "Check the depth camera against a board at several distances, and put it into a rig file.",
+        "Check the depth camera against a board at several distances, and store it in a rig file.",
         "rig_files",
     ),
     "obey": Entry(
-        "Check that a connected headset draws what it is sent, and put that into a rig file.",
+        "Check that a connected headset draws what it is sent, and store the check in a rig file.",
         "display_check",
     ),
     "check": Entry(
@@ -117,7 +117,7 @@ _RIG: Mapping[str, Entry] = {
         "Compare two rig files, and show how far apart they draw a target.", "rig_files"
     ),
     "accept": Entry(
-        "Check a rig without a wearer, by a camera in the eye's place; exit code 1 if it fails.",
+        "Check a rig without a wearer, with a camera in the eye's place; exit code 1 if it fails.",
         "accept",
     ),
     "simulate": Entry(
@@ -125,14 +125,14 @@ _RIG: Mapping[str, Entry] = {
         "accept",
     ),
     "migrate": Entry(
-        "Convert a rig file of any known version to the newest, and list what it does not say.",
+        "Convert a rig file of any known version to the newest, and list what it leaves open.",
         "rig_files",
     ),
 }
 
 _SESSION: Mapping[str, Entry] = {
     "check": Entry(
-        "Check every part of a session; exit code 1 if any is damaged, 2 if it is no session.",
+        "Check every part of a session; exit code 1 if any is damaged, 2 if it is not a session.",
         "sessions",
     ),
     "repair": Entry("Copy what is sound of a damaged session into a new one.", "sessions"),

@@ -75,7 +75,7 @@ RIG_AND_OUTPUT = (
     *RIG_AND_OUTPUT,
 )
 def make(arguments: argparse.Namespace) -> None:
-    """Write the depth camera's pose, by stereo calibration or the factory, into a rig file."""
+    """Write the depth camera's pose, from stereo calibration or the factory, into a rig file."""
     from handcal.rig.assemble import with_stereo
     from handcal.rig.formats import read_stereo
     from handcal.rig.steps import identity_in, intrinsics_in, pose_in
@@ -136,7 +136,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     *REALSENSE_OPTIONS,
 )
 def depth(arguments: argparse.Namespace) -> None:
-    """Check the depth camera against a board at several distances, and put it into a rig file."""
+    """Check the depth camera against a board at several distances, and store it in a rig file."""
     import numpy as np
 
     from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
@@ -217,7 +217,7 @@ def compare(arguments: argparse.Namespace) -> None:
     *REALSENSE_OPTIONS,
 )
 def migrate(arguments: argparse.Namespace) -> None:
-    """Convert a rig file of any known version to the newest, and list what it does not say."""
+    """Convert a rig file of any known version to the newest, and list what it leaves open."""
     from handcal.rig.report import missing_parts
 
     rig = rig_or_example(arguments.input)
@@ -232,7 +232,7 @@ def _with_identity(rig: Rig, arguments: argparse.Namespace) -> Rig:
     """Return the rig with the identity of its depth camera; HandcalError if it is another one."""
     with open_source(arguments.camera, realsense_of(arguments)) as camera:
         if not camera.identity.serial_number:
-            raise HandcalError(f"{camera.name} does not tell its serial number; use another source")
+            raise HandcalError(f"{camera.name} reports no serial number; use another source")
         _require_own(rig, camera)
         return replace(rig, depth_camera=camera.identity)
 

@@ -68,8 +68,8 @@ _SHARE = number(float, 0.0, 1.0)
         "--plan",
         choices=("paper", "recommended"),
         default="paper",
-        help="alignments to make: as many as --alignments says, where the hand is; or those that "
-        "tell most, and a verification of each eye",
+        help="paper: as many alignments as --alignments says, with the hand where it is held; "
+        "recommended: the most informative alignments, then a verification of each eye",
     ),
     *ALIGNMENT_OPTIONS,
     arg("--wearer", default="", metavar="NAME", help="name or code of the wearer"),
@@ -90,8 +90,20 @@ _SHARE = number(float, 0.0, 1.0)
         help="longest time for the wearer and the headset to do one step",
     ),
     arg("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of the simulated wearer"),
-    arg("--loss", type=_SHARE, metavar="P", default=0.0, help="virtual headset: datagrams lost"),
-    arg("--reorder", type=_SHARE, metavar="P", default=0.0, help="virtual headset: and reordered"),
+    arg(
+        "--loss",
+        type=_SHARE,
+        metavar="P",
+        default=0.0,
+        help="virtual headset: share of datagrams lost",
+    ),
+    arg(
+        "--reorder",
+        type=_SHARE,
+        metavar="P",
+        default=0.0,
+        help="virtual headset: share of datagrams reordered",
+    ),
     arg(
         "--slicer",
         nargs="?",

@@ -1,4 +1,4 @@
-"""A segmented hand as files for people and other programs."""
+"""A segmented hand as pictures and as files for other programs."""
 
 from __future__ import annotations
 

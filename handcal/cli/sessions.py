@@ -123,13 +123,13 @@ def export(arguments: argparse.Namespace) -> None:
 
 @command(arg("session", type=Path, help="session folder"), json=True)
 def check(arguments: argparse.Namespace) -> None:
-    """Check every part of a session; exit code 1 if any is damaged, 2 if it is no session."""
+    """Check every part of a session; exit code 1 if any is damaged, 2 if it is not a session."""
     from handcal.session.repair import check_session
 
     found = check_session(arguments.session)
     save(arguments.json, asdict(found))
     for damage in found.damaged:
-        # That it is no session names its folder itself.
+        # The message that it is not a session names its folder itself.
         console.print(damage.what if found.state == "none" else str(damage), markup=False)
     if found.state == "sound":
         console.print("The session is sound.")
@@ -168,7 +168,7 @@ def _say_what_is_left_out(record: SessionRecord) -> None:
         "--alignment",
         type=number(int, 1, 1000),
         metavar="N",
-        help="the alignment to begin with (default: the last)",
+        help="the alignment shown first (default: the last)",
     ),
     arg(
         "--picture",

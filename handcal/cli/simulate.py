@@ -21,7 +21,7 @@ _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
 _RIG = arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)")
 _HAND = arg(
-    "--hand", choices=("left", "right"), help="the raised hand (default: as the seed has it)"
+    "--hand", choices=("left", "right"), help="the raised hand (default: drawn from the seed)"
 )
 _LINK = (
     arg("--loss", type=_SHARE, metavar="P", default=0.0, help="share of datagrams lost"),
@@ -62,12 +62,12 @@ _LINK = (
         dest="former",
         type=Path,
         metavar="SESSION",
-        help="begin with a stored session of the same seed: verify it, go on from there if needed",
+        help="start from a stored session of the same seed: verify it, and align again if needed",
     ),
     arg(
         "--slipped",
         action="store_true",
-        help="with --from: the headset sits otherwise than in that session",
+        help="with --from: the headset has slipped since that session",
     ),
     _HAND,
     *_LINK,
@@ -226,7 +226,7 @@ def _say_contradictions(result: dict[str, Any]) -> None:
         nargs=3,
         metavar=("X", "Y", "Z"),
         default=(0.0, 0.0, 0.0),
-        help="movement of the headset since the seed's eyes were drawn (default: none)",
+        help="movement of the headset on the head, from the seed's position",
     ),
     _HAND,
     arg(

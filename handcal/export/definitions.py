@@ -2,25 +2,25 @@
 
 DEFINITIONS = {
     "φ = (φ₁, φ₂, φ₃)": (
-        "Where the wearer's eye is, from where the viewpoint camera of the offline calibration "
-        "was: to the right, down and forward, along the axes of E."
+        "Position of the wearer's eye relative to the viewpoint camera of the offline calibration: "
+        "right, down and forward, along the axes of E."
     ),
     "± σ": (
         "One standard deviation, from the covariance's diagonal. For the method “consistent” it "
-        "covers the registration, and fused also how exactly people align. For each alignment by "
+        "covers the registration and, if fused, how precisely people align. For an alignment by "
         "another method it is plain least squares with independent pairs, which is optimistic."
     ),
     "fused": (
-        "All alignments together, weighed by their covariances, with what is known before: the "
-        "size of the eye box, and how far the φ of two eyes differ."
+        "All alignments combined, weighted by their covariances, with the prior: the size of the "
+        "eye box, and how far the φ of the two eyes differ."
     ),
     "final, applied": (
-        "The final φ is the one tuned by hand where there is one, else the solved one. It is "
-        "applied if the headset acknowledged it and rendered with it in the end."
+        "The final φ is the one tuned by hand if there is one, else the solved one. It is applied "
+        "if the headset acknowledged it and rendered with it at the end."
     ),
     "expected error": (
-        "What φ's covariance leads to in the display: root mean square at the corners of an 8 cm "
-        "square straight ahead at half a metre, in arcminutes (′, a sixtieth of a degree)."
+        "Error in the display that φ's covariance predicts: root mean square at the corners of an "
+        "8 cm square straight ahead at half a metre, in arcminutes (′, a sixtieth of a degree)."
     ),
     "error in depth": (
         "Distance along the viewing direction by which an object at 0.5 m must move to cover its "
@@ -35,7 +35,7 @@ DEFINITIONS = {
         "Share of the hand's points whose partner is near, and not beside a cut edge such as the "
         "forearm's."
     ),
-    "rotation": "By how much the hand was turned against the cursor at the confirmation.",
+    "rotation": "Angle between the hand and the cursor at the confirmation.",
     "reprojection error": (
         "In the user test: distance in the display between a corner of the target drawn with the "
         "calibrated φ and with the φ that was adjusted by hand until the drawn target covered the "
@@ -51,6 +51,6 @@ DEFINITIONS = {
         "Hu, Rodriguez y Baena, Cutolo: Rotation-constrained optical see-through headset "
         "calibration with bare-hand alignment. ISMAR 2021. “paper” is its solver as published; "
         "“linear” the same model with all equations of each pair; “consistent” the exact model, "
-        "robust to cut edges and a turned hand; “icp” the rigid baseline."
+        "robust to cut edges and a rotated hand; “icp” the rigid baseline."
     ),
 }

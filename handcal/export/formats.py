@@ -37,7 +37,7 @@ FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
         "zip": FormatInfo("Whole session (ZIP)", ("session.zip",)),
     }
 )
-"""The formats of an export that names none."""
+"""The formats of an export if none are named."""
 
 TOOL_FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
     {

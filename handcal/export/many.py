@@ -1,4 +1,4 @@
-"""Export of several sessions, each into a folder of its own."""
+"""Export of several sessions, each into its own folder."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _ORIGINS: Mapping[ShiftOrigin, str] = {
 }
 _VERDICTS: Mapping[VerdictName, str] = {
     "accept": "accepted",
-    "repeat": "to be aligned again",
+    "repeat": "must be aligned again",
     "keep": "offline calibration kept",
     "implausible": "implausible",
     "contradicted": "contradicted",
@@ -230,7 +230,7 @@ def _shift_plots(outcome: SessionOutcome, results: Results) -> Section:
         [
             Figure(
                 "shifts",
-                "Bars are ± σ. Tuned: set by hand, hollow, where there is one.",
+                "Bars are ± σ. Hollow: set by hand, if there is one.",
                 lambda axes: figures.draw_shifts(axes, outcome, results),
                 rows,
                 height_mm=58.0,
@@ -278,7 +278,7 @@ def _residuals(outcome: SessionOutcome, results: Results) -> Section:
                 ax.remove()
 
     items: list[Item] = [
-        "The hand as the eye faces it, in E, mm; colour: mean residual in cells of "
+        "The hand as seen from the eye, in E, mm; colour: mean residual in cells of "
         f"{figures.CELL_MM:g} mm; grey: only outliers, or points that belong to a cut edge."
     ]
     for number, alignment in record.alignments.items():

@@ -69,7 +69,7 @@ def inspect_session(
     ----------
     outcome : SessionOutcome
     number : int, optional
-        The alignment to begin with; by default the last.
+        The alignment shown first; by default the last.
     picture : Path, optional
         A .png file to write instead of opening a window; needs no display.
     progress : Progress

@@ -21,8 +21,8 @@ _IN_BOX_MIN = 0.3  # least share of the hand within its box, which covers at lea
 class HandFinder:
     """Segments the hand in each frame of a camera.
 
-    The hand is the one that the detector sees, or none. Without a detector or without colour, it is
-    the nearest hand-sized object in the depth image.
+    The hand is the one that the detector finds, or none. Without a detector or without colour, it
+    is the nearest hand-sized object in the depth image.
 
     Parameters
     ----------

@@ -153,7 +153,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
                 _check_arm(located, within[place])
     if found is None and box is not None:
         raise HandError(
-            "what the detector sees as a hand has not the shape of one in the depth image; "
+            "what the detector takes for a hand is not shaped like one in the depth image; "
             "show the whole bare hand, clear of other things"
         )
     if found is None:
@@ -180,8 +180,8 @@ def _check_arm(located: LocatedHand, within: Float32) -> None:
     arm, hand = (float(within[part].sum()) for part in (located.arm, located.hand))
     if arm > _ARM_IN_BOX_MAX * (arm + hand):
         raise HandError(
-            "the wrist cannot be told in the depth image; turn the palm or the back of the hand to "
-            "the camera"
+            "the wrist cannot be found in the depth image; turn the palm or the back of the hand "
+            "to the camera"
         )
 
 

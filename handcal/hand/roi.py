@@ -46,7 +46,7 @@ class RoiSettings:
     check_margin: float = 0.5
     """Margin of that check around the hand's box, as a multiple of its longer side."""
     check_pixels: int = 25_600
-    """Pixels of that check: few, because it is repeated all the time."""
+    """Pixels of that check: few, because it is repeated often."""
     search_s: float = 0.06
     """Time between searches of the whole image while no hand is tracked."""
     choose_s: float = 1.0
@@ -184,7 +184,7 @@ class RoiFinder:
         return hands
 
     def _problem(self, track: _Track, color_box: Float64, cloud: _CoarseCloud) -> str:
-        """Return why the content of a box has not a hand's size or does not fill the box."""
+        """Return why the content of a box is not of a hand's size or does not fill the box."""
         settings = self._settings
         side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
         side_m = float(side_px * track.depth_m / cloud.camera.fx)

@@ -61,7 +61,7 @@ class ProcedureStudySettings:
     variants: tuple[str, ...] = ("plain",)
     """Of people, as in `handcal.sim.people`."""
     scales: tuple[float, ...] = (1.33,)
-    """Errors of the wearers, in those of the simulator's usual wearer."""
+    """Errors of the wearers, as multiples of the simulator's usual wearer's."""
     eye_distance: Literal["none", "ruler", "headset"] = "none"
     """Source of the wearer's eye distance."""
     prior: Literal["none", "learned"] = "none"

@@ -52,13 +52,13 @@ class HeadsetState:
     projections: Mapping[Eye, Projection] = field(default_factory=dict)
     """The projection of each eye, once the PC has sent it; all of one wearer and rig."""
     is_offline: bool = False
-    """True while the offline calibration is to be drawn with."""
+    """True while the headset should draw with the offline calibration."""
     target: Target | None = None
     """The user test's target; None if not shown."""
     shape: Shape | None = None
     """The shape fixed in the world; None if not shown."""
     verify: VerifyRequest | None = None
-    """The eye whose drawing the wearer is to move; None if there is none."""
+    """The eye whose drawing the wearer should move; None if there is none."""
     cursor_message: pb.Cursor | None = None
     """The message by which the cursor came."""
 
@@ -207,7 +207,7 @@ class HeadsetClient(Endpoint):
     def nudge(
         self, t_headset_ns: int, state: HeadsetState, moved: NudgeSum, fits: bool = False
     ) -> Outgoing:
-        """Tell reliably how far the wearer has moved the drawing since `state.verify` began.
+        """Send reliably how far the wearer has moved the drawing since `state.verify` began.
 
         Raises
         ------

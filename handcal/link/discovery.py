@@ -55,7 +55,7 @@ class Announcement(Closable):
             raise LinkError(f"cannot announce this PC on the local network: {error}") from error
 
     def close(self) -> None:
-        """Take the announcement back; safe to call twice."""
+        """Withdraw the announcement; safe to call twice."""
         self._zeroconf.close()
 
 

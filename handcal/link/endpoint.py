@@ -123,7 +123,7 @@ class Endpoint(Closable):
         self._transport.close()
 
     def _silence(self, timeout_s: float) -> str:
-        """Return the message for a connection that did not come about."""
+        """Return the message for a connection that failed."""
         return (
             f"no device with this pairing key answered within {timeout_s:g} s; "
             "check the address, the key and the firewall"

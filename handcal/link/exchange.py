@@ -1,8 +1,8 @@
 """Agreement on a pairing key by a few digits (SPEKE: IEEE 1363.2, ISO/IEC 11770-4).
 
 Both ends raise the same secret generator, derived from the digits, to a random power modulo the
-2,048-bit prime of RFC 3526. Who overhears or takes part without the digits learns nothing by which
-to try digits afterwards: every guess costs one attempt with the PC, which allows only a few.
+2,048-bit prime of RFC 3526. Without the digits, neither listening nor taking part helps to try
+digits afterwards: every guess costs one attempt with the PC, which allows only a few.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ DIGITS = 8
 MAX_ATTEMPTS = 5
 """Attempts that are answered; one of them succeeds by chance with 5 in 10⁸."""
 PUBLIC_KEYS = wire.Keys(to_headset=b"handcal pair to headset", to_pc=b"handcal pair to pc")
-"""Keys of the datagrams, known to everyone: they only tell that a datagram is whole."""
+"""Keys of the datagrams, known to everyone: they only show that a datagram is intact."""
 PROOF_BYTES = 16
 PRIME = int(
     "FFFFFFFFFFFFFFFFC90FDAA22168C234C4C6628B80DC1CD129024E088A67CC74"
@@ -50,7 +50,7 @@ class Agreed:
     key: str
     """The pairing key: 48 hexadecimal digits, as text."""
     proof: bytes
-    """The PC sends it, so that the headset knows a wrong code at once."""
+    """The PC sends it, so that the headset notices a wrong code at once."""
 
 
 def new_digits() -> str:
@@ -87,7 +87,7 @@ def agree(
     Raises
     ------
     MalformedError
-        If the other's public value is none.
+        If the other's public value is invalid.
     """
     other = headset_value if is_pc else pc_value
     if len(other) != VALUE_BYTES or not 1 < (value := int.from_bytes(other, "big")) < PRIME - 1:
@@ -127,7 +127,7 @@ class Exchange:
         Raises
         ------
         MalformedError
-            If the datagram is whole, but asks for no pairing.
+            If the datagram is intact, but does not ask to pair.
         """
         if now_s > self._until_s or not wire.is_authentic(PUBLIC_KEYS.to_pc, datagram):
             return Rejection.UNPAIRED

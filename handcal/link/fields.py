@@ -37,7 +37,7 @@ def flat(T: Float64) -> list[float]:
 
 
 def read_numbers(values: Sequence[float], count: int) -> Float64:
-    """Read so many finite numbers, (count,)."""
+    """Read this many finite numbers, (count,)."""
     numbers = np.array(values, dtype=np.float64)
     if len(numbers) != count or not np.isfinite(numbers).all():
         raise MalformedError(f"expected {count} finite numbers")

@@ -2,7 +2,7 @@
 
 A stranger costs no memory: the first hello is answered with a cookie, a MAC over the sender's
 address and the time in periods of two minutes (as WireGuard's cookie and QUIC's Retry). Only a
-hello that returns the cookie is passed on. A hello is heard once: its time must be greater than
+hello that returns the cookie is passed on. A hello is accepted once: its time must be greater than
 that of every earlier one of its device.
 """
 
@@ -56,7 +56,7 @@ class _Heard:
 
 
 class Limiter:
-    """Allows something at most `rate_hz` times a second, one second's worth at once."""
+    """Allows something at most `rate_hz` times per second, one second's worth at once."""
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
@@ -75,7 +75,7 @@ class Limiter:
 
 
 class Reception:
-    """Hears hellos, and admits the devices of a list of pairings.
+    """Receives hellos, and admits the devices of a list of pairings.
 
     Attributes
     ----------
@@ -95,19 +95,19 @@ class Reception:
         self._unbound: list[Pairing] = []
 
     def has_dropped(self, datagram: bytes, address: Address) -> bool:
-        """Return whether a datagram was dropped before; replays in masses cost almost nothing."""
+        """Return whether a datagram was dropped before; mass replays cost almost nothing."""
         mac = datagram[-wire.MAC_BYTES :]
         return mac in self._dropped or (mac, address) in self._dropped
 
     def hear(
         self, packet: Packet, datagram: bytes, address: Address, now_s: float
     ) -> Caller | bytes | Rejection:
-        """Return who calls, or the datagram to answer with, or the reason for no answer.
+        """Return the device, or the datagram to answer with, or the reason for no answer.
 
         Raises
         ------
         MalformedError
-            If the datagram is authentic, but no hello.
+            If the datagram is authentic, but not a hello.
         """
         device = packet.sequence
         found = self._find(device, datagram, now_s)

@@ -40,23 +40,23 @@ class Invitation:
     def text(self) -> str:
         """The text of the QR code, as ``HANDCAL://192.168.1.20:47800/ABCDEFGHIJKLMNOPQRSTUVWXYZ``.
 
-        In capitals, which a QR code holds in less space.
+        It is in capitals, which take less space in a QR code.
         """
         host = self.host.partition("%")[0].upper()
         return f"HANDCAL://{f'[{host}]' if ':' in host else host}:{self.port}/{self.code}"
 
 
 def read_invitation(text: str) -> Invitation:
-    """Return the invitation in a text, scanned or typed; capitals do not matter.
+    """Return the invitation in a text, scanned or typed, in upper or lower case.
 
     Raises
     ------
     LinkError
-        If it is none.
+        If it is not an invitation.
     """
     found = _TEXT.fullmatch(text.strip().upper())
     if found is None or not 0 < int(found["port"]) < 65536:
-        raise LinkError("this is no invitation of handcal; scan the QR code of handcal pair")
+        raise LinkError("this is not an invitation from handcal; scan the QR code of handcal pair")
     return Invitation((found["ipv6"] or found["host"]).lower(), int(found["port"]), found["code"])
 
 

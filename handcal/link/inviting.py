@@ -31,7 +31,7 @@ def run_pairing(
     Parameters
     ----------
     bind : (host, port)
-        Address on which to listen; the station's own, so that the headset need not be told another.
+        Address on which to listen; the station's own, so that the headset can keep using it.
     pairings : Pairings
     show : callable
         Called with the invitation, to show it.
@@ -57,7 +57,7 @@ def run_pairing(
         try:
             stack.enter_context(Announcement((invitation.host, invitation.port)))
         except LinkError as error:
-            _LOG.warning("%s; the headset has to be told the address", error)
+            _LOG.warning("%s; type the address into the headset", error)
         start_s = time.monotonic()
         while (waited_s := time.monotonic() - start_s) < timeout_s:
             progress.at(waited_s / timeout_s, "Waiting for the headset")

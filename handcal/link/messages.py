@@ -1,6 +1,6 @@
 """Conversion between messages of the schema and arrays; incoming messages are checked.
 
-The size of incoming messages is bounded by the datagrams, but their content may be nonsense: every
+The size of incoming messages is bounded by the datagrams, but their content may be anything: every
 reader raises `MalformedError` for it.
 """
 

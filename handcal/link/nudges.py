@@ -1,8 +1,7 @@
 """Messages of a verification: the eye that is verified, and the wearer's nudges.
 
-The wearer moves what one eye draws until the hand's outline covers the hand. A nudge tells all of
-the movement since the verification and the link's session began, so that the newest message is
-enough.
+The wearer moves what one eye draws until the hand's outline covers the hand. A nudge holds all
+movement since the verification and the link's session began, so that the newest message is enough.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ MAX_NUDGE_SIZE = 0.3
 
 @dataclass(frozen=True, slots=True)
 class VerifyRequest:
-    """The eye whose drawing the wearer is to move."""
+    """The eye whose drawing the wearer should move."""
 
     verify_id: int
-    """Another one for each verification; not 0."""
+    """Different for each verification; not 0."""
     eye: Eye
     step_arcmin: float = 1.0
     step_size: float = 0.002

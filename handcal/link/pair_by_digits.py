@@ -30,7 +30,7 @@ def pair_by_digits(
     LinkError
         If no PC answers, the digits are wrong, or the PC takes no more attempts.
     ValueError
-        If there are not 8 digits, or the identity is none.
+        If there are not 8 digits, or the identity is invalid.
     """
     digits = exchange.read_digits(digits)
     device = device_number(device_id)
@@ -49,7 +49,7 @@ def pair_by_digits(
                     continue
                 if answer.refused.nonce == nonce:
                     raise LinkError(
-                        "the PC takes no more codes after too many wrong ones; let it show another"
+                        "the PC takes no more codes after too many wrong ones; show a new one on it"
                     )
                 if answer.paired.nonce == nonce:
                     key = exchange.finish(answer.paired, device, nonce, value, secret)

@@ -90,7 +90,7 @@ class Pairing:
     device_id: str = ""
     """Empty until a device connects with this key; then it belongs to that device."""
     name: str = ""
-    """The device's name when it connected first."""
+    """The device's name when it first connected."""
 
     def __post_init__(self) -> None:
         count = len(self.key.encode())
@@ -131,7 +131,7 @@ class Pairings:
 
     @classmethod
     def read(cls, path: Path) -> Pairings:
-        """Read a file: JSON, or a bare key as version 1 wrote it. A missing one is no pairing.
+        """Read a file: JSON, or a bare key as version 1 wrote it. A missing file means no pairing.
 
         Raises
         ------
@@ -212,7 +212,7 @@ class Pairings:
             self._change(edit)
 
     def rename(self, device_id: str, name: str) -> None:
-        """Give a device another name, for people to read.
+        """Give a device another name, which is only for display.
 
         Raises
         ------

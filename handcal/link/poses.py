@@ -13,7 +13,7 @@ from handcal.types import Float64
 
 SLOW_M = 0.005
 SLOW_RAD = 0.01
-"""A head that has moved and turned less than this across a gap is slow."""
+"""A head that has moved and rotated less than this across a gap is slow."""
 
 
 class PoseBuffer:

@@ -167,7 +167,7 @@ class Sender(Endpoint):
             self._outbox.restart(time.monotonic())
 
     def _difference(self, digest: bytes) -> str:
-        """Return the difference of what a headset has drawn from what it was sent, or nothing."""
+        """Return how a headset's drawing differs from what it was sent; empty if it does not."""
         drawn = drawn_projections(self._projections, self._is_offline)
         if digest == drawn_digest(drawn, self._cursor):
             return ""

@@ -53,7 +53,7 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nudge:
-    """The wearer's movement of what an eye draws, in all since the verification began."""
+    """The wearer's total movement of what an eye draws since the verification began."""
 
     verify_id: int
     moved: NudgeSum

@@ -1,4 +1,4 @@
-"""Shapes that the headset draws beside the hand."""
+"""Shapes that the headset draws besides the hand."""
 
 from __future__ import annotations
 

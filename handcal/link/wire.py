@@ -150,7 +150,7 @@ def seal(key: bytes, packet: Packet) -> bytes:
 def read(datagram: bytes) -> Packet | Rejection:
     """Return the packet in a datagram, or the reason for dropping it; any bytes are allowed.
 
-    Nothing in the packet is to be believed before `is_authentic`.
+    Nothing in the packet may be trusted before `is_authentic`.
     """
     if len(datagram) > MAX_DATAGRAM_BYTES:
         return Rejection.OVERSIZED

@@ -3,7 +3,7 @@
 The error of an eye is the mean distance, in arcminutes, between the corners of the user test's
 target as they are drawn and as they should be, at its three distances. Around the offline
 calibration it is linear in φ: with the Jacobian J of the drawn corners, drawing with φ for an eye
-at φ' errs by J (φ - φ') at each corner. Its expectation over a Gaussian has no closed form, so it
+at φ' is wrong by J (φ - φ') there. Its expectation over a Gaussian has no closed form, so it
 is averaged over a fixed set of samples: equal input gives equal output.
 
 The error in depth is the distance along the viewing direction by which an object at the working
@@ -56,9 +56,9 @@ class Benefit:
     """The error of one eye without the calibration and with it."""
 
     before_arcmin: float
-    """Expected with the offline calibration, before anything is known of the wearer."""
+    """Expected with the offline calibration, before anything is known about the wearer."""
     without_arcmin: float
-    """Expected with the offline calibration, from what the alignments say of the wearer."""
+    """Expected with the offline calibration, from what the alignments say about the wearer."""
     after_arcmin: float
     """Expected with the solved φ."""
     probability_better: float
@@ -67,10 +67,10 @@ class Benefit:
 
 
 def percent(probability: float) -> str:
-    """Return a probability in percent, with a space that does not break.
+    """Return a probability in percent, with a no-break space.
 
-    Rounded down, so that what is refused never reads as the limit, and no more than 99: nobody is
-    entirely sure.
+    Rounded down, so that a refused value never reads as the limit, and at most 99: nothing is
+    certain.
     """
     return f"{min(99, int(100.0 * probability))}\u00a0%"
 

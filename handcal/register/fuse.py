@@ -69,9 +69,9 @@ class FuseSettings:
     verified_sigma_arcmin: float = 2.0
     """Standard deviation of a verification by a usual wearer in each of two directions."""
     verified_depth_sigma: float = 0.005
-    """Relative standard deviation of its size; people see a place better than a size."""
+    """Relative standard deviation of its size; people judge a position better than a size."""
     wearer_scales: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 8.0)
-    """Errors of a wearer's overlay, in those of a usual wearer."""
+    """Errors of a wearer's overlay, relative to a usual wearer's."""
     wearer_weights: tuple[float, ...] = (0.7, 0.16, 0.08, 0.05, 0.01)
     """Probability of each of `wearer_scales`."""
 
@@ -92,7 +92,7 @@ class Fused:
     observed: tuple[Observation, ...]
     """The displacement measured by each alignment."""
     wearer_scale: float
-    """Expected error of the wearer's overlays, in those of a usual wearer."""
+    """Expected error of the wearer's overlays, relative to a usual wearer's."""
     verified: Mapping[Eye, tuple[Observation, ...]] = field(default_factory=dict)
     """The φ found by each eye's verifications."""
     unverified: Mapping[Eye, Observation] = field(default_factory=dict)
@@ -233,7 +233,7 @@ def fuse_alignments(
 def _scale_weights(
     prior: EyePrior, observed: Sequence[Observation], settings: FuseSettings
 ) -> Float64:
-    """Return the probability of each precision of the wearer, by how well it predicts all.
+    """Return the probability of each precision of the wearer, by how well it predicts them all.
 
     The displacements of all alignments are jointly Gaussian, given the precision.
     """

@@ -47,12 +47,12 @@ class GuardSettings:
     """Limits beyond which an alignment is refused."""
 
     advice_rad: float = float(np.radians(3.0))
-    """Rotation from which on the headset advises the wearer to turn the hand back."""
+    """Rotation from which the headset advises the wearer to turn the hand back."""
     limit_rad: float = float(np.radians(9.0))
-    """Largest rotation; 9° in the paper, for its 4 mm line."""
+    """Largest rotation; 9° in the paper, where its error reaches 4 mm."""
     shape_limit_m: float = 0.0025
     """Largest change of the hand's shape, rms over its surface. The joints of real hands moved by
-    twice as much, and φ was wrong by 4 mm on the mean."""
+    twice as much, and φ was wrong by 4 mm on average."""
 
 
 class RotationGuard:

@@ -105,7 +105,7 @@ def balance(cursor_m: Float64, hand_m: Float64, shift_m: Float64, distance_m: fl
 def balanced_turn(outline_m: Float64, R: Float64, about_m: Float64) -> Float64:
     """Return the movement, (3,), by which a wearer balances a turned hand on its cursor.
 
-    An outline that is turned about a point covers the outline as it was nowhere exactly. The
+    An outline that is turned about a point covers the original outline exactly nowhere. The
     wearer moves the hand to where both differ least, by least squares in the image.
 
     Parameters

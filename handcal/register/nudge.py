@@ -1,8 +1,8 @@
 """Verification: the wearer moves the drawing of the resting hand until it covers the hand.
 
 A drawing with φ moves and grows on the display as φ changes. For a hand at one place, movement to
-the right, movement down and growth determine φ, and the other way round. So the movement that the
-wearer makes is the error that was left, and the φ that it leads to is one more observation, with
+the right, movement down and growth determine φ, and vice versa. So the movement that the
+wearer makes is the remaining error, and the φ that it leads to is one more observation, with
 the precision at which a person sees two outlines coincide.
 """
 

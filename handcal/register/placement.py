@@ -83,10 +83,10 @@ def next_alignment(
     settings: PlacementSettings = PlacementSettings(),
     solve: SolveSettings,
 ) -> Planned | None:
-    """Return a plan's next alignment, or None if none is needed now or the most were made.
+    """Return a plan's next alignment, or None if none is needed now or the maximum is reached.
 
     Of ``paper``: both eyes, the cursor where the hand is. Of ``recommended``: left, right and both
-    in turn, each cursor where it tells most. None is needed while an eye is to be verified
+    in turn, each cursor where it is most informative. None is needed while an eye must be verified
     (`next_check`), nor once every eye is accepted or keeps its offline calibration.
 
     Parameters
@@ -106,7 +106,7 @@ def next_alignment(
         φ that the cursor will be drawn with.
     plan : {"recommended", "paper"}
     usable_eyes : tuple of eye
-        One eye for a wearer who sees with one.
+        Only one for a wearer who sees with one eye.
     settings : PlacementSettings
     solve : SolveSettings
         Its prior and precision of a wearer count before the first alignment.
@@ -149,9 +149,9 @@ def next_check(
     usable_eyes: tuple[Eye, ...] = EYES,
     settings: PlacementSettings = PlacementSettings(),
 ) -> Eye | None:
-    """Return the eye to verify next in the recommended plan, or None if none is to be.
+    """Return the eye to verify next in the recommended plan, or None if there is none.
 
-    Each eye once, then each eye again that is not accepted. To be asked when `next_alignment` plans
+    Each eye once, then each eye again that is not accepted. Call it when `next_alignment` plans
     nothing, and again after each check.
     """
     if results is None:
@@ -180,7 +180,7 @@ def _to_verify(
 def _is_enough(
     plan: PlanName, results: Results, usable_eyes: Sequence[Eye], settings: PlacementSettings
 ) -> bool:
-    """Return whether no alignment is needed now: an eye is to be verified, or all are judged."""
+    """Return whether no alignment is needed now: an eye must be verified, or all are judged."""
     if not set(results.verdicts) >= set(usable_eyes):
         return False
     counts = {eye: len(found) for eye, found in results.fused.verified.items()}
@@ -199,7 +199,7 @@ def _places(
     """Return displacements of the raised hand, in H, to places that displays and camera allow.
 
     The hand moves along the camera's line of sight, so that the camera sees the same side of it,
-    and a little aside.
+    and a little sideways.
     """
     camera_m = rig.T_H_D[:3, 3]
     line_m = raised_m.mean(axis=0) - camera_m
@@ -252,7 +252,7 @@ def _expected_arcmin(
     results: Results | None,
     solve: SolveSettings,
 ) -> float:
-    """Return the error to expect on the mean of both eyes after an alignment at a displacement."""
+    """Return the mean expected error of both eyes after an alignment at a displacement."""
     T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
     H, wearer_m2 = seen_by(
         raised_m + place, outline_m + place, T_E_H, drawn_shift_m, eyes, rig, solve.fuse

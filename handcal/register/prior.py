@@ -1,7 +1,7 @@
 """The prior on where a wearer's eyes are, as default and as learned from earlier sessions.
 
 [φ_left; φ_right] is Gaussian. By default its mean is zero, each φ lies in the eye box, and the two
-eyes differ little. A lab's finished sessions with one rig tell more: how far its headset sits from
+eyes differ little. A lab's finished sessions with one rig show more: how far its headset sits from
 the viewpoint on average, and how much wearers differ. Mean and covariance are estimated by
 expectation maximisation, as every session measures φ with an error of its own, and a single
 alignment with both eyes open measures three of the six numbers. The default prior takes part as
@@ -57,7 +57,7 @@ class PriorSettings:
     """The prior on φ of both eyes."""
 
     eye_box_sigma_m: float = 0.004
-    """Standard deviation of each component of φ where nothing is known about the wearers."""
+    """Standard deviation of each component of φ if nothing is known about the wearers."""
     eye_difference_sigma_m: tuple[float, float, float] = (0.0022, 0.0008, 0.0008)
     """Standard deviation of the right φ minus the left. x is the difference of the wearer's eye
     distance from the rig's: 2 mm if the headset is adjusted to the wearer; 3.6 mm among adults

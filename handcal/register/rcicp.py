@@ -49,8 +49,8 @@ def solve_paper(
 ) -> Iterated:
     """Solve as in Hu et al. 2021: rows contracted with λ, SVD, stop at 1 > e_k/e_(k-1) > 0.9999.
 
-    With a rotated hand it can swing between two states to the last iteration, and then ends in
-    whichever comes at that number; `Iterated.best_shift_m` does not depend on the number.
+    With a rotated hand it can alternate between two states up to the last iteration; the result
+    then depends on the number of iterations, but `Iterated.best_shift_m` does not.
 
     Parameters
     ----------

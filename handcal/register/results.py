@@ -149,7 +149,7 @@ def solve_session(
     plan : {"paper", "recommended"}, optional
         The plan that the session follows; advice counts its next alignments.
     usable_eyes : tuple of eye
-        One eye for a wearer who sees with one.
+        Only one for a wearer who sees with one eye.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class RigidSettings:
     """Interior points used from each cloud until a step is below `near_m`, and then all. With a
     known start all are used at once."""
     near_m: float = 1e-3
-    """Step, of a point of the hand, from which on all interior points are used."""
+    """Largest step of a hand point below which all interior points are used."""
     max_iterations: int = 40
     tolerance_m: float = 3e-5
     """The iteration stops when a step moves no point of the hand by more than this."""
@@ -226,7 +226,7 @@ def motion_covariance(
 
 
 def _sums(group: Indices, values: Float64, count: int) -> Float64:
-    """Return the sums of the values (N, K) of each of so many groups, (count, K)."""
+    """Return the sums of the values (N, K) of each of `count` groups, (count, K)."""
     return np.stack([np.bincount(group, column, count) for column in values.T], axis=1)
 
 

@@ -32,7 +32,7 @@ _STEPS = 2
 # Variance of the nodes over that of independent rows. Fitted to disjoint samples of real frames and
 # to simulated clouds (2.4 to 6.5).
 _NOISE_FACTOR = 4.5
-# Nodes as near as this to the one that moved most are told of together.
+# Nodes as near as this to the one that moved most are reported together.
 _REGION_M = 0.035
 # A spread thumb reaches less far than this share of the fingers' reach.
 _THUMB_REACH = 0.6

@@ -28,7 +28,7 @@ from handcal.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
 MOST_ALIGNMENTS = 10
 # More than this are not worth it where the offline calibration is within the target.
 _FEW_ALIGNMENTS = 2
-# Each eye in turn, then both, which a wearer sees best and which tells the eyes' common part.
+# Each eye in turn, then both, which a wearer sees best and which determines the eyes' common part.
 _IN_TURN: tuple[tuple[Eye, ...], ...] = ("left",), ("right",), EYES
 
 
@@ -52,7 +52,7 @@ class VerdictSettings:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """The alignments that would lead to *accept*, as far as can be foreseen."""
+    """The alignments that would lead to *accept*, as far as can be predicted."""
 
     eyes: tuple[Eye, ...]
     """Eyes to keep open in each of them; empty if they follow a plan."""
@@ -157,7 +157,7 @@ def advise(
 
 
 def _is_better_advice(one: Advice, other: Advice) -> bool:
-    """Return whether advice leads further, or as far with fewer alignments, or then closer."""
+    """Return whether advice leads further, or as far with fewer alignments or a smaller error."""
     steps = one.is_accepted - other.is_accepted or one.meets_target - other.meets_target
     if steps or not other.meets_target:
         return steps > 0 or (steps == 0 and one.after_arcmin < other.after_arcmin)
@@ -186,7 +186,7 @@ def judge(
         Sentences of evidence from outside the solver against the result.
     measured : mapping of eye to (before, after)
         Errors in arcmin by the wearer's verification, as `measured_arcmin` gives them. They are
-        part of `fused`, and so of the verdict; here they are told.
+        part of `fused`, and so of the verdict; here they are added to the reason.
     """
     apart_m = eye_distance_m(rig, fused.shifts)
     if contradictions:
@@ -255,9 +255,8 @@ def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSet
     ):
         return Verdict(
             "keep",
-            f"the offline calibration is expected to err by only {gain.without_arcmin:.1f}′ here; "
-            f"this result, expected at {gain.after_arcmin:.1f}′, is only {sure} sure to be "
-            "better",
+            f"the offline calibration has an expected error of only {gain.without_arcmin:.1f}′; "
+            f"this result, with {gain.after_arcmin:.1f}′, is only {sure} sure to be better",
         )
     more = _further_text(advice, eye)
     now = f"expected error {gain.after_arcmin:.1f}′, {sure} sure to be better than none"

@@ -2,14 +2,14 @@
 
 The viewpoint camera stands behind a display. A picture of the display's grid gives the display's
 pixel for each of the camera's. Then it sees a board at several distances, which the depth camera
-sees too. The depth camera's picture gives the place of the board and, with the viewpoint camera's,
+sees, too. The depth camera's picture gives the place of the board and, with the viewpoint camera's,
 the camera's own place φ. The pixels at which the rig draws the board's corners for an eye at φ are
 compared with those at which the camera sees them. Nothing is fitted.
 
 A depth camera that has only shifted moves φ and the board alike. What is drawn then moves by the
 shift divided by the virtual image's distance, 1.7′ for 1 mm at 2 m, at every distance of the board,
-as with a turned camera. A wearer's calibration compensates most of it. Poses of the board tracked
-by the headset tell a shift from a rotation, and find it to fractions of a millimetre.
+as with a rotated camera. A wearer's calibration compensates most of it. Poses of the board tracked
+by the headset distinguish a shift from a rotation, and measure it to fractions of a millimetre.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from handcal.types import Float64, Intrinsics
 
 FEWEST_VIEWS = 5
 LIMIT_ARCMIN = 5.0
-"""Largest accepted mean error at any distance; calibrated wearers have 4 to 9 arcmin in all."""
+"""Largest accepted mean error at any distance; calibrated wearers have 4 to 9 arcmin in total."""
 LARGEST_SHIFT_M = 0.015
 LARGEST_MOVE_M = 0.001
 """Largest accepted shift of the depth camera, beyond twice its standard deviation."""
@@ -261,7 +261,7 @@ def likely_cause(found: Sequence[EyeAcceptance], move: CameraMove | None = None)
             "calibrate its pose again (handcal rig stereo, rig make)"
         )
     return (
-        "each eye's errors are those of a rotation of its own: calibrate the displays again "
+        "each eye's errors are those of a different rotation: calibrate the displays again "
         "(handcal rig display), and see with handcal rig compare what has changed"
     )
 
@@ -271,7 +271,7 @@ def _or_shifted(turn_rad: Float64, found: EyeAcceptance) -> str:
     shift_m = float(np.linalg.norm(turn_rad)) * found.image_distance_m
     if shift_m > LARGEST_SHIFT_M:
         return ""
-    return f" or shifted by {1e3 * shift_m:.0f} mm (EYE/tracked.json would tell which)"
+    return f" or shifted by {1e3 * shift_m:.0f} mm (EYE/tracked.json would show which)"
 
 
 def _middle_m(T_C_B: Float64, seen: BoardView) -> float:

@@ -209,7 +209,7 @@ def _page(
         sections=[
             Section("", [facts({str(eye): text or "passed" for eye, text in problems.items()})]),
             Section(
-                "Drawn against seen",
+                "Drawn and seen corners",
                 [Table([Column("eye", "left"), *map(Column, titles)], rows), facts(about)],
             ),
         ],

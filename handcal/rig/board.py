@@ -62,7 +62,9 @@ class Board:
         if not 0.3 * self.square_m <= self.marker_m <= 0.95 * self.square_m:
             raise ValueError("the markers' side must be 0.3 to 0.95 of the squares' side")
         if self.dictionary not in DICTIONARIES:
-            raise ValueError(f"no dictionary {self.dictionary}; DICT_5X5_100 is one")
+            raise ValueError(
+                f"unknown dictionary {self.dictionary}; choose one such as DICT_5X5_100"
+            )
         markers = len(self.marker_dictionary.bytesList)
         if columns * rows // 2 > markers:
             raise ValueError(

@@ -52,7 +52,7 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     ids, pixels = ids[fits], pixels[fits]
     if board.kind == "checkerboard" and fits.all() and _goes_on(gray, pixels, board):
         columns, rows = board.squares
-        goes_on = f"the checkerboard goes on: it has more squares than {columns}×{rows}"
+        goes_on = f"the checkerboard continues: it has more squares than {columns}×{rows}"
         raise BoardError(why_not_plain(gray) or goes_on)
     pixels = _refine(gray, pixels, board)
     return BoardView(

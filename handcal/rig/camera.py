@@ -130,7 +130,7 @@ def calibrate_camera(
         solved = best_lens(compared) if compared else None
     if solved is None or not np.isfinite(solved.camera.fx) or not 0 < solved.camera.fx < np.inf:
         raise ViewsError(
-            "nothing can be solved from these views: take more, of a board tilted to every side"
+            "nothing can be solved from these views: take more, of a board tilted in all directions"
         )
     fit, camera = solved.fit, solved.camera
     poses = {name: as_transform(pose) for name, pose in zip(found, fit.setup.poses, strict=True)}
@@ -201,8 +201,8 @@ def _judge(
     ):
         return CalibrationVerdict(
             "bad",
-            "all views show the board at nearly one angle, which does not tell the focal length: "
-            "tilt it by 20° to 45° to every side",
+            "all views show the board at nearly one angle, which leaves the focal length open: "
+            "tilt it by 20° to 45° in all directions",
         )
     seen_area = coverage(found.values())
     wanting = []

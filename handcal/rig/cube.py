@@ -67,7 +67,9 @@ class Cube:
         if not 0.3 * self.side_m <= self.marker_m <= 0.9 * self.side_m:
             raise ValueError("the markers' side must be 0.3 to 0.9 of the cube's")
         if self.dictionary not in DICTIONARIES:
-            raise ValueError(f"no dictionary {self.dictionary}; DICT_4X4_50 is one")
+            raise ValueError(
+                f"unknown dictionary {self.dictionary}; choose one such as DICT_4X4_50"
+            )
         markers = len(self.marker_dictionary.bytesList)
         if len(set(self.ids)) != len(FACES) or not all(0 <= i < markers for i in self.ids):
             raise ValueError(
@@ -123,7 +125,7 @@ def find_cube(image: UInt8, cube: Cube) -> Mapping[int, Float64]:
         raise CubeError(_explain_missing(image, cube, ids))
     twice = [marker for marker in seen if ids.count(marker) > 1]
     if twice:
-        raise CubeError(f"marker {twice[0]} is seen twice: take other cubes and prints away")
+        raise CubeError(f"marker {twice[0]} is seen twice: remove other cubes and prints")
     cells = cube.marker_dictionary.markerSize + 2
     rough = {marker: found[ids.index(marker)].reshape(4, 2).astype(np.float64) for marker in seen}
     return MappingProxyType(
@@ -152,7 +154,7 @@ def cube_pose(corners_px: Mapping[int, Float64], cube: Cube, camera: Intrinsics)
     off_px = rms(image_points(transform(T, points_m), camera) - pixels)
     if not off_px < _MISFIT_SIDES * side_px:
         raise CubeError(
-            f"the corners lie {off_px:.1f} px from where this cube has them: check its sides and "
+            f"the corners are {off_px:.1f} px from their places on this cube: check its sides and "
             "which marker is on which face"
         )
     return T

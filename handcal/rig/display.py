@@ -295,7 +295,7 @@ def _judge(
     if turn_rad > settings.largest_turn_rad:
         return CalibrationVerdict(
             "bad",
-            f"the display is turned by {np.degrees(turn_rad):.1f}° against the headset's own view: "
+            f"the display is turned by {np.degrees(turn_rad):.1f}° from the headset's own view: "
             "left and right exchanged, a mirrored image, or poses of another camera place",
         )
     if offset_m > settings.largest_offset_m:

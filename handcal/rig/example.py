@@ -19,7 +19,7 @@ def example_rig() -> Rig:
     """Return a HoloLens-1-like headset with an Intel RealSense D415 bolted on top.
 
     Virtual image at 2 m, viewpoints 63 mm apart. The rig's origin H is its colour camera, 40 mm
-    above and 50 mm before the middle of the viewpoints. The depth camera sits 70 mm above the
+    above and 50 mm in front of the middle of the viewpoints. The depth camera sits 70 mm above the
     viewpoints and looks 15° down, so that all of both displays lies in its view from 0.4 to 0.6 m.
     """
     return Rig(

@@ -1,9 +1,9 @@
 """Check that a display obeys: what is drawn must move as the projections sent to it say.
 
-A square is drawn for one eye. Moved in V by a known angle, it says how far that is in the picture
+A square is drawn for one eye. Moved in V by a known angle, it shows how far that is in the picture
 (the control). Then the square stays and the projection changes: by a shift of the image, by an eye
 that has moved, and by a shift of the other eye's projection. The share of the expected movement
-that is seen tells which part of the headset's software undoes it: an app that submits the
+that is seen shows which part of the headset's software undoes it: an app that submits the
 calibrated view to its runtime asks it to show everything where the runtime's own view would. The
 camera needs no calibration, and need not be at the rig's viewpoint.
 """
@@ -130,7 +130,7 @@ def find_square(dark: tuple[UInt8, UInt8], seen: UInt8) -> tuple[Float64, int]:
     if np.count_nonzero(mask) < _LEAST_PIXELS:
         raise UnseenError(
             "the camera does not see the square that the headset draws; darken the room, and put "
-            "the camera before this eye's display"
+            "the camera behind this eye's display"
         )
     y, x = np.nonzero(mask)
     weights = np.abs(added[mask])
@@ -154,8 +154,8 @@ def shares_seen(found: Mapping[Shown, tuple[Float64, int]]) -> dict[Probe, float
     pixels = [count for _, count in found.values()]
     if max(pixels) > _AREA_RATIO * min(pixels):
         raise UnseenError(
-            "something else than the square moved or was lit, or the square left the picture; keep "
-            "the camera and everything before it still, and check again"
+            "something other than the square moved or lit up, or the square left the picture; keep "
+            "the camera and everything in front of it still, and check again"
         )
     control = found["control"][0] - found["rest"][0]
     length = float(control @ control)

@@ -75,7 +75,7 @@ def write_page(
 def _page(size_m: Float64, paper: Paper) -> Float64:
     """Return the page's width and height, in the orientation in which the print fits."""
     if paper not in PAPERS:
-        raise ValueError(f"no paper {paper}; there is {', '.join(PAPERS)}")
+        raise ValueError(f"unknown paper {paper}; choose from {', '.join(PAPERS)}")
     needed_m = size_m + 2 * _EDGE_M + [0.0, _CAPTION_M]
     upright = np.array(PAPERS[paper])
     for page_m in (upright, upright[::-1]):

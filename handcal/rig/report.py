@@ -31,9 +31,9 @@ class RigFinding:
     found: str
     is_fine: bool = True
     expected: str = ""
-    """Empty where anything is."""
+    """The expected value; empty if any value is."""
     is_known: bool = True
-    """False if the file does not tell it: neither fine nor doubtful."""
+    """False if the file does not contain it: neither fine nor doubtful."""
 
 
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
@@ -82,9 +82,9 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
     facing = view_of_eye(rig.eyes["left"], np.eye(4))[:3, :3] @ (right_m - left_m)
     yield RigFinding(
         "Viewpoints",
-        "right is right of left" if facing[0] > 0 else "left and right are exchanged",
+        "right is to the right of left" if facing[0] > 0 else "left and right are exchanged",
         bool(facing[0] > 0),
-        "right is right of left",
+        "right is to the right of left",
     )
     for eye in EYES:
         yield from _display_findings(eye, rig.eyes[eye])
@@ -117,7 +117,7 @@ def _display_findings(eye: str, display: EyeDisplay) -> Iterator[RigFinding]:
     arcmin = float(arcmin_from_px(display, 1.0))
     yield RigFinding(
         f"{eye}: display",
-        f"{display.width_px}×{display.height_px} px, {arcmin:.2f}′ a pixel, "
+        f"{display.width_px}×{display.height_px} px, {arcmin:.2f}′ per pixel, "
         f"{_angle_deg(display):.0f}° across",
     )
     yield _within(f"{eye}: z(C0→S)", display.z_C0_S_m, _FOCAL_DISTANCE_M, 1.0, "m")
@@ -193,7 +193,7 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
 
 
 def _not_told(what: str) -> RigFinding:
-    return RigFinding(what, "not told in this file", is_known=False)
+    return RigFinding(what, "not in this file", is_known=False)
 
 
 def _origin_finding(rig: Rig, part: str) -> RigFinding:

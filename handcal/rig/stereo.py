@@ -247,7 +247,7 @@ def _check_not_mirrored(
     if any(_rms_px(*trial) < rms_px / 2 for trial in _unmirrored(both, *cameras)):
         raise ViewsError(
             "one camera's images are mirrored, the other's not: switch that off in the camera "
-            "(letters in its images, or a ChArUco board, tell which)"
+            "(letters in its images, or a ChArUco board, show which)"
         )
 
 
@@ -318,7 +318,7 @@ def _judge(
     if covariance is None or spread_rad < settings.good_spread_rad / 4:
         return CalibrationVerdict(
             "bad",
-            "all pairs show the board at nearly one angle: tilt it by 20° to 45° to every side",
+            "all pairs show the board at nearly one angle: tilt it by 20° to 45° in all directions",
         )
     place = np.zeros(6) if fit.setup.place is None else fit.setup.place
     shift_m = float(np.linalg.norm(place[3:]))

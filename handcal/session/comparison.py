@@ -1,7 +1,7 @@
 """Blinded comparisons: the offline calibration against the applied φ, as the wearer judges them.
 
-The wearer sees both in an order that nobody knows, and says which fits the hand better. The order
-is in the journal, and only the report tells it.
+The wearer sees both in a hidden random order, and says which fits the hand better. The order
+is in the journal, and only the report shows it.
 """
 
 from __future__ import annotations

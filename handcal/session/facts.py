@@ -70,9 +70,9 @@ class SessionFacts:
     plan: EyePlan | PlanName | None = None
     """The plan that was followed, or only the order in which the eyes were aligned."""
     usable_eyes: tuple[Eye, ...] = EYES
-    """The eyes that the plan calibrates: one for a wearer who sees with one."""
+    """The eyes that the plan calibrates: only one for a wearer who sees with one eye."""
     former: str = ""
-    """Name of the session with whose φ this one began; empty if with none."""
+    """Name of the session whose φ this one started from; empty if there is none."""
     eye_distance: EyeDistance | None = None
     """Measured; the results were solved with it."""
     verified: Mapping[Eye, Verification] = field(default_factory=dict)

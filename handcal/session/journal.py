@@ -1,6 +1,6 @@
 """The journal of a session: an append-only file, one JSON object per line, safe after a crash.
 
-Every line ends with a checksum of its own. A damaged line is left out and named; all others count.
+Every line ends with its checksum. A damaged line is left out and reported; all others count.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def journal_line(event: Event) -> bytes:
 
 
 def read_journal(path: Path) -> JournalContent:
-    """Read a journal; damaged lines are left out and named.
+    """Read a journal; damaged lines are left out and reported.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The sessions in a folder, as their journals tell; deleting them with a way back."""
+"""The sessions in a folder, by their journals; deletes them and restores deleted ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading of a session: whatever is damaged costs only itself, and is named."""
+"""Reading of a session: only what is damaged is lost, and it is reported."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class SessionRecord:
     last_alignment: int = 0
     """Greatest number of an alignment, lost ones too; the next one is greater."""
     damaged: tuple[Damage, ...] = ()
-    """Parts that are damaged; what they held is missing here, or was read from a copy."""
+    """Parts that are damaged; their contents are missing here, or were read from a copy."""
 
     @property
     def refused(self) -> int:

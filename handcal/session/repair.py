@@ -51,7 +51,7 @@ def repair_session(path: Path, output: Path, rig: Rig | None = None) -> SessionR
     output : Path
         A new folder.
     rig : Rig, optional
-        Taken in place of the stored one, if that is damaged.
+        Used in place of the stored one, if that is damaged.
 
     Raises
     ------

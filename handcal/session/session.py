@@ -161,12 +161,12 @@ class Session(Closable):
         before : SessionRecord, optional
             An earlier record of it; its alignments, which never change, are not read again.
         rig : Rig, optional
-            Taken in place of the stored one.
+            Used in place of the stored one.
 
         Returns
         -------
         SessionRecord
-            Without what is damaged, which is named in `damaged`.
+            Without damaged parts, which are listed in `damaged`.
 
         Raises
         ------
@@ -191,7 +191,7 @@ class Session(Closable):
         self._append(event, data)
 
     def save_alignment(self, alignment: Alignment, facts: AlignmentFacts | None = None) -> int:
-        """Save an alignment with what is known of its making; return its number, from 1.
+        """Save an alignment with its circumstances; return its number, from 1.
 
         Raises
         ------
@@ -222,7 +222,7 @@ class Session(Closable):
         return number
 
     def delete(self, kind: Kind, number: int) -> None:
-        """Mark an alignment or a trial as deleted; results go with an alignment.
+        """Mark an alignment or a trial as deleted; with an alignment, the results are discarded.
 
         Raises
         ------
@@ -282,7 +282,7 @@ class Session(Closable):
     def save_facts(self, **facts: Any) -> None:
         """Record facts by their names in `SessionFacts`; each replaces an earlier one.
 
-        Results go if the eye distance or a verification changes.
+        The results are discarded if the eye distance or a verification changes.
 
         Raises
         ------
@@ -365,8 +365,8 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
     Returns
     -------
     SessionRecord
-        Rig, settings, alignments, trials of the user test, notes and events, without what is
-        damaged; `damaged` names that.
+        Rig, settings, alignments, trials of the user test, notes and events, without
+        damaged parts, which `damaged` lists.
 
     Raises
     ------

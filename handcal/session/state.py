@@ -18,7 +18,7 @@ from handcal.types import Eye, Float64
 MAX_ALIGNMENTS = 100
 MAX_TRIALS = 1000
 _DELETED_LIMIT = 10
-"""Items saved in all, deleted ones too, over those that are not deleted."""
+"""Largest ratio of all items saved, deleted ones too, to those that are not deleted."""
 MAX_WEARER_CHARACTERS = 100
 
 Kind: TypeAlias = Literal["alignment", "trial"]
@@ -56,7 +56,7 @@ ASIDE = (SessionEvent.NOTES_SAVED, SessionEvent.UPGRADED)
 
 
 class NumberedItems(Generic[Item]):
-    """Items numbered from 1 that can be deleted and restored; a number is never given twice.
+    """Items numbered from 1 that can be deleted and restored; a number is never used twice.
 
     At most `limit` are active.
 
@@ -64,7 +64,7 @@ class NumberedItems(Generic[Item]):
     ----------
     active, deleted : dict of int to item
     taken : int
-        Numbers up to this one are not given again, even if their items are unknown.
+        Numbers up to this one are not used again, even if their items are unknown.
     has_gaps : bool
         True if numbers may be missing, because the session is or was damaged.
     """
@@ -241,7 +241,7 @@ class SessionState:
         if "rig" in data:
             rig, settings = data["rig"], data["settings"]
             if not isinstance(settings, dict):
-                raise TypeError("the settings are no object")
+                raise TypeError("the settings are not an object")
             self.rig_sha256 = hashlib.sha256(rig.encode()).hexdigest()
             self.rig, self.settings = rig, settings
             self.notes_sha256 = ("",)
@@ -258,7 +258,7 @@ def _number(data: Mapping[str, Any]) -> int:
     """Return the number in an event, which must be an int: true and 1.0 equal 1 too."""
     number = data["number"]
     if type(number) is not int:
-        raise ValueError(f"a number is whole, not {number!r}")
+        raise ValueError(f"a number must be whole, not {number!r}")
     return number
 
 

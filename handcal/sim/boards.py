@@ -98,7 +98,7 @@ def board_poses(
     max_tilt_rad: float = 0.7,
     others: tuple[tuple[Float64, Intrinsics], ...] = (),
 ) -> list[Float64]:
-    """Return poses T_C_B of a hand-held board: all over the image, tilted to every side.
+    """Return poses T_C_B of a hand-held board: all over the image, tilted in all directions.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A simulated wearer who sits before a cube: head, depth camera and eyes, over the real link."""
+"""A simulated wearer in front of a cube: head, depth camera and eyes, over the real link."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class CubeBench(Closable):
         self._poses.start()
 
     def place(self, depth_m: float) -> None:
-        """Put the cube at random before the left eye, at a distance."""
+        """Put the cube, turned at random, in front of the left eye at a distance."""
         left = self._rig.eyes["left"]
         T_E_T = some_cube_pose(left, depth_m, self._rng)
         self.T_W_T = invert(view_of_eye(left, self.head(time.monotonic_ns()))) @ T_E_T

@@ -75,8 +75,8 @@ class CaptureSettings:
     place_sigma_m: float = 0.001
     """Standard deviation of the camera's position, each axis."""
     prior: Literal["camera", "wearer"] = "camera"
-    """The solver's prior: the placement of the camera, which moves aside only; or the eye box of
-    wearers."""
+    """The solver's prior: the placement of the camera, which is only moved sideways; or the eye
+    box of wearers."""
     turn_sigma_rad: float = 0.02
     """Standard deviation of the camera's rotation relative to the display, about each axis."""
     points: int = 5000
@@ -242,7 +242,7 @@ class _Studio:
 def cube_prior(settings: CaptureSettings) -> PriorSettings:
     """Return the solver's prior of φ before the alignments.
 
-    A camera on a stand is moved aside on purpose, and stays where it was along the line of sight. A
+    A camera on a stand is moved sideways on purpose, and stays in place along the line of sight. A
     wearer's eye does not: with the eye box as prior, alignments move φ along z by more than the
     stand's error.
     """
@@ -255,7 +255,7 @@ def cube_prior(settings: CaptureSettings) -> PriorSettings:
 
 
 def some_cube_pose(display: EyeDisplay, depth_m: float, rng: np.random.Generator) -> Float64:
-    """Return T_E_T of a cube before the display's centre with three visible faces, at random."""
+    """Return a random T_E_T of a cube on the display's axis with three visible faces."""
     middle_px = [(display.width_px - 1) / 2, (display.height_px - 1) / 2, 1.0]
     ray = np.linalg.solve(eye_projection(display)[:, :3], middle_px)
     aside_m = rng.uniform(-_ASIDE_M, _ASIDE_M, 2)

@@ -1,4 +1,4 @@
-"""A simulated headset before a viewpoint camera, whose compositor may undo what the app draws."""
+"""A simulated headset seen by a viewpoint camera; its compositor may undo what the app draws."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SimulatedDisplay(ViewpointCamera):
     Attributes
     ----------
     eye : eye
-        The eye before which the camera is.
+        The eye behind whose display the camera is.
     """
 
     name = "Simulated viewpoint camera"
@@ -66,7 +66,7 @@ class SimulatedDisplay(ViewpointCamera):
         self._R_E_C = rigid(self._rng.normal(0.0, 0.02, 3))[:3, :3]
 
     def place(self, eye: Eye) -> None:
-        """Put the camera before the display of an eye."""
+        """Put the camera behind the display of an eye."""
         self.eye = eye
 
     def read(self) -> tuple[UInt8, int]:

@@ -1,4 +1,4 @@
-"""The virtual headset: a process of its own that speaks the real datagrams.
+"""The virtual headset: a separate process that exchanges the real datagrams.
 
 It hosts the simulated wearer, shows what the PC sends, and reports poses and confirmations on its
 own clock, as a real headset does. The true poses go only to the simulated camera, as light. Without
@@ -78,7 +78,7 @@ class HeadsetSettings:
     eye_distance_m: float | None = None
     """Eye distance that it reports; None: it measures none."""
     side: Side | None = None
-    """The hand that is raised; None: as the seed has it."""
+    """The hand that is raised; None: drawn from the seed."""
     has_wearer: bool = True
     """False: a device at rest, without a simulated wearer."""
 

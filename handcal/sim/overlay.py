@@ -97,7 +97,7 @@ def overlay_by_eye(
     placed = overlay_hand(transform(invert(T_H_raised), cursor_m), turned, views)
     if placed is None:
         raise HandcalError(
-            "with this rig, a hand raised half a metre before the headset is not on the displays, "
+            "with this rig, a hand raised half a metre from the headset is not on the displays, "
             "or the depth camera does not see it: check the rig file"
         )
     eyes_m = [

@@ -26,7 +26,7 @@ class Simulation(Closable):
     start_headset : callable
         Starts the process, given the port to which it sends the scene.
     side : {"left", "right"}, optional
-        The hand that is raised; default: as the seed has it.
+        The hand that is raised; default: drawn from the seed.
 
     Attributes
     ----------

@@ -152,7 +152,7 @@ class Check:
             if t_s < self._next_s:
                 return None, False
             self._moved = self._moved.plus(*self._presses.pop())
-            # After the last key the drawing is awaited.
+            # After the last key, wait for the drawing.
             self._next_s = t_s + (self._press_s if self._presses else _EFFECT_S)
             return self._moved, False
         if not np.array_equal(drawn, self._drawn):

@@ -292,7 +292,7 @@ class Wearer:
         self._reach(view.t_s, self._draw_error(turned_rad))
 
     def _recognised(self, cursor_m: Float64) -> Float64:
-        """Return roughly the pose of the hand that a cursor shows: of this hand, maybe moved."""
+        """Return roughly the pose of the hand that a cursor shows: of this hand, possibly moved."""
         moved_m = cursor_m.mean(axis=0) - self._T_W_hand[:3, 3]
         is_far = float(np.linalg.norm(moved_m)) > _FAR_M
         return rigid(translation_m=moved_m) @ self._T_W_hand if is_far else self._T_W_hand

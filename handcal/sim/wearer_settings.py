@@ -18,7 +18,7 @@ class WearerSettings:
     largest_shift_m: float = 0.010
     """Eye box, to which longer shifts are shortened."""
     slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Movement of both eyes before the headset since these were drawn, E axes: it has slipped."""
+    """Movement of both eyes in the headset since these were drawn, E axes: it has slipped."""
     raise_m: tuple[float, float, float] = (0.0, 0.048, 0.56)
     raise_spread_m: tuple[float, float, float] = (0.015, 0.006, 0.025)
     """Position of the raised palm relative to the midpoint of the viewpoints C0, in the head's

@@ -1,4 +1,4 @@
-"""One alignment while it is made: the live hand against the cursor, and the judging of it."""
+"""One alignment in progress: compares the live hand with the cursor, and judges confirmations."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from handcal.station.states import CalibrationSettings, Observation
 from handcal.types import EYES, Alignment, Eye, Float64
 
 KEEP_PROMPT = "Keep your hand up."
-"""Shown while the next cursor or verification follows at once."""
+"""Shown if the next cursor or verification follows at once."""
 # The prompt says what to balance when the hand is turned.
 _MOVE = "Move your hand under the cursor, finger tips and wrist alike, then confirm."
 ADVISE_EVERY_NS = 1_000_000_000
-"""Least time between two pieces of advice, to be read."""
+"""Least time between two pieces of advice, so that each can be read."""
 # The advice does not come and go at its limit.
 _STILL_TURNED = 0.7
 _SHAPE_EVERY_NS = 250_000_000
@@ -45,12 +45,12 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """A confirmation that makes no alignment."""
+    """A confirmation that was refused."""
 
     prompt: str
-    """The reason, and what the wearer is to do."""
+    """The reason, and what the wearer should do."""
     reason: str
-    """In the journal's words."""
+    """The reason as the journal names it."""
     angle_deg: float | None = None
     is_by_guard: bool = False
     """True if the hand was turned or had changed its shape."""
@@ -148,7 +148,7 @@ class Aligning:
         return self._followed
 
     def advise(self, observation: Observation) -> str | None:
-        """Return a new prompt for the wearer, to turn the hand back or no more; None if none."""
+        """Return a new prompt for the wearer, to turn the hand back or to stop; else None."""
         hand, rotation_rad = observation.hand, observation.rotation_rad
         if hand is None or rotation_rad is None:
             return None
@@ -171,8 +171,8 @@ class Aligning:
         """Accept or refuse a confirmation; None while the pose of its time is not yet known."""
         if confirmation.problem:
             return Refused(
-                "The headset does not show what it should. Confirm again; if this is repeated, "
-                "restart the headset's app.",
+                "The headset does not show what it should. Confirm again; if this keeps "
+                "happening, restart the headset's app.",
                 "drawn otherwise",
             )
         try:
@@ -232,7 +232,7 @@ class Aligning:
             )
         if self._has_changed(shape):
             return Refused(
-                "Your hand has changed its shape since the cursor was made: "
+                "The shape of your hand has changed since the cursor was made: "
                 f"{change_text(shape, R_D_W)}. "
                 "Hold it as it was and confirm again, or make the cursor again.",
                 "shape changed",

@@ -207,7 +207,7 @@ class AlignmentSteps:
         if self._delay.is_needed:
             raise ProcedureError(
                 "the delay of the camera's pictures is not known yet; let the wearer look slowly "
-                "to the left and to the right, before a background with texture"
+                "to the left and to the right, in front of a background with texture"
             )
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
@@ -266,7 +266,7 @@ class AlignmentSteps:
         self._store.write_waiting()
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:
-        """Compare the pose that a frame tells with that of the headset's app."""
+        """Compare the pose that a frame carries with that of the headset's app."""
         if frame.T_W_D is None:
             return None
         with suppress(PoseError):
@@ -275,7 +275,7 @@ class AlignmentSteps:
         return self.evidence.other_world
 
     def _ask_to_look_around(self) -> None:
-        """Have the wearer move the head as long as the camera's delay is needed for a cursor."""
+        """Ask the wearer to move the head while a cursor still needs the camera's delay."""
         is_before_cursor = self.state in (State.SHOW_HAND, State.APPLIED)
         is_needed = self._delay.is_needed and is_before_cursor
         # Not before the hand is up; then until the delay is known, also while the hand moves.

@@ -1,6 +1,6 @@
 """Measure where a headset's own camera is on the rig of its app, from both their poses.
 
-Both tell where they are in one world. The transform between them is constant at the right time
+Both poses are in the same world. The transform between them is constant at the right time
 offset between the two clocks, however the head moves.
 """
 
@@ -25,7 +25,7 @@ _MOST_S, _STEP_S = 0.3, 0.01
 _LEAST_SEEN = 30
 _LEAST_TURN_RAD = np.radians(10.0)
 _REACH_M = 0.5
-"""Distance of a hand: a turn moves it by so much."""
+"""Distance of a hand, at which a turn of the head is measured."""
 _MOST_SPREAD_M = 0.015
 _POLL_S = 0.05
 _ENDED_S = 1.0
@@ -55,14 +55,14 @@ def find_camera_pose(
     Parameters
     ----------
     seen : sequence of (t_host_ns, (4, 4) float64)
-        Time of exposure and T_W_D, as the camera tells it.
+        Time of exposure and T_W_D, as the camera reports it.
     pose_at_host_ns : callable
         Returns T_W_H (4, 4), or raises PoseError.
 
     Raises
     ------
     HandcalError
-        If the head was not turned enough, or both do not speak of one world.
+        If the head was not turned enough, or both poses are not in the same world.
     """
     steps = round(_MOST_S / _STEP_S)
     offsets_s = _STEP_S * np.arange(-steps, steps + 1)
@@ -85,7 +85,7 @@ def find_camera_pose(
     T_H_D, spread_m = means[best]
     if spread_m > _MOST_SPREAD_M:
         raise HandcalError(
-            f"the camera moves by {1e3 * spread_m:.0f} mm on the rig, as the app has it: let the "
+            f"by the app's poses, the camera moves by {1e3 * spread_m:.0f} mm on the rig: let the "
             "app use the world of hl2ss"
         )
     return CameraPose(T_H_D, spread_m, float(offsets_s[best]))
@@ -110,14 +110,14 @@ def run_camera_pose(
     server : HeadsetServer
         With a connected headset.
     camera : Camera
-        Whose frames tell its pose.
+        Its frames carry its pose.
     duration_s : float
     progress : Progress
 
     Raises
     ------
     CameraError
-        If the camera fails, or does not tell its pose.
+        If the camera fails, or does not report its pose.
     HandcalError
         As `find_camera_pose`.
     CancelledError
@@ -134,7 +134,7 @@ def run_camera_pose(
             except CameraTimeoutError:
                 continue
             if frame.T_W_D is None:
-                raise CameraError(f"{camera.name} does not tell its pose")
+                raise CameraError(f"{camera.name} does not report its pose")
             if passed_s < duration_s:
                 frames.append((frame.t_camera_ns, frame.t_host_ns, frame.T_W_D))
     finally:

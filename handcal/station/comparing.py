@@ -79,7 +79,7 @@ class Comparing:
         ProcedureError
             Unless both have been shown.
         FileError
-            If the session cannot be written; the comparison goes on.
+            If the session cannot be written; the comparison continues.
         """
         if self.shown is None or not self.has_seen_both:
             raise ProcedureError("show the wearer both drawings first")

@@ -136,7 +136,7 @@ def see_cube(frame: Frame, cube: Cube) -> Float64:
         If the frame has no colour.
     """
     if frame.color is None or frame.color_intrinsics is None:
-        raise CameraError("the depth camera gives no colour; the cube is tracked in colour")
+        raise CameraError("the depth camera delivers no colour, in which the cube is tracked")
     gray: UInt8 = np.asarray(cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY), np.uint8)
     T_C_T = cube_pose(find_cube(gray, cube), cube, frame.color_intrinsics)
     return invert(frame.T_C_D) @ T_C_T

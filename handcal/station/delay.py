@@ -86,7 +86,7 @@ class MeasuredOffset:
 
 
 class DelayMeter:
-    """Measures the time of the exposures, and tells it to the camera's clock.
+    """Measures the time of the exposures, and sets the camera's clock by it.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class DelayMeter:
         """True if the delay has an effect and is not known.
 
         A head that hardly moves is in the same place at all times. Without colour, in which the
-        background is followed, and before a background without texture, the delay stays assumed.
+        background is followed, or with a background without texture, the delay stays assumed.
         """
         can_measure = (
             self._followed_ns is not None and self._newest_ns - self._followed_ns < _PLAIN_NS
@@ -208,7 +208,7 @@ class DelayMeter:
     def _carried_m_s(self, hand: PlacedHand) -> float:
         """Return the speed at which the head carries what is at the hand's place; 0 if unknown.
 
-        Where the frame told the pose, no delay matters, and it is 0.
+        If the frame carries the pose, no delay matters, and it is 0.
         """
         if hand.is_posed_by_camera:
             return 0.0
@@ -295,7 +295,7 @@ def measure_offset(
     ----------
     backgrounds : iterable of Background
     times_ns : (N,) int64
-        Times of the poses on the host's clock, evenly spaced but for gaps.
+        Times of the poses on the host's clock, evenly spaced except for gaps.
     poses : (N, 4, 4) float64
         T_W_H.
     T_H_D : (4, 4) float64

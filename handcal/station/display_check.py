@@ -1,4 +1,4 @@
-"""The check that a headset's displays obey, over the link: by a camera, or by the wearer's word."""
+"""The check that a headset's displays obey, over the link: seen by a camera, or by the wearer."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def by_camera(
     ----------
     camera : ViewpointCamera
     ready : callable
-        Returns when the camera is before the display of this eye.
+        Returns when the camera is behind the display of this eye.
     settle_s : float
         Time from the acknowledgement until a picture surely shows what was sent.
     """
@@ -148,8 +148,8 @@ def by_wearer(ask: Callable[[Eye, Probe, Show], Answer]) -> Observe:
     Parameters
     ----------
     ask : callable
-        Shows ``rest`` and the probe as often as wanted, and returns how far the square moved to the
-        right: its own width, less, or not at all.
+        Shows ``rest`` and the probe as often as the person wants, and returns how far the square
+        moved to the right: its own width, less, or not at all.
     """
 
     def observe(eye: Eye, show: Show) -> Mapping[Probe, float]:

@@ -160,7 +160,7 @@ def _install_again() -> str:
         return "install the Debian package of handcal again"
     return {
         "linux": "run bash installer/run.sh, or pip install handcal",
-        "win32": "run the setup of handcal again, or pip install handcal",
+        "win32": "run handcal's installer again, or pip install handcal",
     }.get(sys.platform, "pip install handcal")
 
 
@@ -199,9 +199,9 @@ def _network() -> Finding:
         transport.close()
         return f"UDP works on the loopback interface (port {port})"
 
-    advice = "let the firewall pass UDP on the loopback interface"
+    advice = "allow UDP on the loopback interface in the firewall"
     if sys.platform == "win32":
-        advice = "in Windows Security, let handcal's Python pass the firewall in private networks"
+        advice = "in Windows Security, allow handcal's Python in private networks (firewall)"
     return _try("Network", bind, advice)
 
 
@@ -209,7 +209,7 @@ def _pairing() -> Finding:
     try:
         read_pairing_key()
     except HandcalError as error:
-        advice = "only handcal headset needs it; the desktop program has a key of its own"
+        advice = "only handcal headset needs it; the desktop program has its own key"
         return Finding("Pairing key", Health.LIMITED, str(error), advice)
     return Finding("Pairing key", Health.GOOD, f"set in {KEY_VARIABLE}")
 
@@ -226,7 +226,7 @@ def _cameras(rig: Path | None) -> list[Finding]:
     except HandcalError as error:
         return [Finding("RealSense SDK", Health.LIMITED, str(error), "needed for real cameras")]
     if not devices:
-        advice = "the simulator and recordings work without"
+        advice = "the simulator and recordings work without it"
         if sys.platform == "win32":
             advice += "; a plugged-in camera needs Settings, Privacy, Camera, desktop apps: on"
         return [Finding("Camera", Health.LIMITED, explain_absence(), advice)]
@@ -283,7 +283,7 @@ def examine_camera(device: Device) -> Finding:
 
 def _screen() -> Finding:
     if sys.platform != "linux" or any(os.environ.get(v) for v in ("DISPLAY", "WAYLAND_DISPLAY")):
-        return Finding("Screen", Health.GOOD, "there is one")
+        return Finding("Screen", Health.GOOD, "available")
     advice = "commands run without one; windows need one"
     return Finding("Screen", Health.LIMITED, "none", advice)
 

@@ -1,7 +1,7 @@
 """Evidence from outside the solver against a calibration.
 
 The solver's residuals cannot show that the picture was frozen, that another camera than the rig's
-gave it, or that the headset drew something else than the PC believes. Each of these is watched for
+gave it, or that the headset did not draw what the PC believes. Each of these is watched for
 while the calibration runs. What is found refuses alignments while it lasts, or contradicts the
 result, and is named.
 """
@@ -26,7 +26,7 @@ FROZEN_FRAMES = 4
 _REFUSALS = 2
 _COMPARED = 20
 _APART_M, _APART_RAD = 0.02, np.radians(2.0)
-"""Poses of one rig in one world agree better at least once in so many frames, also while the head
+"""Poses of one rig in one world agree better at least once in this many frames, even while the head
 moves."""
 
 
@@ -37,7 +37,7 @@ class Contradiction:
     name: str
     """Short name, as in ``handcal demo --fault``."""
     text: str
-    """A sentence for people, with advice."""
+    """A sentence for the technician, with advice."""
 
 
 class Evidence:
@@ -76,7 +76,7 @@ class Evidence:
         return tuple(self._found.values())
 
     def see(self, frame: Frame, identity: CameraIdentity) -> Contradiction | None:
-        """Look at a frame; return what forbids to use it, if anything does.
+        """Look at a frame; return what forbids using it, if anything does.
 
         A frozen picture passes by, so it forbids frames only while it lasts. Another camera
         contradicts the whole calibration.
@@ -101,17 +101,17 @@ class Evidence:
         )
 
     def see_delay(self, delay_s: float | None, limit_s: float) -> Contradiction | None:
-        """Return what forbids to use frames that arrive this long after their exposure."""
+        """Return what forbids using frames that arrive this long after their exposure."""
         if delay_s is None or delay_s <= limit_s:
             return None
         return Contradiction(
             "late-camera",
             f"the camera's pictures arrive {1e3 * delay_s:.0f} ms after their exposure, more than "
-            f"{1e3 * limit_s:.0f} ms; end other programs, and connect the camera directly",
+            f"{1e3 * limit_s:.0f} ms; close other programs, and connect the camera directly",
         )
 
     def see_delivery(self, is_lost: bool) -> Contradiction | None:
-        """Return what forbids to use frames while a connected headset draws nobody knows what."""
+        """Return what forbids using frames while it is unknown what a connected headset draws."""
         if not is_lost:
             return None
         return Contradiction(
@@ -120,14 +120,14 @@ class Evidence:
         )
 
     def see_poses(self, by_camera: Float64, by_app: Float64) -> None:
-        """Compare T_W_D (4, 4) as the camera tells it and as it follows from the app's pose."""
+        """Compare T_W_D (4, 4) as the camera reports it and as it follows from the app's pose."""
         difference = invert(by_camera) @ by_app
         turn_rad = float(Rotation.from_matrix(difference[:3, :3]).magnitude())
         self._apart.append((float(np.linalg.norm(difference[:3, 3])), turn_rad))
 
     @property
     def other_world(self) -> Contradiction | None:
-        """Evidence that forbids frames while camera and app speak of other worlds or rigs."""
+        """Evidence that forbids frames while camera and app refer to different worlds or rigs."""
         if len(self._apart) < _COMPARED:
             return None
         apart_m, turn_rad = (min(values) for values in zip(*self._apart, strict=True))
@@ -136,7 +136,7 @@ class Evidence:
         return Contradiction(
             "other-world",
             f"the camera is {1e3 * apart_m:.0f} mm and {np.degrees(turn_rad):.0f}° from where the "
-            "headset's app and the rig file have it; let the app use the world of hl2ss, and "
+            "headset's app and the rig file place it; let the app use the world of hl2ss, and "
             "measure the camera's pose again (handcal rig make --factory)",
         )
 

@@ -1,8 +1,8 @@
-"""A stored session to begin with: a wearer who comes back, or a headset that has slipped.
+"""A stored session to start from: a wearer who comes back, or a headset that has slipped.
 
 The new session draws with the stored φ, which the wearer verifies first. The stored posterior,
-widened by how a headset sits otherwise, is the prior. So one verification of each eye may be
-enough, and where it is not, the alignments go on from there.
+widened by how differently a headset may sit, is the prior. So one verification of each eye may
+be enough; if it is not, alignments follow.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from handcal.types import EYES, Eye, Float64
 
 SLIP_M = (0.002, 0.0015, 0.003)
 """Change of a headset's fit when the same wearer puts it on again, standard deviation along
-E's axes. As much as the simulated wearers differ; of a real headset it is not known."""
+E's axes. As much as the simulated wearers differ; for a real headset it is not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +37,7 @@ class Former:
 
 
 def read_former(path: Path, rig: Rig) -> Former:
-    """Read the session that another one begins with.
+    """Read the session that another one starts from.
 
     Raises
     ------
@@ -46,13 +46,13 @@ def read_former(path: Path, rig: Rig) -> Former:
     """
     record = Session.open(path)
     if rig_numbers(record.rig) != rig_numbers(rig):
-        raise FileError(f"{path} was calibrated with another rig; begin without it")
+        raise FileError(f"{path} was calibrated with another rig; start without it")
     results = solve_again(record, stored_solve_settings(record))
     if results is None:
-        raise FileError(f"{path} has no alignment; begin without it")
+        raise FileError(f"{path} has no alignment; start without it")
     faulty = [one for one in results.verdicts.values() if one.name in _FAULTY]
     if faulty:
-        raise FileError(f"{path} is no calibration to begin with: {faulty[0].reason}")
+        raise FileError(f"{path} is not a calibration to start from: {faulty[0].reason}")
     fused = results.fused
     known = [one.at(fused.wearer_scale) for one in fused.all_observed]
     mean_m, covariance_m2 = posterior(fused.prior, known)

@@ -41,7 +41,7 @@ class PlacedHand:
     movement_m: float = 0.0
     """Movement of the hand during those frames."""
     is_posed_by_camera: bool = False
-    """True if its frame told the camera's pose, so that no clock entered."""
+    """True if its frame carried the camera's pose, so that no clock was involved."""
 
 
 class RecentHands:
@@ -81,7 +81,7 @@ class RecentHands:
     ) -> tuple[PlacedHand | None, str]:
         """Add the cloud of a new frame, None if it shows no hand, and place the clouds that can be.
 
-        A frame that tells its camera's pose T_W_D (4, 4) needs no other.
+        If the frame carries its camera's pose T_W_D (4, 4), no other is needed.
 
         Returns
         -------

@@ -58,11 +58,11 @@ def headset_problem(
         return f"it did not acknowledge {link.failed} messages; restart its app"
     sent, received = _lost_shares(link)
     if max(sent, received) > _MOST_LOST:
-        return "the network loses many datagrams; use a Wi-Fi channel of its own, near the router"
+        return "the network loses many datagrams; use a free Wi-Fi channel, near the router"
     if link.latency_ms is not None and link.latency_ms > _MOST_LATENCY_MS:
         return "the network is slow; connect the computer to the router by cable"
     if link.pose_rate_hz < _LEAST_RATE_HZ:
-        return "it sends fewer than 60 poses a second; close other apps on it"
+        return "it sends fewer than 60 poses per second; close other apps on it"
     uncertainty_ms = link.clock_uncertainty_ms
     if uncertainty_ms is None or uncertainty_ms > _MOST_CLOCK_MS:
         return "its clock is not known well; wait, or improve the network"
@@ -101,14 +101,14 @@ def _absence(link: LinkStatistics) -> str:
     if link.notice:
         return link.notice
     if link.rejected.get(Rejection.WRONG_VERSION, 0):
-        return "a headset app of another version calls; update it, or handcal"
+        return "a headset app of another version tries to connect; update it, or handcal"
     if link.rejected.get(Rejection.UNPAIRED, 0):
-        return "a headset with another pairing key calls; pair it with handcal pair"
+        return "a headset with another pairing key tries to connect; pair it with handcal pair"
     if any(link.rejected.values()):
-        return "datagrams arrive that are not of a headset app; check the app's port"
+        return "datagrams arrive that are not from a headset app; check the app's port"
     return (
         "nothing arrives; check the address in the headset, that both are in one network, and that "
-        "the firewall lets UDP pass"
+        "the firewall allows UDP"
     )
 
 
@@ -128,7 +128,7 @@ def _other_than_rig(device: HeadsetIdentity, rig: Rig) -> str:
                     "choose the rig file of this headset"
                 )
     if rig.headset is not None and rig.headset.device_id != device.device_id:
-        return "it is another headset than the rig's; choose the rig file of this headset"
+        return "it is not the rig's headset; choose the rig file of this headset"
     check = rig.display_check
     if check is not None and (check.runtime, check.app) != (device.runtime, device.app):
         return (

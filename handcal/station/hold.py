@@ -85,7 +85,7 @@ def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand
 
 
 def _in_one_place(hands: Sequence[PlacedHand], reference: PlacedHand) -> list[PlacedHand]:
-    """Return the hands that, but for noise, are where the reference is.
+    """Return the hands that are where the reference is, except for noise.
 
     None if almost all points of one lie at cut edges.
     """

@@ -1,4 +1,4 @@
-"""The test square by which a wearer sees, before a calibration, that the headset draws for us."""
+"""The test square: shows a wearer, before a calibration, that the headset draws what is sent."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """The plan of a session: which step is next, and doing it when the hand is still.
 
-The paper's plan is one alignment with both eyes open. The recommended plan raises the hand once:
-its cursors are that hand, placed where an alignment tells most (`handcal.register.placement`), the
-left eye, the right eye and both in turn; then each eye is verified. Both end when every eye has
-its verdict, or when nothing more is to be gained.
+The paper's plan is one alignment with both eyes open. In the recommended plan the hand is raised
+once: the cursors are that hand, placed where an alignment is most informative
+(`handcal.register.placement`), for the left eye, the right eye and both in turn; then each eye is
+verified. Both plans end when every eye has its verdict, or when nothing more can be gained.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class PlanSettings:
 
     name: PlanName = "paper"
     usable_eyes: tuple[Eye, ...] = EYES
-    """One eye for a wearer who sees with one."""
+    """Only one for a wearer who sees with one eye."""
     is_automatic: bool = False
     """True if each step is done by itself once the hand is still."""
     verify: bool = True
@@ -35,7 +35,7 @@ class PlanSettings:
 
 
 class StepName(StrEnum):
-    """Next need of a plan."""
+    """The next thing that a plan needs."""
 
     RAISE = "raise"
     """The hand must be raised and held still."""
@@ -148,7 +148,7 @@ class Plan:
         return NextStep(StepName.DONE, (), self._takes())
 
     def advance(self, observation: Observation) -> NextStep:
-        """Do the next step if it needs nobody; return it. The next frame may have another.
+        """Take the next step if nobody has to act; return it. The next frame may have another.
 
         Raises
         ------

@@ -90,7 +90,7 @@ def _camera(settings: StationSettings) -> Finding:
         case "oak" | "orbbec" as kind:
             name = "OAK-D" if kind == "oak" else "Orbbec camera"
             which = f"{name} {settings.serial}".rstrip()
-            return _limited(f"{which}, not tried yet", "it is opened at the start")
+            return _limited(f"{which}, not tried yet", "it is opened when you start")
         case "recording":
             return _recording(settings)
         case "simulator":
@@ -109,7 +109,7 @@ def _hololens2(settings: StationSettings) -> Finding:
     name = identity.model or "RealSense on the HoloLens 2"
     found = _limited(
         f"{name} at {settings.hololens2.host}, not tried yet",
-        "start hl2ss on it; it is opened at the start",
+        "start hl2ss on it; it is opened when you start",
     )
     return with_rig(found, _chosen_rig(settings), identity)
 
@@ -141,7 +141,7 @@ def _headset(settings: StationSettings, pairing_key: str) -> Finding:
     _require_free(LOOPBACK)
     if settings.source != "simulator":
         return _limited(
-            "the virtual headset knows nothing of a real hand",
+            "the virtual headset cannot see a real hand",
             "suitable only for viewing the camera image; to calibrate, use a network headset",
         )
     return _good("virtual, with a simulated wearer; started on this computer")
@@ -157,7 +157,7 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
     try:
         address = ip_address(settings.host)
     except ValueError:
-        advice = "give it in numbers; 0.0.0.0 or :: listens on all networks"
+        advice = "enter it in numbers; 0.0.0.0 or :: listens on all networks"
         return _broken(f"{settings.host!r} is not an address", advice)
     if not 1 <= settings.port <= 65535:
         return _broken(f"{settings.port} is not a valid port", "choose one from 1 to 65535")
@@ -167,7 +167,7 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
     except LinkError:
         return _limited("this computer has no network", "connect it to the headset's network")
     return _limited(
-        f"not seen yet; it is awaited at {host}, UDP port {port}",
+        f"not connected yet; it can connect to {host}, UDP port {port}",
         "pair and try it with Connect, or let it connect after the start",
     )
 
@@ -192,6 +192,6 @@ def _sessions(settings: StationSettings) -> Finding:
     if not there.is_dir():
         return _broken(f"{there} is a file", "choose a folder")
     if not os.access(there, os.W_OK | os.X_OK):
-        return _broken(f"nothing may be written in {there}", "choose another folder")
+        return _broken(f"cannot write to {there}", "choose another folder")
     disk = examine_disk(there)
     return disk if there == folder else replace(disk, found=f"{disk.found}; will be created")

@@ -66,9 +66,9 @@ class Calibration(VerificationSteps):
     plan : {"paper", "recommended"}, optional
         The advice counts its next alignments.
     usable_eyes : tuple of eye
-        One eye for a wearer who sees with one.
+        Only one for a wearer who sees with one eye.
     former_m : mapping of eye to (3,) array_like
-        φ of a stored session to begin with, in place of the offline calibration.
+        φ of a stored session to start from, in place of the offline calibration.
 
     Raises
     ------
@@ -88,7 +88,7 @@ class Calibration(VerificationSteps):
     verifications : dict of eye to Verification
         The newest of each eye; fused with the alignments.
     verifying : Verifying or None
-        The verification that goes on, in the state `verify`.
+        The verification in progress, in the state `verify`.
     refused : int
         Number of confirmations refused by the guard.
     camera : CameraIdentity
@@ -288,12 +288,13 @@ class Calibration(VerificationSteps):
     def go_back(self, to: Literal["offline", "former"]) -> None:
         """Have the headset draw with the offline calibration, or with φ before the newest one.
 
-        A cursor, a verification and projections on their way are given up; the alignments stay.
+        A cursor, a verification and projections not yet acknowledged are dropped; the alignments
+        stay.
 
         Raises
         ------
         FileError
-            If the session cannot be written; the headset draws so anyway.
+            If the session cannot be written; the headset draws with it anyway.
         LinkError
             If the link is closed.
         """

@@ -33,7 +33,7 @@ class RunSettings:
     """Number of alignments of the paper's plan; of each eye, if `eyes` is ``"each"``. The
     recommended plan decides by itself."""
     eyes: EyePlan = "both"
-    """One eye for a wearer who sees with one."""
+    """Only one for a wearer who sees with one eye."""
     patience_s: float = 60.0
     """Longest time for the wearer and the headset to do one step."""
 

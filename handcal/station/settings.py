@@ -53,7 +53,7 @@ class StationSettings:
     fault: Fault = ""
     """Fault of the simulated camera or the virtual headset; empty: none."""
     side: Side | None = None
-    """The hand that the simulated wearer raises; None: as the seed has it."""
+    """The hand that the simulated wearer raises; None: drawn from the seed."""
     slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Movement of the simulated wearer's headset since the seed's eyes were drawn, E axes."""
     eye_distance_m: float | None = None

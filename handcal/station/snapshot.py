@@ -43,9 +43,9 @@ class Procedure:
     """True if the headset has acknowledged it."""
     plan: PlanName = "paper"
     next_step: NextStep | None = None
-    """Next need of the plan; None before the first frame."""
+    """The plan's next step; None before the first frame."""
     verifying: VerifyingView | None = None
-    """The verification that goes on, in the state `verify`."""
+    """The verification in progress, in the state `verify`."""
     verifications: Mapping[Eye, Verification] = field(default_factory=dict)
     """The newest verification of each eye."""
     former_shift_m: Mapping[Eye, Float64] = field(default_factory=dict)

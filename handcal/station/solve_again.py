@@ -80,7 +80,7 @@ def stored_solve_settings(record: SessionRecord) -> SolveSettings:
 
 
 def _upgraded(calibration: Any) -> Any:
-    """Return stored settings with the names of today; those of version 1 had no prior."""
+    """Return stored settings with today's names; those of version 1 had no prior."""
     fuse = calibration.get("solve", {}).get("fuse") if isinstance(calibration, dict) else None
     if not isinstance(fuse, dict) or "eye_box_sigma_m" not in fuse:
         return calibration

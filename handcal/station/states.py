@@ -60,7 +60,7 @@ class Observation:
     state: State
     """After the step."""
     hand: PlacedHand | None
-    """The newest hand placed in this step, maybe of an earlier frame; None if none was."""
+    """The newest hand placed in this step, possibly from an earlier frame; None if none was."""
     problem: str
     """Reason why there is no hand; empty if there is one."""
     is_steady: bool
@@ -82,6 +82,6 @@ class Observation:
     guard_ms: float | None = None
     """Durations of these stages; None if one did not run in this step."""
     contradiction: Contradiction | None = None
-    """Evidence that forbids to use this frame."""
+    """Evidence that forbids using this frame."""
     needs_delay: bool = False
     """True if no cursor can be made before the wearer has looked around (`DelayMeter`)."""

@@ -244,7 +244,7 @@ class Station(Closable):
                 self._next_step,
             ),
             record=self._record,
-            # A view of what the headset draws would tell which drawing is compared.
+            # A view of what the headset draws would reveal which drawing is shown.
             views={} if self.comparing.shown else dict(self._views.shown),
             comparing=self.comparing.shown,
             has_compared_both=self.comparing.has_seen_both,
@@ -258,18 +258,18 @@ class Station(Closable):
         self._watchers.append(watcher)
 
     def _follow_plan(self, observation: Observation) -> NextStep:
-        """Do the plan's next step if it is automatic; return it."""
+        """Take the plan's next step if it is automatic; return it."""
         if self.plan.settings.is_automatic and not self.holds_plan:
             return self.plan.advance(observation)
         return self.plan.next_step(observation.is_steady)
 
     def take_step(self) -> None:
-        """Do the next step of a plan that is held.
+        """Take the next step of a plan that is held.
 
         Raises
         ------
         ProcedureError
-            If it cannot be done yet.
+            If it cannot be taken yet.
         LinkError
             If the link is closed.
         FileError

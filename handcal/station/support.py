@@ -123,7 +123,7 @@ def known_names(settings: SupportSettings) -> frozenset[str]:
 def without_names(text: str, names: Collection[str]) -> str:
     """Return a text with wearers' names, the user's name and the home folder replaced.
 
-    Names are found in any capitals, as whole words.
+    Names are found as whole words, in upper or lower case.
     """
     with suppress(RuntimeError):  # no home folder
         text = text.replace(str(Path.home()), _HOME)

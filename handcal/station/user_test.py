@@ -36,7 +36,7 @@ from handcal.types import EYES, Eye, Float64
 Adjust: TypeAlias = Callable[[Eye, Float64, Callable[[Float64], None]], Float64]
 """Given an eye, its φ, and a function that draws with another φ: returns φ as adjusted by hand."""
 
-PLACE_PROMPT = "Look straight ahead. The cube is put {:g} m before you."
+PLACE_PROMPT = "Look straight ahead. The cube will be put {:g} m in front of you."
 _ACK_S = 6.0
 _POSE_AGE_NS = 60_000_000
 _POSE_PATIENCE_S, _POLL_S = 3.0, 0.02

@@ -29,7 +29,7 @@ from handcal.types import EYES, Eye, Float64, Frame, Verification
 
 
 class VerificationSteps(AlignmentSteps, ABC):
-    """Draws the hand's outline for one eye, and moves it as the wearer says.
+    """Draws the hand's outline for one eye, and moves it by the wearer's nudges.
 
     The middle part of `handcal.station.procedure.Calibration`, which documents the parameters.
     """
@@ -54,7 +54,7 @@ class VerificationSteps(AlignmentSteps, ABC):
 
     @property
     def refusal(self) -> str:
-        """Reason why the wearer's last word was refused, on a cursor or a drawing; else empty."""
+        """Reason why the wearer's last confirmation was refused; else empty."""
         return super().refusal if self.verifying is None else self.verifying.refusal
 
     def step(self, frame: Frame) -> Observation:
@@ -95,7 +95,7 @@ class VerificationSteps(AlignmentSteps, ABC):
         self._store.event(VERIFYING, **self.verifying.event())
 
     def nudge(self, eye: Eye, right_arcmin: float, down_arcmin: float, size: float = 0.0) -> None:
-        """Move what the verified eye draws, as the wearer says; the projection is sent.
+        """Move what the verified eye draws, by the wearer's nudge; the projection is sent.
 
         Raises
         ------
@@ -112,11 +112,11 @@ class VerificationSteps(AlignmentSteps, ABC):
         self._nudge(self._require_verifying().undo)
 
     def redo_nudge(self) -> None:
-        """Do the last nudge that was undone again; raises as `nudge`."""
+        """Redo the last nudge that was undone; raises as `nudge`."""
         self._nudge(self._require_verifying().redo)
 
     def verified(self) -> None:
-        """Take the wearer's word, given to the technician, that the drawing covers the hand.
+        """Confirm for the wearer, who has told the technician, that the drawing covers the hand.
 
         Raises
         ------

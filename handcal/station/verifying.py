@@ -1,4 +1,4 @@
-"""The verification of one eye while it goes on.
+"""The verification of one eye while it is in progress.
 
 With the hand at rest and the other eye closed, the wearer moves what the eye draws until the hand's
 outline covers the hand. The wearer's nudges come from the headset as sums, the technician's from
@@ -36,16 +36,16 @@ _ENDS = (
     SessionEvent.FINE_TUNED,
     SessionEvent.FINISHED,
 )
-"""Events after which a verification does not go on."""
+"""Events that end a verification."""
 
 
 @dataclass(frozen=True, slots=True)
 class VerifyingView:
-    """A verification while it goes on."""
+    """A verification in progress."""
 
     eye: Eye
     moved: NudgeSum
-    """All movement of the drawing so far: the error that was left, as far as it is found."""
+    """All movement of the drawing so far: the error found so far."""
     before_m: tuple[float, float, float]
     shift_m: tuple[float, float, float]
     """φ before the verification, and with the movement so far."""
@@ -74,9 +74,9 @@ class Verifying:
     shift_m : (3,) float64
         φ with it.
     fits : Nudge or None
-        The wearer's word that the drawing covers the hand, until it is judged.
+        The wearer's confirmation that the drawing covers the hand, until it is judged.
     refusal : str
-        Reason why the last word of it was refused; empty if none was.
+        Reason why the last confirmation was refused; empty if none was.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Verifying:
     def hear(self, nudge: Nudge) -> tuple[float, float, float] | None:
         """Take the wearer's sums; return what they add to the last ones, None if nothing.
 
-        The word that the drawing fits counts only for a drawing that the wearer has seen so.
+        A confirmation counts only for the drawing that the wearer has seen.
         """
         heard = nudge.moved
         before = self._heard if nudge.session == self._session else NudgeSum()
@@ -143,7 +143,7 @@ class Verifying:
         self._draw(self._done.pop())
 
     def redo(self) -> None:
-        """Do the last nudge that was undone again; ValueError if there is none."""
+        """Redo the last nudge that was undone; ValueError if there is none."""
         if not self._undone:
             raise ValueError("there is no nudge to redo")
         self._move(self._undone.pop())

@@ -1,4 +1,4 @@
-"""The one message about what is wrong at present: neither flashing, nor raised while starting."""
+"""The one message about what is wrong at present: it neither flashes nor appears while starting."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Conditions:
                 self._slow_text = _slow_text(rate_hz, lost_hz, is_camera=is_camera)
 
     def _lost_hz(self, camera: CameraStatus, now_s: float) -> float:
-        """Return the frames per second that were lost of late."""
+        """Return the frames per second that were lost recently."""
         self._dropped.append((now_s, camera.dropped))
         while len(self._dropped) > 2 and now_s - self._dropped[1][0] >= _LOST_OVER_S:
             self._dropped.popleft()

@@ -1,4 +1,4 @@
-"""The 3D window of a session, which is a process of its own."""
+"""The 3D window of a session, which runs in its own process."""
 
 from __future__ import annotations
 

@@ -426,7 +426,7 @@ def _held(station: Station) -> Station:
 
 
 def _skip_planned(station: Station) -> None:
-    """Skip the verification, which the wearer may have ended already; the plan goes on."""
+    """Skip the verification, which the wearer may have ended already; the plan continues."""
     with suppress(FileError):
         if station.calibration.state is State.VERIFY:
             station.plan.skip()

@@ -1,4 +1,4 @@
-"""The dialog in which a headset is paired, seen to be connected, and tried."""
+"""The dialog in which a headset is paired, its connection is shown, and it is tried."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ class PreferencesDialog(QDialog):
         self._calibration.add_row(tr("Prior"), self._learn)
         slicer = QWidget()
         fill_row(slicer, self._slicer, QLabel(tr("port")), self._port, grows=self._port)
-        self._calibration.add_heading(tr("Told to other programs, from the next calibration on"))
+        self._calibration.add_heading(tr("Sent to other programs, from the next calibration on"))
         self._calibration.add_row("OpenIGTLink", slicer)
         self._calibration.add_row("LSL", self._lsl)
         self._calibration.add_heading(tr("Program"))

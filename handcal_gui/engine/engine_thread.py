@@ -34,7 +34,7 @@ class EngineThread(Worker):
     open_station : callable
         Opens the station, in the engine's thread.
     bridges : BridgeSettings
-        The calibration goes on without bridges that cannot be opened.
+        The calibration continues without bridges that cannot be opened.
 
     Attributes
     ----------

@@ -49,9 +49,8 @@ class ReviewPage(QWidget):
         self._again = button("reviewAgain", tr("Calibrate a&gain"))
         self._again.setToolTip(
             tr(
-                "The same wearer, or the headset has slipped: begins with this result, "
-                "which each eye "
-                "checks first"
+                "For the same wearer again, or after the headset has slipped: starts from "
+                "this result and first verifies each eye"
             )
         )
         close = button("reviewClose", tr("Close &session"))

@@ -80,7 +80,7 @@ def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] 
     target_arcmin : float
         The lab's target.
     head : mapping of str to str
-        Facts to begin with, such as the wearer.
+        Facts shown first, such as the wearer.
     """
     lines = [f"{name}: {value}" for name, value in head.items()]
     lines.append(tr("Target: {:.1f}′").format(target_arcmin))

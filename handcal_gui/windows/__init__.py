@@ -1,1 +1,1 @@
-"""Windows of their own: rig calibration and evaluation."""
+"""Separate windows: rig calibration, evaluation, library and manual."""

@@ -567,7 +567,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Told to other programs, from the next calibration on</source>
+        <source>Sent to other programs, from the next calibration on</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -647,7 +647,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Move what the chosen eye sees, as the key points</source>
+        <source>Move what the chosen eye sees in the key&apos;s direction</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -671,7 +671,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The same wearer, or the headset has slipped: begins with this result, which each eye checks first</source>
+        <source>For the same wearer again, or after the headset has slipped: starts from this result and first verifies each eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -735,15 +735,15 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>By the seed</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Left</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Chosen by the seed</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -911,9 +911,9 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Recommended: the hand is raised once; its cursors are placed where they tell most,
-and each eye is verified. The steps follow by themselves.
-As in the paper: each cursor is the hand where it is held; you choose the eyes in the guide.</source>
+        <source>Recommended: the hand is raised once; the cursors are placed where they are most
+informative, and each eye is verified. The steps run by themselves.
+As in the paper: the cursor is the hand where it is held; you choose the eyes in the guide.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -937,7 +937,7 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>One eye for a wearer who sees with one.</source>
+        <source>Only one, if the wearer sees with one eye.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1245,7 +1245,11 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Nobody has verified every eye. Finish, or check an eye again.</source>
+        <source>Not every eye has been verified. Finish, or check an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset draws with another φ than this result&apos;s: an earlier or a fine-tuned one.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1254,10 +1258,6 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
     </message>
     <message>
         <source>Headset &amp;slipped</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The headset draws with another φ than this result: gone back, or set by hand.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1653,15 +1653,15 @@ As in the paper: each cursor is the hand where it is held; you choose the eyes i
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Draw with φ before the newest, or with the newest again</source>
+        <source>Draw with the previous φ, or with the newest again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Movement of the outline</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Draw with the offline calibration</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Move of the outline</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1702,7 +1702,7 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Depth in metres. The hand is searched from {:.2f} to {:.2f} m (colour). Grey: nearer or farther. Black: not measured.</source>
+        <source>Depth in metres. A hand is looked for from {:.2f} to {:.2f} m (colour). Grey: nearer or farther. Black: not measured.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1882,7 +1882,7 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Points of the present hand</source>
+        <source>Points of the live hand</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2484,11 +2484,11 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>▲ Another shape</source>
+        <source>✓ Hold still</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>✓ Hold still</source>
+        <source>▲ Shape differs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2622,7 +2622,7 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the eye distance is a number; enter 45 to 85 mm</source>
+        <source>the eye distance must be a number; enter 45 to 85 mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2646,8 +2646,8 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show the wearer the drawing without and with the calibration, in an order that nobody knows,
-and record which fits the hand better. The report tells which was which.</source>
+        <source>Show the wearer the drawing without and with the calibration, in a hidden random order,
+and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2843,7 +2843,7 @@ and record which fits the hand better. The report tells which was which.</source
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The preferences are of a newer version of handcal. Settings that this one does not know are left out; they are kept in {}.</source>
+        <source>The preferences are from a newer version of handcal. Settings that this version does not know are ignored; they are kept in {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3633,6 +3633,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Check lists what is damaged; Repair copies the rest</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Images to take</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3650,10 +3654,6 @@ one turns out.</source>
     </message>
     <message>
         <source>taken</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Check names what is damaged; Repair copies the rest</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3733,7 +3733,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>How well does the segmented hand agree with true masks of your own camera&apos;s frames, and how stable is it? About a second a frame.</source>
+        <source>How well does the segmented hand agree with true masks of your own camera&apos;s frames, and how stable is it? About a second per frame.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3949,10 +3949,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Select a wearer with several calibrations to see how their errors went on.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Checking {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3981,10 +3977,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} is back.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Review the selected session</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4001,27 +3993,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Read every file of the selected</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Repair</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Copy what is sound to a new one</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Move the selected away (Del)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Restore</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Bring the last deleted back (Ctrl+Z)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4030,6 +4006,30 @@ one turns out.</source>
     </message>
     <message>
         <source>Delete sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Select a wearer with several calibrations to see how the errors changed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} restored.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Read every file of the selected sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy what is sound to a new session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Delete the selected sessions (Del)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Restore the last deleted session (Ctrl+Z)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4113,7 +4113,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Fill the screen with the live image, to align a hand by. Escape goes back.</source>
+        <source>Fill the screen with the live image, to align a hand with it. Escape goes back.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4273,7 +4273,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Put the cube {:g} m from the eyes, two or three faces towards them.</source>
+        <source>Put the cube {:g} m from the eyes, with two or three faces towards them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4357,11 +4357,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>waiting for a pose of the head</source>
+        <source>waiting for the head&apos;s pose</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the cube moves</source>
+        <source>the cube is moving</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>From the camera, mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4382,10 +4386,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Measured in this image; from the depth camera.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Before the camera, mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4453,10 +4453,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>For each eye, put the viewpoint camera behind its display. Take the grid in a dark room. Do not move camera or headset; switch the display off, and take the board with both cameras at {} or more distances, 0.35 to 0.65 m.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Corners</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4481,7 +4477,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Drawn against seen</source>
+        <source>For each eye, put the viewpoint camera behind its display. In a dark room, take images of the grid. Do not move camera or headset: switch the display off, and take images of the board with both cameras at {} or more distances, 0.35 to 0.65 m.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drawn and seen corners</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4977,7 +4977,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Check what is drawn by a camera in the eye&apos;s place</source>
+        <source>Check with a camera in the eye&apos;s place what the displays draw</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -99,7 +99,7 @@ def test_the_format_is_the_slowest_from_15_hz_on() -> None:
         ({"0": GROUPS["0"]}, "found: QC Back Camera"),
         ({"0": group("\ud800 a\n\x1b[1mcamera" + 200 * "!")}, r"found: \? a \[1mcamera!{86}\)"),
         ({"0": group(NAME, one_format(6.0))}, "has no depth images of 48x32 at 15 Hz"),
-        ({"0": group(NAME.replace("415", "405"), *FORMATS)}, "a unit that hl2ss does not tell"),
+        ({"0": group(NAME.replace("415", "405"), *FORMATS)}, "a unit that hl2ss does not report"),
         ([], "sent no list of cameras"),
         ({"0": []}, "sent no list of cameras"),
         ({"1e9": GROUPS["1"]}, "sent no list of cameras"),

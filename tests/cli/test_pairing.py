@@ -149,8 +149,8 @@ def test_the_virtual_headset_is_paired(
 @pytest.mark.parametrize(
     ("words", "typed", "problem"),
     [
-        (["--pair"], "HANDCAL://nothing", "no invitation"),
-        (["--pair"], "", "no invitation"),
+        (["--pair"], "HANDCAL://nothing", "not an invitation"),
+        (["--pair"], "", "not an invitation"),
         (["--pair", "--port", "47941"], "1234", "8 digits, not 4"),
         ([], "", "--port and a pairing key, or --pair"),
     ],

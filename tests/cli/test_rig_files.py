@@ -81,7 +81,7 @@ def test_the_serial_number_is_taken_from_the_rig_s_own_camera_only(tmp_path: Pat
     longer = recorded(tmp_path / "longer", d415, replace(lens, fx=1.04 * lens.fx))
     before = new.read_bytes()
     for rig, source, problem in (
-        (old, nameless, "does not tell its serial number"),
+        (old, nameless, "reports no serial number"),
         (new, other, "another serial number: 456, not 123"),
         (old, longer, "focal length 4.0 % longer"),
         (old, tmp_path / "nothing", "there is no recording"),

@@ -50,7 +50,7 @@ def test_the_text_is_read_back_in_any_capitals(host: str, text: str) -> None:
     ],
 )
 def test_another_text_is_no_invitation(text: str) -> None:
-    with pytest.raises(LinkError, match="no invitation"):
+    with pytest.raises(LinkError, match="not an invitation"):
         read_invitation(text)
 
 

@@ -184,7 +184,7 @@ def test_what_is_hardly_better_than_nothing_keeps_the_offline_calibration() -> N
     unmoved = replace(GOOD, shift_m=np.array([0.0002, 0.0, 0.0]))
     verdict = _judge({"left": unmoved})["left"]
     assert verdict.name == "keep"
-    assert verdict.reason.startswith("the offline calibration is expected to err by only")
+    assert verdict.reason.startswith("the offline calibration has an expected error of only")
 
 
 def test_evidence_from_outside_contradicts_the_best_result() -> None:

@@ -125,7 +125,7 @@ def test_noise_is_no_board() -> None:
         ({"squares": (41, 7)}, "3 to 40 squares"),
         ({"square_m": 0.0}, "between 1 mm and 1 m"),
         ({"marker_m": 0.025}, "0.3 to 0.95"),
-        ({"dictionary": "DICT_9X9"}, "no dictionary DICT_9X9"),
+        ({"dictionary": "DICT_9X9"}, "unknown dictionary DICT_9X9"),
         ({"squares": (20, 20)}, "has 100 markers, too few"),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_photograph_of_a_charuco_board(shared_data: Path) -> None:
 def test_part_of_a_larger_checkerboard_is_not_taken_for_the_board(shared_data: Path) -> None:
     file = shared_data / "boards" / "opencv_stereo" / "left01.jpg"
     image = read_image(file, cv2.IMREAD_GRAYSCALE)
-    with pytest.raises(BoardError, match="goes on: it has more squares than 8×7"):
+    with pytest.raises(BoardError, match="continues: it has more squares than 8×7"):
         find_board(image, Board(kind="checkerboard", squares=(8, 7)))
 
 

@@ -59,5 +59,5 @@ def test_the_printed_board_has_its_true_size(tmp_path: Path, kind: str) -> None:
 def test_a_board_larger_than_the_paper_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="510×197 mm, more than a4 has"):
         write_board_pdf(tmp_path / "board.pdf", Board(squares=(20, 7)))
-    with pytest.raises(ValueError, match="no paper a9"):
+    with pytest.raises(ValueError, match="unknown paper a9"):
         write_board_pdf(tmp_path / "board.pdf", Board(), "a9")  # type: ignore[arg-type]

@@ -100,7 +100,7 @@ def test_corners_of_a_cube_with_other_faces_are_refused() -> None:
     [
         ({"side_m": 5.0}, "10 mm and 1 m"),
         ({"marker_m": 0.059}, "0.3 to 0.9"),
-        ({"dictionary": "DICT_9X9"}, "no dictionary"),
+        ({"dictionary": "DICT_9X9"}, "unknown dictionary"),
         ({"ids": (0, 1, 2, 3, 4, 4)}, "six different"),
         ({"ids": (0, 1, 2, 3, 4, 50)}, "of the 50"),
     ],

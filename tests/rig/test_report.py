@@ -19,7 +19,7 @@ def test_the_example_is_in_order() -> None:
     assert doubtful(RIG) == {}
     told = {one.what: one.found for one in report_rig(RIG)}
     assert told["Distance of the viewpoints"] == "63 mm"
-    assert told["left: display"] == "1268×720 px, 1.40′ a pixel, 29° across"
+    assert told["left: display"] == "1268×720 px, 1.40′ per pixel, 29° across"
 
 
 def test_exchanged_eyes_are_told() -> None:

@@ -45,7 +45,7 @@ def test_what_equals_a_number_but_is_none_is_refused(number: object, event: Sess
     state = SessionState()
     if event == SessionEvent.ALIGNMENT_DELETED:
         state.apply(Event(1, "", SessionEvent.ALIGNMENT_SAVED, {"number": 1, "sha256": "x"}))
-    with pytest.raises(ValueError, match="a number is whole"):
+    with pytest.raises(ValueError, match="a number must be whole"):
         state.apply(Event(2, "", event, {"number": number, "sha256": "x"}))
 
 

@@ -103,6 +103,6 @@ def test_the_wearer_looks_around_and_the_pose_is_found(monkeypatch: pytest.Monke
     assert scene.prompts == [LOOK_AROUND, ""]
     mute: Any = Scene(tells=False)
     monkeypatch.setattr("handcal.station.camera_pose.time", mute)
-    with pytest.raises(CameraError, match="does not tell its pose"):
+    with pytest.raises(CameraError, match="does not report its pose"):
         run_camera_pose(mute, mute)
     assert mute.prompts[-1] == ""

@@ -100,7 +100,7 @@ def test_a_hand_of_another_shape_is_refused_and_told(stage: Stage, session: Sess
     assert re.fullmatch("thumb .* further out than in the cursor", seen.shape_text)
     stage.press()
     assert stage.see(thumb_out_rad=0.4).state is State.ALIGN
-    assert "changed its shape" in stage.calibration.refusal
+    assert "shape of your hand has changed" in stage.calibration.refusal
     assert events(session)[-1][1]["reason"] == "shape changed"
     seen = stage.hold()
     assert not seen.is_over_limit

@@ -72,7 +72,7 @@ def test_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
     ("system", "advice"),
     [
         ({"platform": "linux", "frozen": True}, "install the Debian package of handcal again"),
-        ({"platform": "win32"}, "run the setup of handcal again, or pip install handcal"),
+        ({"platform": "win32"}, "run handcal's installer again, or pip install handcal"),
         ({"platform": "darwin"}, "pip install handcal"),
     ],
 )

@@ -63,7 +63,7 @@ def test_a_good_headset_is_described_by_name() -> None:
         (DEVICE, replace(ABSENT, notice="headset B asks; A is connected"), "B asks"),
         (DEVICE, replace(ABSENT, rejected={"wrong_version": 1}), "another version"),
         (DEVICE, replace(ABSENT, rejected={"unpaired": 3}), "pair it with handcal pair"),
-        (DEVICE, replace(ABSENT, rejected={"corrupt": 3}), "not of a headset app"),
+        (DEVICE, replace(ABSENT, rejected={"corrupt": 3}), "not from a headset app"),
         (None, ABSENT, "nothing arrives; check the address"),
         (None, GOOD, "not introduced itself"),
         (replace(DEVICE, protocol=1), GOOD, "protocol 1, not 2"),
@@ -87,7 +87,7 @@ def test_what_is_wrong_is_one_sentence(
 
 def test_another_headset_or_app_than_the_rigs_is_said() -> None:
     other = replace(RIG, headset=HeadsetIdentity("d" * 16))
-    assert "another headset than the rig's" in headset_problem(DEVICE, GOOD, other)
+    assert "not the rig's headset" in headset_problem(DEVICE, GOOD, other)
     check = DisplayCheck("today", "camera", "c" * 16, "runtime 1", "app 2", {"left": ""})
     changed = replace(RIG, display_check=check)
     assert "changed since the display check" in headset_problem(DEVICE, GOOD, changed)

@@ -199,7 +199,7 @@ def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: P
     networked = replace(recorded, headset="network")
     networked_finding = find("headset", networked)
     assert networked_finding.health is Health.LIMITED
-    assert "not seen yet" in networked_finding.found
+    assert "not connected yet" in networked_finding.found
     assert str(settings.port) in find("headset", networked).found
     assert find("rig", networked).health is Health.LIMITED  # the example's
     own = replace(networked, rig=str(resource_path("example_rig.yaml")))
@@ -247,7 +247,7 @@ def test_the_session_folder_must_take_a_session(
     (tmp_path / "new").touch()
     assert find("sessions", new).found == f"{tmp_path / 'new'} is a file"
     monkeypatch.setattr(os, "access", lambda *_: False)
-    assert "nothing may be written" in find("sessions", settings).found
+    assert "cannot write to" in find("sessions", settings).found
     monkeypatch.undo()
     full = shutil.disk_usage(tmp_path)._replace(free=100 * 2**20)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: full)

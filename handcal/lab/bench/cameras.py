@@ -94,7 +94,7 @@ def _ahat() -> See:
 
 
 def _seen_by(ideal: Intrinsics, sense: Sense, camera: Intrinsics, scale_m: float) -> See:
-    """Return the measurement of a hand before a wall, drawn by one camera, sensed by another."""
+    """Return the measured hand in front of a wall, drawn by one camera and sensed by another."""
     segment = SegmentSettings(points=_POINTS)
 
     def see(

@@ -20,7 +20,7 @@ from handcal.types import Float64, Intrinsics
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CubeMisalignment:
-    """The virtual cube less the real one, in the axes of the (turned) camera."""
+    """The virtual cube minus the real one, in the axes of the (rotated) camera."""
 
     faces: int
     """Seen in both captures."""

@@ -80,7 +80,7 @@ def keep_capture(
 
 
 class RestWatch:
-    """Decides when an image is to be taken: its object is at rest, and not that taken last.
+    """Decides when to take an image: its object is at rest, and not the one taken last.
 
     The cube must have been out of view since the last image of it, and the image must have changed:
     a hand in front of the camera does not make the real cube a drawn one.

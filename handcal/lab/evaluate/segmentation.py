@@ -93,7 +93,7 @@ def evaluation(rows: Sequence[FrameFigures]) -> dict[str, Any]:
     """Return the figures of all frames, and of each under ``rows``, JSON-able.
 
     All but ``frames`` and ``refused`` are over the frames in which a hand was segmented. None
-    where no frame tells.
+    where no frame has it.
     """
     beyond_mm = [row.beyond_wrist_mm for row in rows]
     known_mm = [one for one in beyond_mm if one is not None]

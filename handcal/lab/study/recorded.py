@@ -129,7 +129,7 @@ def evaluate_recordings(data: RecordedSet) -> dict[str, RecordedResult]:
     """
     P_base = _solve(BASE, data.recordings[BASE])
     K, R, viewpoint_m = split_projection(P_base)
-    # How far the eye is before the display, along the base's axes as the authors take it.
+    # Distance from the eye to the display, along the base's axes as the authors take it.
     distance_m = -float((R @ viewpoint_m)[2] + data.T_S_W[2, 3])
     display = EyeDisplay(
         K=K,
@@ -216,7 +216,7 @@ def _table(path: Path, columns: int) -> Float64:
     try:
         table = np.loadtxt(_checked(path), dtype=np.float64, ndmin=2)
     except ValueError as error:
-        raise FileError(f"{path} is no table of numbers: {error}") from error
+        raise FileError(f"{path} is not a table of numbers: {error}") from error
     if table.shape[1:] != (columns,) or not np.isfinite(table).all():
         raise FileError(f"{path} must hold {columns} finite numbers in each line")
     return table
@@ -233,7 +233,7 @@ def _archived(path: Path, count: int) -> Float64:
             words = [*words[-9:-5], *words[-3:]]
         numbers = np.array([float(word) for word in words[-count:]])
     except ValueError as error:
-        raise FileError(f"{path} is no calibration of Ubitrack's: {error}") from error
+        raise FileError(f"{path} is not a Ubitrack calibration: {error}") from error
     if len(numbers) != count or not np.isfinite(numbers).all():
         raise FileError(f"{path} must end with {count} finite numbers")
     return numbers

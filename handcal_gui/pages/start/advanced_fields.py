@@ -14,7 +14,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
 from handcal_gui.widgets.fields import choice, fill_row, number, whole_number, with_name
 
-_SIDES = {"": tr("By the seed"), "left": tr("Left"), "right": tr("Right")}
+_SIDES = {"": tr("Chosen by the seed"), "left": tr("Left"), "right": tr("Right")}
 
 
 class AdvancedFields(QWidget):

@@ -14,9 +14,9 @@ from handcal_gui.widgets.fields import choice, fill_row
 
 _PLANS: dict[PlanName, str] = {"recommended": tr("Recommended"), "paper": tr("As in the paper")}
 _PLAN_HELP = tr(
-    "Recommended: the hand is raised once; its cursors are placed where they tell most,\n"
-    "and each eye is verified. The steps follow by themselves.\n"
-    "As in the paper: each cursor is the hand where it is held; you choose the eyes in the guide."
+    "Recommended: the hand is raised once; the cursors are placed where they are most\n"
+    "informative, and each eye is verified. The steps run by themselves.\n"
+    "As in the paper: the cursor is the hand where it is held; you choose the eyes in the guide."
 )
 _EYES: dict[str, str] = {
     "both": tr("Both eyes"),
@@ -40,7 +40,7 @@ class PlanField(QWidget):
         super().__init__(parent)
         self._plan = choice("plan", tr("Plan"), _PLANS, _PLAN_HELP)
         self._eyes = choice(
-            "usableEyes", tr("Eyes"), _EYES, tr("One eye for a wearer who sees with one.")
+            "usableEyes", tr("Eyes"), _EYES, tr("Only one, if the wearer sees with one eye.")
         )
         fill_row(self, self._plan, self._eyes, grows=self._eyes)
         self.setFocusProxy(self._plan)

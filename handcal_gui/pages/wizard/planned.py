@@ -46,7 +46,7 @@ _STATES = {
     State.VERIFY: Step.VERIFY,
 }
 _FOLLOWS = Step.SHOW_HAND
-"""The guide's own place while the plan goes on."""
+"""The guide's own step while the plan continues."""
 _CHECKS: dict[Eye, ButtonSpec] = {
     "left": ButtonSpec(Action.CHECK_LEFT, tr("Check l&eft eye")),
     "right": ButtonSpec(Action.CHECK_RIGHT, tr("Check &right eye")),
@@ -72,7 +72,7 @@ class PlannedWizard(Wizard):
 
     @property
     def holds_plan(self) -> bool:
-        """True if the plan is to be held."""
+        """True if the plan should be held."""
         return self.is_held or self._free is not _FOLLOWS
 
     def step(self, snapshot: Snapshot) -> Step:
@@ -207,7 +207,7 @@ class PlannedWizard(Wizard):
             text = tr("The wearer has verified the result. Finish, or check an eye again.")
             main = ButtonSpec(Action.NEXT, tr("Finish"))
         else:
-            text = tr("Nobody has verified every eye. Finish, or check an eye again.")
+            text = tr("Not every eye has been verified. Finish, or check an eye again.")
         return WizardView(
             Step.VERIFY,
             text if checks else f"{sentence(planned.text)}.",
@@ -241,4 +241,6 @@ def _drawn_otherwise(procedure: Procedure) -> str:
     solved_m = results.rendered_shift_m
     if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
         return ""
-    return tr("The headset draws with another φ than this result: gone back, or set by hand.")
+    return tr(
+        "The headset draws with another φ than this result's: an earlier or a fine-tuned one."
+    )

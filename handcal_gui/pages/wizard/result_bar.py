@@ -29,7 +29,7 @@ class ResultBar(QWidget):
     ----------
     buttons : QWidget
     blink_toggled : Signal(bool)
-        Before and after are to be shown in turn, or no longer.
+        Before and after should be shown in turn, or no longer.
     """
 
     blink_toggled = Signal(bool)

@@ -51,7 +51,7 @@ _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
 }
 """Name and keys of each nudge; its movement right and down in arcminutes, and its growth."""
 _GO_BACK = {
-    "former": (tr("Draw with φ before the newest, or with the newest again"), "G"),
+    "former": (tr("Draw with the previous φ, or with the newest again"), "G"),
     "offline": (tr("Draw with the offline calibration"), "Shift+G"),
 }
 """Name and key of each φ that the headset can go back to."""
@@ -74,10 +74,10 @@ class WizardPanel(QWidget):
     hold_changed : Signal(bool)
         A person has chosen whether every step waits for a person.
     nudged : Signal(float, float, float)
-        The outline of a verification is to move to the right and down, in arcminutes, and to grow
+        The outline of a verification should move to the right and down, in arcminutes, and to grow
         by a share.
     went_back : Signal(str)
-        The headset is to draw with the φ before the newest, ``"former"``, or with the offline
+        The headset should draw with the φ before the newest, ``"former"``, or with the offline
         calibration, ``"offline"``.
     step_changed : Signal(Step)
         Another step is shown.
@@ -101,7 +101,7 @@ class WizardPanel(QWidget):
         self._hold = self._hold_action()
         self._nudges = self._nudge_actions()
         self._undo = add_action(
-            self, tr("Move of the outline"), "", lambda: self.asked.emit(Action.UNDO_NUDGE)
+            self, tr("Movement of the outline"), "", lambda: self.asked.emit(Action.UNDO_NUDGE)
         )
         self._undo.setObjectName("undo")
         self._undo.setEnabled(False)
@@ -197,7 +197,7 @@ class WizardPanel(QWidget):
         return actions
 
     def _ask_to_go_back(self, to: str) -> None:
-        self.hold(True)  # or a plan would go on, and send another φ
+        self.hold(True)  # or a plan would continue, and send another φ
         self.went_back.emit(to)
 
     def _choose_hold(self, is_held: bool) -> None:

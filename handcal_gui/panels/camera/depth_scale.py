@@ -25,7 +25,7 @@ class DepthColors:
     Parameters
     ----------
     gate_m : (float, float)
-        Range of depths in which a hand is searched.
+        Range of depths in which a hand is looked for.
     """
 
     def __init__(self, gate_m: tuple[float, float]) -> None:
@@ -87,7 +87,7 @@ class DepthLegend(QWidget):
         low_m, high_m = depth_colors.gate_m
         self.setToolTip(
             tr(
-                "Depth in metres. The hand is searched from {:.2f} to {:.2f} m (colour). "
+                "Depth in metres. A hand is looked for from {:.2f} to {:.2f} m (colour). "
                 "Grey: nearer or farther. Black: not measured."
             ).format(low_m, high_m)
         )

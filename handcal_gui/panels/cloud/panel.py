@@ -91,7 +91,7 @@ class CloudPanel(QWidget):
             tr("Cursor"), "cursor", tr("Points of the frozen hand"), widest=widest
         )
         self._hand = LegendEntry(
-            tr("Live hand"), "live", tr("Points of the present hand"), widest=widest
+            tr("Live hand"), "live", tr("Points of the live hand"), widest=widest
         )
         self._scale = ResidualScale()
         self._pairs = QCheckBox(tr("Pairs"))

@@ -44,7 +44,7 @@ _MOVES: dict[int, tuple[int, int]] = {
     Qt.Key.Key_PageDown: (2, -1),
     Qt.Key.Key_PageUp: (2, 1),
 }
-"""Axis and direction of φ, opposite to the picture's, which moves as the key points."""
+"""Axis and direction of φ, opposite to the picture's, which moves in the key's direction."""
 _KEYS = tr(
     "Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). "
     "Click here first; E changes the eye."
@@ -73,7 +73,7 @@ class FineTunePanel(QWidget):
     shift_changed : Signal(object)
         φ of both eyes, a mapping of eye to (3,) metres, for the headset; at most 30 times a second.
     shift_settled : Signal()
-        The last φ sent has been unchanged for 0.7 s and is to be stored.
+        The last φ sent has been unchanged for 0.7 s and should be stored.
     """
 
     shift_changed = Signal(object)

@@ -31,7 +31,7 @@ class ShiftStream(QObject):
     sent : Signal(object)
         Shifts to render with; at most 30 times a second.
     settled : Signal()
-        The last shifts sent are to be stored: unchanged for 0.7 s.
+        The last shifts sent should be stored: unchanged for 0.7 s.
     arrival : Arrival
         As of the last snapshot seen.
     """

@@ -29,7 +29,7 @@ _HISTORY_LIMITS = 2.0
 _STRAIGHT_RAD = np.radians(2.0)
 """Rotations below this need no correction: hardly more than the guard's own error."""
 _SHAPE_M = 0.0015
-"""A smaller change of shape, rms, is not worth a word."""
+"""A smaller change of shape, rms, is not mentioned."""
 _NO_CURSOR = tr("The hand's rotation from the cursor will be shown here.")
 _TAKEN = tr("The alignment is confirmed.")
 _NO_HAND = tr("Hold the hand in view of the camera.")
@@ -90,7 +90,7 @@ class RotationPanel(QWidget):
             observation.is_over_limit and not observation.has_changed
         )
         if not is_turned and (angle_rad < _STRAIGHT_RAD or observation.has_changed):
-            word = tr("▲ Another shape") if observation.has_changed else tr("✓ Hold still")
+            word = tr("▲ Shape differs") if observation.has_changed else tr("✓ Hold still")
             self._dial.show_angle(angle_rad, self._limit_rad, word)
             self._hand.show_turn("")
             self._advice.setText(shape or _STRAIGHT)

@@ -223,5 +223,5 @@ def _read_eye_distance(text: str) -> EyeDistance:
     try:
         value_mm = float(text.replace(",", "."))
     except ValueError:
-        raise ValueError(tr("the eye distance is a number; enter 45 to 85 mm")) from None
+        raise ValueError(tr("the eye distance must be a number; enter 45 to 85 mm")) from None
     return EyeDistance(1e-3 * value_mm)

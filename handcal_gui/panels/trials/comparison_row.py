@@ -19,8 +19,8 @@ _ANSWERS: dict[Answer, str] = {
     "neither": tr("Neither"),
 }
 _COMPARE_HELP = tr(
-    "Show the wearer the drawing without and with the calibration, in an order that nobody knows,\n"
-    "and record which fits the hand better. The report tells which was which."
+    "Show the wearer the drawing without and with the calibration, in a hidden random order,\n"
+    "and record which fits the hand better. The report says which was which."
 )
 
 

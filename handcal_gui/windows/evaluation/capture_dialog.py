@@ -102,7 +102,7 @@ class CaptureDialog(PreparationDialog):
             QCheckBox(tr("&Large view")),
             "largeView",
             help_text=tr(
-                "Fill the screen with the live image, to align a hand by. Escape goes back."
+                "Fill the screen with the live image, to align a hand with it. Escape goes back."
             ),
         )
         self._close = button("close", tr("Close"))

@@ -104,7 +104,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             tr("Segmentation"),
             tr(
                 "How well does the segmented hand agree with true masks of your own camera's "
-                "frames, and how stable is it? About a second a frame."
+                "frames, and how stable is it? About a second per frame."
             ),
             FileEvaluation(_missing_frames, run_segmentation_test),
             _segmentation_form,

@@ -16,7 +16,7 @@ class TimeLeft:
     Parameters
     ----------
     begun : float
-        Share that was already done at the start.
+        Share that was already complete at the start.
     clock : callable
         Returns the time in seconds.
     """

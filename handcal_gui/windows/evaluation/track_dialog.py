@@ -179,14 +179,14 @@ def _finding(sight: CubeSight) -> Finding:
     if sight.problem:
         return Finding("", Health.BROKEN, sight.problem)
     if sight.tracked is None:
-        return Finding("", Health.LIMITED, tr("waiting for a pose of the head"))
+        return Finding("", Health.LIMITED, tr("waiting for the head's pose"))
     if not sight.tracked.is_at_rest:
-        return Finding("", Health.LIMITED, tr("the cube moves"))
+        return Finding("", Health.LIMITED, tr("the cube is moving"))
     return Finding("", Health.GOOD, tr("the cube is at rest"))
 
 
 def _pose_rows(sight: CubeSight) -> list[Row]:
-    """Return the filtered pose in the world, and the measured one before the camera."""
+    """Return the filtered pose in the world, and the measured one relative to the camera."""
     rows = []
     if sight.tracked is not None:
         T_W_T = sight.tracked.T_W_T
@@ -196,7 +196,7 @@ def _pose_rows(sight: CubeSight) -> list[Row]:
         rows.append(Row(tr("Rotation vector, °"), _cells(turn_deg, 2), averaged))
     if sight.T_D_T is not None:
         before = tr("Measured in this image; from the depth camera.")
-        rows.append(Row(tr("Before the camera, mm"), _cells(1e3 * sight.T_D_T[:3, 3], 1), before))
+        rows.append(Row(tr("From the camera, mm"), _cells(1e3 * sight.T_D_T[:3, 3], 1), before))
     return rows
 
 

@@ -70,9 +70,9 @@ class _Desk:
     def _place(self, depth_m: float) -> None:
         self._tell(
             _Step(
-                tr("Put the cube {:g} m from the eyes, two or three faces towards them.").format(
-                    depth_m
-                ),
+                tr(
+                    "Put the cube {:g} m from the eyes, with two or three faces towards them."
+                ).format(depth_m),
                 tr("It is there"),
             )
         )

@@ -155,7 +155,7 @@ COLUMNS = (
         lambda e: _known_first(e.trials_arcmin),
         is_number=True,
     ),
-    _Column(tr("State"), tr("Check names what is damaged; Repair copies the rest"), _state, _state),
+    _Column(tr("State"), tr("Check lists what is damaged; Repair copies the rest"), _state, _state),
 )
 
 

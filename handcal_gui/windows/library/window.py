@@ -199,7 +199,7 @@ class LibraryWindow(QDialog):
             self._trend.show_calibrations(found)
         else:
             self._trend_title.setText(
-                tr("Select a wearer with several calibrations to see how their errors went on.")
+                tr("Select a wearer with several calibrations to see how the errors changed.")
             )
 
     def _open_chosen(self) -> None:
@@ -264,7 +264,7 @@ class LibraryWindow(QDialog):
 
     def _restore_last(self) -> None:
         last = self._deleted[-1]
-        self._start(lambda _: tr("{} is back.").format(restore_session(last).name))
+        self._start(lambda _: tr("{} restored.").format(restore_session(last).name))
 
     def _start(self, work: Work) -> None:
         if self._job is not None:
@@ -307,25 +307,25 @@ class LibraryWindow(QDialog):
             (
                 "checkSessions",
                 tr("Check"),
-                tr("Read every file of the selected"),
+                tr("Read every file of the selected sessions"),
                 self._check_chosen,
             ),
             (
                 "repairSession",
                 tr("Repair"),
-                tr("Copy what is sound to a new one"),
+                tr("Copy what is sound to a new session"),
                 self._repair_chosen,
             ),
             (
                 "deleteSessions",
                 tr("Delete"),
-                tr("Move the selected away (Del)"),
+                tr("Delete the selected sessions (Del)"),
                 self._delete_chosen,
             ),
             (
                 "restoreSession",
                 tr("Restore"),
-                tr("Bring the last deleted back (Ctrl+Z)"),
+                tr("Restore the last deleted session (Ctrl+Z)"),
                 self._restore_last,
             ),
         ]

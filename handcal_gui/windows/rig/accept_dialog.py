@@ -34,16 +34,16 @@ from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
 _HOW = tr(
-    "For each eye, put the viewpoint camera behind its display. Take the grid in a dark room. Do "
-    "not move camera or headset; switch the display off, and take the board with both cameras at "
-    "{} or more distances, 0.35 to 0.65 m."
+    "For each eye, put the viewpoint camera behind its display. In a dark room, take "
+    "images of the grid. Do not move camera or headset: switch the display off, and take images "
+    "of the board with both cameras at {} or more distances, 0.35 to 0.65 m."
 ).format(FEWEST_VIEWS)
 _COLUMNS = (tr("Corners"), tr("Mean, ′"), tr("Largest, ′"))
 _TAKE = {"grid": tr("Take grid"), "board": tr("Take board")}
 
 
 class AcceptDialog(QDialog):
-    """Takes the images of an acceptance, and shows if the rig passes.
+    """Takes the images of an acceptance, and shows whether the rig passes.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class AcceptDialog(QDialog):
         self._page: Path | None = None
         self._counts = {eye: QLabel() for eye in EYES}
         self._found = FindingLine("accepted")
-        self._table = NumberTable("drawn-against-seen", tr("Drawn against seen"))
+        self._table = NumberTable("drawn-against-seen", tr("Drawn and seen corners"))
         self._bar = JobBar()
         self._run = main_button("runAcceptance", tr("Accept"))
         self._open = button("openPage", tr("Open page"))

@@ -1,4 +1,4 @@
-"""The rig wizard: the offline calibration, step by step, in a window of its own."""
+"""The rig wizard: the offline calibration, step by step, in a separate window."""
 
 from __future__ import annotations
 

@@ -19,28 +19,28 @@ namespace Handcal
     public sealed class HandcalHeadset : MonoBehaviour
     {
         [Tooltip("The text under the PC's QR code (handcal pair), or its address and 8 digits, as "
-            + "192.168.1.20 12345678. It is used once; then the app connects as paired, until the text is another.")]
+            + "192.168.1.20 12345678. Used once; afterwards the app connects as paired, until you enter another text.")]
         public string invitation = "";
 
         [Tooltip("Name by which the PC calls this headset. Empty: the device's own.")]
         public string deviceName = "";
 
-        [Tooltip("Time from the camera's pose to its display, ms, where the app sets no PoseTimeNs.")]
+        [Tooltip("Time from the camera's pose to its display, ms, if the app sets no PoseTimeNs.")]
         public float poseDelayMs;
 
-        [Tooltip("Stabilise the picture at the virtual image, where reprojection takes nothing of the correction.")]
+        [Tooltip("Stabilise the picture at the virtual image, where reprojection does not reduce the correction.")]
         public bool setsFocusPlane = true;
 
-        [Tooltip("Distance of the virtual image, m, until the calibration tells it.")]
+        [Tooltip("Distance of the virtual image, m, until the calibration provides it.")]
         public float focusDistanceM = 2;
 
-        [Tooltip("The wearer's eye distance, mm, if it is measured, as by eye tracking. 0: it is not.")]
+        [Tooltip("The wearer's eye distance, mm, if it is measured, for example by eye tracking. 0: not measured.")]
         public float eyeDistanceMm;
 
         [Tooltip("Show prompts and the state of the connection in front of the wearer.")]
         public bool showsText = true;
 
-        [Tooltip("Word to confirm by (Windows devices, with the Microphone capability). Empty: none.")]
+        [Tooltip("Spoken word that confirms (Windows devices, with the Microphone capability). Empty: none.")]
         public string confirmWord = "confirm";
 
         /// <summary>

@@ -84,7 +84,7 @@ def test_a_change_of_shape_is_shown_beside_the_turn(panel: RotationPanel, snapsh
         "is_over_limit": True,
     }
     panel.show_snapshot(snapshot(observation=changed | {"rotation_rad": np.radians([0, 4, 0])}))
-    assert word(panel) == "▲ Another shape"
+    assert word(panel) == "▲ Shape differs"
     assert text(panel, "advice") == "Thumb 9 mm further out than in the cursor."
     panel.show_snapshot(snapshot(observation=changed | {"rotation_rad": np.radians([0, 14, 0])}))
     assert word(panel) == "▲ Turn back"

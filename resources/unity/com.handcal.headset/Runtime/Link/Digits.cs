@@ -98,7 +98,7 @@ namespace Handcal.Link
                     }
                 }
             }
-            problem = "No PC answered: let it show a code with handcal pair.";
+            problem = "No PC answered: show a code on it with handcal pair.";
             return null;
         }
 
@@ -140,7 +140,7 @@ namespace Handcal.Link
             }
             if (!Keys.AreEqual(echo, nonce)) return false;
             if (body == (int)Body.Refused)
-                problem = "The PC takes no more codes after too many wrong ones: let it show another.";
+                problem = "The PC takes no more codes after too many wrong ones: show a new one on the PC.";
             else if (body != (int)Body.Paired || !IsValue(pcValue)) return false;
             else
             {
