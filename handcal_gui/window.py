@@ -14,6 +14,7 @@ from PySide6.QtGui import (
     QAction,
     QCloseEvent,
     QColor,
+    QIcon,
     QKeyEvent,
     QKeySequence,
     QPainter,
@@ -80,6 +81,13 @@ _MENUS = {
 }
 _TITLE_BUTTONS = {"qt_dockwidget_closebutton": "close", "qt_dockwidget_floatbutton": "float"}
 """Icons of a dock's buttons, by the names that Qt gives the buttons."""
+_ICON_TABS = """
+    QTabBar::tab { padding: 5px 9px; width: 20px; border: 0; font-size: 1px; color: transparent; }
+    QTabBar::tab:hover { background: palette(midlight); }
+    QTabBar::tab:selected { background: palette(base); }
+    QTabBar::tab:selected { border-bottom: 2px solid palette(highlight); }
+"""
+"""Tabs without texts, which stay for screen readers and tooltips."""
 _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
     "start": frozenset(),
     "live": frozenset(_TITLES),
@@ -298,7 +306,9 @@ class MainWindow(QMainWindow):
         return super().event(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Handle the keys that a floating dock ignores, as if it were docked."""
+        """Handle the keys that a floating dock ignores, and fit the tabs of a resized one."""
+        if isinstance(watched, QDockWidget) and event.type() == QEvent.Type.Resize:
+            self._titles_timer.start()
         is_apart = isinstance(watched, QDockWidget) and watched.window() is not self
         if is_apart and isinstance(event, QKeyEvent):
             self._bar.notice_key(event)
@@ -378,18 +388,34 @@ class MainWindow(QMainWindow):
                     button.setIcon(icon(drawing))
 
     def _leave_titles_to_tabs(self) -> None:
-        """Hide the titles of docks that are tabbed together; their tabs show the same text."""
-        for dock in self._docks.values():
+        """Hide the titles of docks whose tabs show the same text."""
+        bars = self.findChildren(QTabBar, options=_CHILDREN_ONLY)
+        without_text = {name for bar in bars for name in self._fit_tabs(bar)}
+        for name, dock in self._docks.items():
             shared = any(not other.isHidden() for other in self.tabifiedDockWidgets(dock))
+            is_said = shared and name not in without_text
             title = dock.titleBarWidget()
-            if shared and title is None:
+            if is_said and title is None:
                 dock.setTitleBarWidget(QWidget(dock))
-            elif not shared and title is not None:
+            elif not is_said and title is not None:
                 dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
                 title.deleteLater()
-        for bar in self.findChildren(QTabBar, options=_CHILDREN_ONLY):
-            bar.setElideMode(Qt.TextElideMode.ElideNone)
         self._draw_title_buttons()  # Qt recreates them with the titles
+
+    def _fit_tabs(self, bar: QTabBar) -> Iterator[str]:
+        """Show icons in place of texts that do not fit; return the names of those docks."""
+        bar.setElideMode(Qt.TextElideMode.ElideNone)
+        named = {dock.windowTitle(): name for name, dock in self._docks.items()}
+        names = [named[bar.tabText(i)] for i in range(bar.count()) if bar.tabText(i) in named]
+        texts_px = sum(
+            bar.fontMetrics().horizontalAdvance(self._docks[name].windowTitle()) for name in names
+        )
+        room_px = max((self._docks[name].width() for name in names), default=0)
+        has_icons = texts_px + 3 * SPACING_PX * len(names) > room_px
+        bar.setStyleSheet(_ICON_TABS if has_icons else "")
+        for i, name in enumerate(names):
+            bar.setTabIcon(i, icon(name.replace("_", "-")) if has_icons else QIcon())
+        return iter(names if has_icons else ())
 
     def _make_menus(self) -> None:
         self.menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}

@@ -2,10 +2,12 @@
 # Builds what is given to users, in dist/:
 #   bash installer/build.sh wheel      handcal-VERSION-py3-none-any.whl
 #   bash installer/build.sh deb        handcal_VERSION_amd64.deb, for Debian and Ubuntu
-#   bash installer/build.sh windows    handcal-setup-VERSION.exe, for Windows 10 and 11
+#   bash installer/build.sh deb-open3d handcal-open3d_VERSION_amd64.deb, the same with Open3D
+#   bash installer/build.sh windows    handcal-setup-VERSION.exe, for Windows 10 and 11, and
+#                                      handcal-open3d-VERSION-windows.zip, to unpack beside it
 #   bash installer/build.sh all
 # Runs on Debian 12 or newer with Python 3.11 to 3.13 (PYTHON names another than python3); deb
-# needs binutils, windows needs nsis and unzip. docs/platforms.md says what was measured.
+# needs binutils, windows needs nsis, zip and unzip. docs/platforms.md says what was measured.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 work=$PWD/dist/work
@@ -20,15 +22,15 @@ require() {
     command -v "$1" >/dev/null || fail "$1 is missing; run apt-get install $2"
 }
 
-# Installs the tools and the program's packages, by the hashes of the lock.
+# Installs the tools and the packages of a lock by their hashes: make_environment FOLDER LOCK
 make_environment() {
-    local lock=installer/requirements-build.lock state
+    local folder=$1 lock=$2 state
     state=$(sha256sum <"$lock")
-    [[ -x $python && $(cat "$work/venv/state" 2>/dev/null) == "$state" ]] && return
-    "${PYTHON:-python3}" -m venv --clear "$work/venv"
-    "$python" -m pip --disable-pip-version-check --quiet install --require-hashes -r "$lock" ||
-        fail "the packages could not be installed; is this computer online?"
-    echo "$state" >"$work/venv/state"
+    [[ -x $folder/bin/python && $(cat "$folder/state" 2>/dev/null) == "$state" ]] && return
+    "${PYTHON:-python3}" -m venv --clear "$folder"
+    "$folder/bin/python" -m pip --disable-pip-version-check --quiet install --require-hashes \
+        -r "$lock" || fail "the packages could not be installed; is this computer online?"
+    echo "$state" >"$folder/state"
 }
 
 build_wheel() {
@@ -39,8 +41,18 @@ build_wheel() {
 }
 
 build_deb() {
+    make_deb handcal "$python" handcal-open3d "Inspect in 3D is in handcal-open3d"
+}
+
+build_deb-open3d() {
+    make_environment "$work/venv-open3d" installer/requirements-open3d.lock
+    make_deb handcal-open3d "$work/venv-open3d/bin/python" handcal "With Open3D for Inspect in 3D"
+}
+
+# make_deb PACKAGE PYTHON OTHER SENTENCE: of the packages of a Python, in place of another package.
+make_deb() {
     require objdump binutils
-    local root=$work/deb depends size
+    local package=$1 python=$2 other=$3 sentence=$4 root=$work/deb depends size
     "$python" -m pip --quiet install --no-deps --force-reinstall "$wheel"
     # Elsewhere, so that it finds the installed program and not the checkout.
     (cd "$work" && "$python" -m PyInstaller --noconfirm --log-level WARN --distpath "$work" \
@@ -58,7 +70,9 @@ build_deb() {
     depends=$(system_packages "$root/opt/handcal")
     size=$(du -sk "$root" | cut -f1)
     cat >"$root/DEBIAN/control" <<CONTROL
-Package: handcal
+Package: $package
+Conflicts: $other
+Replaces: $other
 Version: $version
 Architecture: amd64
 Maintainer: the handcal authors <handcal@localhost>
@@ -68,8 +82,9 @@ Section: science
 Priority: optional
 Description: calibrate an optical see-through headset with the wearer's bare hand
  A window (handcal-gui) and a command line (handcal), with a simulator that needs no hardware.
+ $sentence.
 CONTROL
-    dpkg-deb --root-owner-group -Zzstd -z9 --build "$root" "dist/handcal_${version}_amd64.deb"
+    dpkg-deb --root-owner-group -Zzstd -z9 --build "$root" "dist/${package}_${version}_amd64.deb"
 }
 
 # Prints the packages of the system's libraries that the bundle loads, for the control file.
@@ -90,15 +105,17 @@ system_packages() {
 build_windows() {
     require makensis nsis
     require unzip unzip
-    local root=$work/windows
-    rm -rf "$root"
-    mkdir -p "$root/wheels"
-    "$python" installer/windows/requirements.py installer/requirements-build.lock "$root"
-    "$python" -m pip --disable-pip-version-check --quiet download --no-deps --require-hashes \
-        --only-binary=:all: --platform win_amd64 --python-version 3.13 \
-        -r "$root/requirements.txt" -d "$root/wheels"
-    "$python" -m pip --disable-pip-version-check --quiet download --no-deps --require-hashes \
-        --only-binary=:all: --platform win_amd64 -r "$root/tools.txt" -d "$root"
+    require zip zip
+    local root=$work/windows open3d=$work/handcal-open3d file=handcal-open3d-$version-windows.zip
+    rm -rf "$root" "$open3d" "dist/$file"
+    mkdir -p "$root" "$open3d"
+    "$python" installer/windows/requirements.py installer/requirements-build.lock \
+        installer/requirements-open3d.lock "$root"
+    download "$root/requirements.txt" "$root/wheels"
+    download "$root/requirements-open3d.txt" "$open3d"
+    download "$root/tools.txt" "$root"
+    "$python" installer/licences.py "$open3d/licences" "$open3d"/*.whl
+    (cd "$work" && zip -qr0 "$OLDPWD/dist/$file" handcal-open3d) # wheels are compressed already
     cp "$wheel" "$root/wheels"
     "$python" installer/licences.py "$root/licences" "$root"/wheels/*.whl "$root"/uv-*.whl
     unzip -qjo "$root"/uv-*.whl '*/scripts/uv.exe' -d "$root"
@@ -113,13 +130,19 @@ build_windows() {
         installer/windows/handcal.nsi
 }
 
+# Downloads what a file of requirements lists, for Windows: download FILE FOLDER
+download() {
+    "$python" -m pip --disable-pip-version-check --quiet download --no-deps --require-hashes \
+        --only-binary=:all: --platform win_amd64 --python-version 3.13 -r "$1" -d "$2"
+}
+
 case ${1:-} in
-wheel | deb | windows) wanted=(wheel "$1") ;;
-all) wanted=(wheel deb windows) ;;
-*) fail "say what to build: wheel, deb, windows or all" ;;
+wheel | deb | deb-open3d | windows) wanted=(wheel "$1") ;;
+all) wanted=(wheel deb deb-open3d windows) ;;
+*) fail "say what to build: wheel, deb, deb-open3d, windows or all" ;;
 esac
 mkdir -p "$work"
-make_environment
+make_environment "$work/venv" installer/requirements-build.lock
 for one in $(printf '%s\n' "${wanted[@]}" | awk '!seen[$0]++'); do
     "build_$one"
 done

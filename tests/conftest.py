@@ -4,6 +4,7 @@ import multiprocessing.process
 import os
 import platform
 import subprocess
+import sys
 from collections.abc import Callable, Generator, Sequence
 from functools import cache
 from pathlib import Path
@@ -22,6 +23,10 @@ from handcal.types import EYES, Alignment, Eye
 # A busy machine fails no test.
 hypothesis.settings.register_profile("handcal", deadline=None)
 hypothesis.settings.load_profile("handcal")
+
+# Images of machines turn bytecode off, and then each worker rewrites all assertions in every run.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 platform.platform()  # starts a process the first time, which a quick test may not
 

@@ -6,6 +6,9 @@ from collections import deque
 
 from handcal.types import Frame
 
+INFORM_NS = 25_000_000
+"""Least time between the frames in which work is done that only informs people: all frames of a
+camera of 30 Hz, every second of 60, every third of 90."""
 _WINDOW = 300
 
 

@@ -1,10 +1,16 @@
-"""The RealSense SDK, and the devices that it lists."""
+"""The RealSense SDK, and the devices that it lists.
+
+``python -m handcal.camera.sdk_devices`` lists them as JSON, in a process that the SDK may crash.
+"""
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from handcal.camera.usb import explain_absence
@@ -12,6 +18,7 @@ from handcal.errors import CameraError
 from handcal.types import CameraIdentity
 
 _MOST_CHARACTERS = 100
+_LONGEST_LISTING_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +102,45 @@ def connected_devices() -> list[Device]:
     return [describe_device(device) for device in sdk_devices()]
 
 
+def devices_by_child() -> list[Device]:
+    """Return the connected devices as listed by another process, which the SDK may crash.
+
+    Raises
+    ------
+    CameraError
+        If the SDK is missing, cannot list devices, crashes, or does not answer.
+    """
+    advice = (
+        "unplug the camera and plug it in again; if it stays so, install pyrealsense2 again "
+        "(the simulator, recordings and other cameras work without)"
+    )
+    command = [sys.executable, "-m", "handcal.camera.sdk_devices"]
+    try:
+        child = subprocess.run(  # noqa: S603
+            command,
+            capture_output=True,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            errors="replace",
+            timeout=_LONGEST_LISTING_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise CameraError(
+            f"librealsense lists no devices within {_LONGEST_LISTING_S:g} s: {advice}"
+        ) from error
+    answer = child.stdout.rpartition("\n")[2]  # a library may print before
+    try:
+        listed = json.loads(answer)
+    except ValueError as error:
+        last = child.stderr.strip().rpartition("\n")[2][:_MOST_CHARACTERS]
+        why = ", ".join(filter(None, (f"status {child.returncode}", last)))
+        raise CameraError(f"librealsense crashed ({why}): {advice}") from error
+    if isinstance(listed, str):
+        raise CameraError(listed)
+    return [Device(**device) for device in listed]
+
+
 def describe_device(device: Any) -> Device:
     """Return the description of a device, as far as the device answers."""
     rs = librealsense()
@@ -149,3 +195,16 @@ def _temperature_c(rs: Any, device: Any) -> float | None:
             if sensor.supports(rs.option.asic_temperature):
                 return float(sensor.get_option(rs.option.asic_temperature))
     return None
+
+
+def _main() -> None:
+    """Print the connected devices, or the reason why there is no list, as one line of JSON."""
+    try:
+        answer: object = [asdict(device) for device in connected_devices()]
+    except CameraError as error:
+        answer = str(error)
+    sys.stdout.write(f"\n{json.dumps(answer)}")
+
+
+if __name__ == "__main__":
+    _main()

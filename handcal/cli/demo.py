@@ -18,7 +18,7 @@ import numpy as np
 from handcal.display import reprojection_arcmin
 from handcal.errors import HandcalError
 from handcal.progress import Progress
-from handcal.register.fuse import eye_position_m
+from handcal.register.prior import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig

@@ -200,8 +200,7 @@ def prior(arguments: argparse.Namespace) -> None:
 
     from handcal.errors import FileError
     from handcal.io.resources import resource_path
-    from handcal.register.fuse import eye_slice
-    from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
+    from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior, eye_slice
     from handcal.rig.rig_file import read_rig
     from handcal.station.lab_prior import run_learn_prior
     from handcal.types import EYES

@@ -63,9 +63,9 @@ _SHAPE_SHARE = 1.35
 # movement by a rotation that becomes an error in every direction.
 _LEAST_SIGMA_M = 5e-5
 _TURNED_SHARE = 0.03
-# Unknown place about which a wearer turns the hand, in the scatter of the hand's points. Chosen on
-# 100 simulated alignments each of wearers who balance all of the hand, its fingers or its palm.
-_PIVOT_SHARE = 0.7
+# Probability that a wearer who turned the hand balanced its outline on the cursor, rather than
+# turning it about some point. Nobody has measured it.
+_BALANCE_SHARE = 0.5
 
 
 Pairs: TypeAlias = tuple[Float64, Indices, Bool]
@@ -165,7 +165,11 @@ def fit_match(
     hand_m = match.hand_m[chosen]
     paired = transform(T_E, hand_m)
     R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))
-    moved_m = balanced_turn(transform(T_cursor, match.outline_m), R, mean_point(unturned))
+    turned_rad = Rotation.from_matrix(R).as_rotvec()
+    turned_rad *= _turned_share(match, T_E, turned_rad, _scatter(paired))
+    R_turned = Rotation.from_rotvec(turned_rad).as_matrix()
+    outline_m = transform(T_cursor, match.outline_m)
+    moved_m = _BALANCE_SHARE * balanced_turn(outline_m, R_turned, mean_point(unturned))
     unturned += moved_m
     rigid_fit_m, _ = _fit_pairs(unturned, paired, distance_m, history[0] / 3.0)
     shift_m = balance(unturned, paired, rigid_fit_m, distance_m)
@@ -241,18 +245,16 @@ def _covariance(
     """Return the covariance of φ from the uncertainty of the hand's displacement at its centroid.
 
     Its parts: the registration's own; if the hand returned rotated by R, the unknown
-    centre of that rotation, which may be any point of the hand and moves the centroid by (I - R)
-    times its distance, and the movement (3,) by which the wearer is taken to have balanced it; the
-    change of the hand's shape; and a lower bound.
+    centre of that rotation, which may be any point of the cloud and moves the centroid by (I - R)
+    times its distance, and the movement (3,) by which the wearer is expected to have balanced it,
+    which is as far from either extreme; the change of the hand's shape; and a lower bound.
     """
     R_E = T_E[:3, :3]
+    scatter_m2 = _scatter(hand_m)
     turned_rad = Rotation.from_matrix(R).as_rotvec()
-    noise_rad2 = R_E @ match.covariance[:3, :3] @ R_E.T
-    # A rotation that noise explains is none.
-    surplus = 1.0 - 3.0 / max(float(turned_rad @ np.linalg.solve(noise_rad2, turned_rad)), 3.0)
-    lever = np.eye(3) - Rotation.from_rotvec(np.sqrt(surplus) * turned_rad).as_matrix()
-    centred = _centred(hand_m)
-    turned = _PIVOT_SHARE**2 * (lever @ (centred.T @ centred / len(hand_m)) @ lever.T)
+    turned_rad *= np.sqrt(_turned_share(match, T_E, turned_rad, scatter_m2))
+    lever = np.eye(3) - Rotation.from_rotvec(turned_rad).as_matrix()
+    turned = lever @ scatter_m2 @ lever.T
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
     measured = match.covariance[3:, 3:] + _SHAPE_SHARE**2 * match.shape.scatter_m2
     displacement = R_E @ measured @ R_E.T + turned + least_m2 * np.eye(3)
@@ -261,6 +263,27 @@ def _covariance(
     middle_m = np.array([mean_point(cursor_m), mean_point(hand_m)])
     gain = np.linalg.inv(design(middle_m[:1], middle_m[1:], distance_m, exact=True)[0])
     return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
+
+
+def _turned_share(
+    match: HandMatch, T_E: Float64, turned_rad: Float64, scatter_m2: Float64
+) -> float:
+    """Return the share of a squared rotation (3,) that noise and a change of shape do not explain.
+
+    As much of the change of shape may be a displacement of the hand as a rotation that moves its
+    points, of scatter (3, 3), as far.
+    """
+    R_E = T_E[:3, :3]
+    inertia_m2 = np.trace(scatter_m2) * np.eye(3) - scatter_m2
+    shape_m2 = (_SHAPE_SHARE * match.shape.rms_m) ** 2 / 3.0
+    explained_rad2 = R_E @ match.covariance[:3, :3] @ R_E.T + shape_m2 * np.linalg.inv(inertia_m2)
+    return 1.0 - 3.0 / max(float(turned_rad @ np.linalg.solve(explained_rad2, turned_rad)), 3.0)
+
+
+def _scatter(points_m: Float64) -> Float64:
+    """Return the mean of the products of the coordinates about the centroid, (3, 3)."""
+    centred = _centred(points_m)
+    return np.asarray(centred.T @ centred / len(points_m))
 
 
 def _pairs(

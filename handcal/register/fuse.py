@@ -24,22 +24,25 @@ A verification, in which the wearer moves the drawing of the resting hand until 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import softmax
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import invert, project, transform
+from handcal.display import eye_projection
+from handcal.geometry import project, transform
 from handcal.register.prior import (
     EyePrior,
     Observed,
     PriorSettings,
     depth_covariance_m2,
     eye_prior,
+    eye_slice,
     posterior,
+    shift_by_depth,
+    with_eye_distance,
 )
 from handcal.register.surface import describe_surface
 from handcal.rig_types import EyeDisplay, Rig
@@ -51,8 +54,6 @@ _OUTLINE_FROM_POINTS = 1500
 _NORMAL_FLOOR = 1e-3
 # Place of the hand, in E, that a verification to come is expected to have.
 _VERIFIED_AT_M = 0.0, 0.0, 0.5
-# Of a single solved eye: the eye box is about 2 cm wide (paper).
-_WIDE_EYE_BOX_M = 0.010
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,17 +149,6 @@ class Observation:
         return self.H, self.seen_m, self.registration_m2 + scale**2 * self.wearer_m2
 
 
-def with_eye_box(shift: EyeShift) -> EyeShift:
-    """Return the estimate with a wide eye box as prior: uncertain components shrink towards C0."""
-    prior = np.eye(3) / _WIDE_EYE_BOX_M**2
-    covariance_m2 = np.asarray(np.linalg.inv(np.linalg.inv(shift.covariance_m2) + prior))
-    return replace(
-        shift,
-        shift_m=covariance_m2 @ np.linalg.solve(shift.covariance_m2, shift.shift_m),
-        covariance_m2=covariance_m2,
-    )
-
-
 def fuse_alignments(
     solved: Sequence[tuple[Alignment, Mapping[Eye, EyeShift]]],
     rig: Rig,
@@ -198,7 +188,7 @@ def fuse_alignments(
     if not solved and not checks:
         raise ValueError("at least one alignment is needed")
     observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
-    prior = _with_eye_distance(eye_prior(settings.prior), rig, eye_distance)
+    prior = with_eye_distance(eye_prior(settings.prior), rig, eye_distance)
     known = (*observed, *(one for found in checks.values() for one in found))
     weights = _scale_weights(prior, known, settings)
     found = [posterior(prior, [o.at(scale) for o in known]) for scale in settings.wearer_scales]
@@ -238,50 +228,6 @@ def fuse_alignments(
         },
         by_depth_m2=by_depth_m2,
     )
-
-
-def _by_depth(point_E_m: Float64, display: EyeDisplay, rig: Rig) -> Float64:
-    """Return derivatives (3, 2), E axes, of φ by scale and offset of the depth of a hand."""
-    T_E_D = view_of_eye(display, np.eye(4)) @ rig.T_H_D
-    point_D_m = transform(invert(T_E_D), point_E_m[None])[0]
-    ray_E = T_E_D[:3, :3] @ (point_D_m / point_D_m[2])
-    gain = 1.0 / (1.0 - point_E_m[2] / display.z_C0_S_m)
-    moved: Float64 = gain * np.outer(ray_E, [point_D_m[2], 1.0])
-    return moved
-
-
-def eye_slice(eye: Eye) -> slice:
-    """Return an eye's components in [φ_left; φ_right]."""
-    return slice(3 * EYES.index(eye), 3 * EYES.index(eye) + 3)
-
-
-def eye_position_m(display: EyeDisplay, shift_m: Float64) -> Float64:
-    """Return where an eye with φ is, (3,), in H."""
-    eye_V = shift_m - display.t_C0_V_m
-    return np.asarray(transform(invert(display.T_V_H), eye_V[None])[0])
-
-
-def observe_eye_distance(rig: Rig, eye_distance: EyeDistance, near_m: Float64) -> Observed:
-    """Return a measured eye distance as an observation of [φ_left; φ_right], linear near `near_m`.
-
-    H is (1, 6), the distance seen (1,), and its covariance (1, 1).
-    """
-    left_m, right_m = (eye_position_m(rig.eyes[eye], near_m[eye_slice(eye)]) for eye in EYES)
-    between_m = right_m - left_m
-    distance_m = float(np.linalg.norm(between_m))
-    H = np.zeros((1, 6))
-    for eye, sign in zip(EYES, (-1.0, 1.0), strict=True):
-        H[0, eye_slice(eye)] = sign * rig.eyes[eye].T_V_H[:3, :3] @ between_m / distance_m
-    seen_m = np.array([eye_distance.value_m - distance_m]) + H @ near_m
-    return H, seen_m, np.array([[eye_distance.sigma_m**2]])
-
-
-def _with_eye_distance(prior: EyePrior, rig: Rig, eye_distance: EyeDistance | None) -> EyePrior:
-    """Return the prior with a measured eye distance, if there is one."""
-    if eye_distance is None:
-        return prior
-    observed = observe_eye_distance(rig, eye_distance, prior.mean_m)
-    return EyePrior(*posterior(prior, [observed]), prior.sessions)
 
 
 def _scale_weights(
@@ -330,7 +276,7 @@ def _observe(
         registrations.append(R_A_E @ shift.covariance_m2 @ R_A_E.T)
         seen_m += H[:, eye_slice(eye)] @ shift.shift_m
         middle_E_m = transform(alignment.T_E_W[eye], middle_m[None])[0]
-        by_depth += H[:, eye_slice(eye)] @ _by_depth(middle_E_m, rig.eyes[eye], rig)
+        by_depth += H[:, eye_slice(eye)] @ shift_by_depth(middle_E_m, rig.eyes[eye], rig)
     registration_m2 = np.mean(registrations, axis=0) + alignment.time_sigma_m**2 * np.eye(3)
     return Observation(H, seen_m, registration_m2, wearer_m2, by_depth)
 
@@ -396,7 +342,7 @@ def verified_observation(
         R_A_E @ np.asarray(shift_m),
         np.zeros((3, 3)),
         R_A_E @ wearer_m2 @ R_A_E.T,
-        R_A_E @ _by_depth(np.asarray(hand_E_m, np.float64), rig.eyes[eye], rig),
+        R_A_E @ shift_by_depth(np.asarray(hand_E_m, np.float64), rig.eyes[eye], rig),
     )
 
 

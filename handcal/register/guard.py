@@ -75,7 +75,8 @@ class RotationGuard:
         self._settings = settings
         self._cursor = describe_surface(cursor_m, cursor_cut, settings.max_points)
         self._given = cursor_m, cursor_cut
-        self._shape_cursors: dict[int, Surface] = {}
+        self._shape_cursors = {settings.max_points: self._cursor}
+        self._newest: tuple[Float64, Surface] | None = None
         self._found: tuple[RigidResult, Float64] | None = None
         self._lost_m2 = 0.0
 
@@ -98,6 +99,7 @@ class RotationGuard:
         starts from scratch. Raises as `rotation`.
         """
         hand = self._describe(hand_m, hand_cut)
+        self._newest = hand_m, hand
         middle_m = hand.points_m.mean(axis=0)
         fit = None
         if self._found is not None:
@@ -124,7 +126,11 @@ class RotationGuard:
         count = settings.max_points
         if count not in self._shape_cursors:
             self._shape_cursors[count] = describe_surface(*self._given, count)
-        cursor, hand = self._shape_cursors[count], describe_surface(hand_m, hand_cut, count)
+        cursor = self._shape_cursors[count]
+        if self._newest and self._newest[0] is hand_m and count == self._settings.max_points:
+            hand = self._newest[1]
+        else:
+            hand = describe_surface(hand_m, hand_cut, count)
         T_start = None
         if self._found is not None:
             last, last_middle_m = self._found

@@ -18,8 +18,8 @@ import numpy as np
 from handcal.display import eye_projection, view_of_eye
 from handcal.geometry import image_points, invert, project, transform
 from handcal.register.benefit import expected_arcmin
-from handcal.register.fuse import Observation, eye_slice, seen_by
-from handcal.register.prior import EyePrior, eye_prior, posterior
+from handcal.register.fuse import Observation, seen_by
+from handcal.register.prior import EyePrior, eye_prior, eye_slice, posterior
 from handcal.register.results import Results, SolveSettings
 from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes

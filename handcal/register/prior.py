@@ -17,8 +17,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handcal.rig_types import DepthCheck
-from handcal.types import Float64
+from handcal.display import view_of_eye
+from handcal.geometry import invert, transform
+from handcal.rig_types import DepthCheck, EyeDisplay, Rig
+from handcal.types import EYES, Eye, EyeDistance, Float64
 
 MIN_SESSIONS = 10
 """Fewer sessions than this do not make a prior."""
@@ -196,3 +198,47 @@ def learn_prior(
         )
     symmetric = 0.5 * (covariance_m2 + covariance_m2.T)
     return LearnedPrior(tuple(mean_m.tolist()), tuple(symmetric.ravel().tolist()), count)
+
+
+def eye_slice(eye: Eye) -> slice:
+    """Return an eye's components in [φ_left; φ_right]."""
+    return slice(3 * EYES.index(eye), 3 * EYES.index(eye) + 3)
+
+
+def eye_position_m(display: EyeDisplay, shift_m: Float64) -> Float64:
+    """Return where an eye with φ is, (3,), in H."""
+    eye_V = shift_m - display.t_C0_V_m
+    return np.asarray(transform(invert(display.T_V_H), eye_V[None])[0])
+
+
+def observe_eye_distance(rig: Rig, eye_distance: EyeDistance, near_m: Float64) -> Observed:
+    """Return a measured eye distance as an observation of [φ_left; φ_right], linear near `near_m`.
+
+    H is (1, 6), the distance seen (1,), and its covariance (1, 1).
+    """
+    left_m, right_m = (eye_position_m(rig.eyes[eye], near_m[eye_slice(eye)]) for eye in EYES)
+    between_m = right_m - left_m
+    distance_m = float(np.linalg.norm(between_m))
+    H = np.zeros((1, 6))
+    for eye, sign in zip(EYES, (-1.0, 1.0), strict=True):
+        H[0, eye_slice(eye)] = sign * rig.eyes[eye].T_V_H[:3, :3] @ between_m / distance_m
+    seen_m = np.array([eye_distance.value_m - distance_m]) + H @ near_m
+    return H, seen_m, np.array([[eye_distance.sigma_m**2]])
+
+
+def with_eye_distance(prior: EyePrior, rig: Rig, eye_distance: EyeDistance | None) -> EyePrior:
+    """Return the prior with a measured eye distance, if there is one."""
+    if eye_distance is None:
+        return prior
+    observed = observe_eye_distance(rig, eye_distance, prior.mean_m)
+    return EyePrior(*posterior(prior, [observed]), prior.sessions)
+
+
+def shift_by_depth(point_E_m: Float64, display: EyeDisplay, rig: Rig) -> Float64:
+    """Return derivatives (3, 2), E axes, of φ by scale and offset of the depth of a hand."""
+    T_E_D = view_of_eye(display, np.eye(4)) @ rig.T_H_D
+    point_D_m = transform(invert(T_E_D), point_E_m[None])[0]
+    ray_E = T_E_D[:3, :3] @ (point_D_m / point_D_m[2])
+    gain = 1.0 / (1.0 - point_E_m[2] / display.z_C0_S_m)
+    moved: Float64 = gain * np.outer(ray_E, [point_D_m[2], 1.0])
+    return moved

@@ -12,7 +12,8 @@ import numpy as np
 from handcal.frozen import html_table
 from handcal.progress import Progress
 from handcal.register.benefit import Benefit, expected_arcmin
-from handcal.register.fuse import Fused, FuseSettings, eye_slice, fuse_alignments
+from handcal.register.fuse import Fused, FuseSettings, fuse_alignments
+from handcal.register.prior import eye_slice
 from handcal.register.solve import solve_alignment
 from handcal.register.verdict import (
     MOST_ALIGNMENTS,

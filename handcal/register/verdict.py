@@ -20,7 +20,8 @@ from handcal.register.benefit import (
     foreseen_benefits,
     percent,
 )
-from handcal.register.fuse import Fused, eye_position_m, eye_slice
+from handcal.register.fuse import Fused
+from handcal.register.prior import eye_position_m, eye_slice
 from handcal.rig_types import Rig
 from handcal.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
 

@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from handcal.errors import HandcalError
 from handcal.frozen import freeze
@@ -19,6 +20,7 @@ Int64: TypeAlias = NDArray[np.int64]
 
 DICTIONARIES = {name: getattr(cv2.aruco, name) for name in dir(cv2.aruco) if name[:5] == "DICT_"}
 MIN_CORNERS = 8
+_NEIGHBOURS = 6
 """Minimum number of corners for a view to be used."""
 
 
@@ -101,10 +103,16 @@ class BoardView:
         freeze(self, "ids", np.int64, len(self.points_m))
 
     def only(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> BoardView:
-        """Return the view with some of its corners, by index or mask."""
-        return replace(
-            self, points_m=self.points_m[which], pixels=self.pixels[which], ids=self.ids[which]
-        )
+        """Return the view with some of its corners, by index or mask; itself if these are all."""
+        ids = self.ids[which]
+        if len(ids) == len(self.ids):
+            return self
+        return replace(self, points_m=self.points_m[which], pixels=self.pixels[which], ids=ids)
+
+    @property
+    def beside(self) -> Int64:
+        """The nearest corners of each corner in the image, the nearest first, (N, 6 or fewer)."""
+        return _beside(self)
 
 
 def corners_m(board: Board) -> Float64:
@@ -112,6 +120,12 @@ def corners_m(board: Board) -> Float64:
     columns, rows = board.inner
     row, column = np.divmod(np.arange(columns * rows), columns)
     return board.square_m * np.stack([column + 1.0, row + 1.0, np.zeros(len(row))], axis=1)
+
+
+@lru_cache(maxsize=256)
+def _beside(seen: BoardView) -> Int64:
+    count = min(_NEIGHBOURS, len(seen.pixels) - 1)
+    return np.asarray(cKDTree(seen.pixels).query(seen.pixels, k=count + 1)[1])[:, 1:]
 
 
 @lru_cache(maxsize=8)

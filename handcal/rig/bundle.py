@@ -16,7 +16,6 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from handcal.geometry import rigid
 from handcal.rig.board import BoardView
@@ -38,7 +37,6 @@ _STRAY_SIGMAS = 10.0
 # Of a view, and of all: more indicate a fault of the view or of the lens model.
 _MAX_STRAY_SHARES = 0.1, 0.01
 _LEAST_SIGMA_PX = 0.01
-_NEIGHBOURS = 6
 _COEFFICIENT_SIGMA = 10.0
 
 
@@ -126,9 +124,10 @@ def adjust(
     steps : int
         Limit.
     """
-    beside = [_beside(one.seen) for one in sightings]
+    counts = [len(one.seen.pixels) for one in sightings]
+    beside = _beside(sightings)
     whole = _Problem(sightings, lenses, solve_place and setup.place is not None)
-    problem, kept, linear = whole, [np.ones(len(near), np.bool_) for near in beside], None
+    problem, kept, linear = whole, [np.ones(count, np.bool_) for count in counts], None
     for least_gain in _LEAST_GAINS:
         setup, linear = problem.minimised(setup, steps, least_gain, linear)
         off_px = whole.residuals(linear if problem is whole else whole.linear(setup))
@@ -146,31 +145,57 @@ def adjust(
     return Adjusted(setup, tuple(off_px), tuple(kept), problem.blocks(linear), whole.is_coefficient)
 
 
-def linearised(
-    sightings: Sequence[Sighting], setup: Setup, lenses: Sequence[LensModel | None]
-) -> tuple[tuple[Float64, Float64, Float64], ...]:
-    """Return `Adjusted.blocks` of a setup as it is, with the second camera's pose as unknown."""
+def foreseen(
+    points_m: Float64, setup: Setup, lenses: Sequence[LensModel | None]
+) -> tuple[Float64, Float64]:
+    """Return what the frames of a setup would tell, before they are taken.
+
+    Parameters
+    ----------
+    points_m : (N, 3) float64
+        The board's corners.
+    setup : Setup
+    lenses : sequence of LensModel or None
+
+    Returns
+    -------
+    information : (F, P, P) float64
+        Of each frame by itself, about the shared parameters, with 1 px of noise.
+    seen_share : (F, C) float64
+        Share of the corners that each camera has in its image.
+    """
+    ids, blank = np.arange(len(points_m)), np.zeros((len(points_m), 2))
+    sightings = [
+        Sighting(frame, number, BoardView(points_m, blank, (camera.width, camera.height), ids, 2.0))
+        for number, camera in enumerate(setup.cameras)
+        for frame in range(len(setup.poses))
+    ]
     problem = _Problem(sightings, lenses, setup.place is not None)
-    return problem.blocks(problem.linear(setup))
+    return problem.foreseen(setup)
 
 
-def _beside(seen: BoardView) -> NDArray[np.int64]:
-    """Return the numbers of the corners nearest to each corner, (N, K)."""
-    count = min(_NEIGHBOURS, len(seen.pixels) - 1)
-    return np.asarray(cKDTree(seen.pixels).query(seen.pixels, k=count + 1)[1])[:, 1:]
+def _beside(sightings: Sequence[Sighting]) -> NDArray[np.int64]:
+    """Return the corners nearest to each corner, (N, K), counted over all sightings."""
+    each = [one.seen.beside for one in sightings]
+    least = min(near.shape[1] for near in each)
+    starts = np.cumsum([0, *(len(near) for near in each[:-1])])
+    return np.concatenate(
+        [near[:, :least] + start for near, start in zip(each, starts, strict=True)]
+    )
 
 
-def _regular(
-    off_px: Sequence[Float64], beside: Sequence[NDArray[np.int64]]
-) -> list[NDArray[np.bool_]]:
+def _regular(off_px: Sequence[Float64], beside: NDArray[np.int64]) -> list[NDArray[np.bool_]]:
     """Return which corners to keep: all if too many are far off."""
-    alone_px = [off - _median(off[near]) for off, near in zip(off_px, beside, strict=True)]
-    sigma_px = 1.4826 * float(np.median(np.abs(np.concatenate(alone_px))))
+    off = np.concatenate(off_px)
+    alone_px = off - _median(off[beside])
+    sigma_px = 1.4826 * float(np.median(np.abs(alone_px)))
     limit_px = _STRAY_SIGMAS * max(_LEAST_SIGMA_PX, sigma_px)
-    strays = [np.linalg.norm(alone, axis=1) > limit_px for alone in alone_px]
+    is_stray = np.linalg.norm(alone_px, axis=1) > limit_px
     of_view, of_all = _MAX_STRAY_SHARES
-    is_few = np.concatenate(strays).mean() <= of_all
-    return [~(stray & is_few & (stray.mean() <= of_view)) for stray in strays]
+    strays = np.split(is_stray, np.cumsum([len(one) for one in off_px[:-1]]))
+    if not is_stray.any() or is_stray.mean() > of_all:
+        return [np.ones(len(stray), np.bool_) for stray in strays]
+    return [~stray if stray.mean() <= of_view else np.ones_like(stray) for stray in strays]
 
 
 def _median(values: Float64) -> Float64:
@@ -323,6 +348,26 @@ class _Problem:
                 V[frame] += own[:, -7:-1]
                 g_own[frame] += own[:, -1]
         return U, W, V, g_shared, g_own
+
+    def foreseen(self, setup: Setup) -> tuple[Float64, Float64]:
+        """Return the function of this name's result, if all detected pixels are 0."""
+        count, frames = self._count, self._frames
+        normal, shares = np.zeros((frames, count + 6, count + 6)), []
+        for camera, corners, rows in zip(
+            setup.cameras, self._corners, self.linear(setup), strict=True
+        ):
+            pixels = -rows[:, -1].reshape(-1, 2)
+            seen = ((pixels > 0) & (pixels < [camera.width - 1, camera.height - 1])).all(axis=1)
+            rows[np.repeat(~seen, 2)] = 0.0
+            own = rows[:, :-1].reshape(frames, -1, rows.shape[1] - 1)
+            columns = np.array([*corners.used, *range(count, count + 6)])
+            normal[:, columns[:, None], columns] += own.swapaxes(1, 2) @ own
+            shares.append(seen.reshape(frames, -1).mean(axis=1))
+        mixed = normal[:, count:, :count]
+        # A frame that shows nothing has no pose either.
+        by_shared = np.linalg.solve(normal[:, count:, count:] + 1e-12 * np.eye(6), mixed)
+        information = normal[:, :count, :count] - mixed.swapaxes(1, 2) @ by_shared
+        return information, np.stack(shares, axis=1)
 
     def _moved(self, setup: Setup, shared: Float64, own: Float64) -> Setup:
         cameras = []

@@ -19,7 +19,7 @@ from handcal.rig.bundle import as_transform
 from handcal.rig.fit import rms
 from handcal.rig.lens import Camera, LensModel, as_pinhole, solved_parameters
 from handcal.rig.lens_fit import LensFit, best_lens, compare_lenses, fit_lens
-from handcal.rig.uncertainty import ProjectionUncertainty, next_view, projection_uncertainty
+from handcal.rig.uncertainty import ProjectionUncertainty, next_view
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import (
     BoardImage,
@@ -141,14 +141,10 @@ def calibrate_camera(
         off_px,
         tilt_rad,
     )
-    covariance = fit.covariance()
-    uncertainty = None
-    if covariance is not None:
-        uncertainty = projection_uncertainty(camera, solved_parameters(solved.lens), covariance)
     return CameraCalibration(
         intrinsics=camera,
         lens=solved.lens,
-        covariance=covariance,
+        covariance=solved.covariance,
         rms_px=fit.rms_px,
         residuals_px={name: rms(off) for name, off in off_px.items()},
         left_out=fit.left_out,
@@ -156,8 +152,8 @@ def calibrate_camera(
         dropped=tuple(view.name for view in views if view.dropped),
         coverage=coverage(found.values()),
         worst=worst,
-        verdict=_judge(solved, covariance, uncertainty, found, poses, worst, settings),
-        uncertainty=uncertainty,
+        verdict=_judge(solved, found, poses, worst, settings),
+        uncertainty=solved.uncertainty,
         compared=compared,
     )
 
@@ -179,14 +175,13 @@ def normal_spread(poses: Mapping[str, Float64]) -> float:
 
 def _judge(
     solved: LensFit,
-    covariance: Float64 | None,
-    uncertainty: ProjectionUncertainty | None,
     found: Mapping[str, BoardView],
     poses: Mapping[str, Float64],
     worst: WorstView,
     settings: CameraSettings,
 ) -> CalibrationVerdict:
     rms_px, camera = solved.fit.rms_px, solved.camera
+    covariance, uncertainty = solved.covariance, solved.uncertainty
     spread_rad = normal_spread(poses)
     if rms_px > settings.max_rms_px:
         return CalibrationVerdict(

@@ -19,7 +19,7 @@ from handcal.rig.lens import (
     solved_parameters,
     undistorted_camera,
 )
-from handcal.rig.uncertainty import projection_uncertainty
+from handcal.rig.uncertainty import ProjectionUncertainty, projection_uncertainty
 from handcal.types import Float64
 
 # Focal lengths tried, in widths of the image, and the views that judge them.
@@ -41,13 +41,20 @@ class LensFit:
     held_out_px2: Float64
     """(V,); mean square residual of each view with intrinsics from the others, to first order; over
     the corners that all models compared have kept."""
-    edge_px: float
-    """`ProjectionUncertainty.edge_px`; infinite if the views do not determine the camera."""
+    covariance: Float64 | None
+    """`Adjusted.covariance`."""
+    uncertainty: ProjectionUncertainty | None
+    """None if the views do not determine the camera."""
 
     @property
     def camera(self) -> Camera:
         """The camera solved for."""
         return self.fit.setup.cameras[0]
+
+    @property
+    def edge_px(self) -> float:
+        """`ProjectionUncertainty.edge_px`; infinite if the views do not determine the camera."""
+        return np.inf if self.uncertainty is None else self.uncertainty.edge_px
 
     @property
     def held_out_px(self) -> float:
@@ -133,11 +140,11 @@ def _is_worse(one: LensFit, least: LensFit) -> bool:
 
 def _judged(lens: LensModel, fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> LensFit:
     covariance = fit.covariance()
-    edge_px = np.inf
+    uncertainty = None
     if covariance is not None:
         solved = solved_parameters(lens)
-        edge_px = projection_uncertainty(fit.setup.cameras[0], solved, covariance).edge_px
-    return LensFit(lens, fit, _held_out_px2(fit, kept), edge_px)
+        uncertainty = projection_uncertainty(fit.setup.cameras[0], solved, covariance)
+    return LensFit(lens, fit, _held_out_px2(fit, kept), covariance, uncertainty)
 
 
 def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:

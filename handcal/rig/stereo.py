@@ -127,7 +127,10 @@ def calibrate_stereo(
     if headset is None:
         of_headset = _solved([second for _, second in pairs], "headset", settings.camera)
         headset, lenses[1] = of_headset.intrinsics, of_headset.lens
-    alone = each_alone(both, depth, headset)
+    if of_depth is None or of_headset is None:
+        alone = each_alone(both, depth, headset)
+    else:
+        alone = _as_solved(pairs, both, of_depth, of_headset)
     fit = _fit(both, alone, (depth, headset), lenses)
     if fit.rms_px > settings.max_rms_px:
         # Pairs that contradict each other bend intrinsics that are free until nothing is sound.
@@ -145,7 +148,7 @@ def calibrate_stereo(
         name: rms(np.vstack(off_px[2 * number : 2 * number + 2]))
         for number, name in enumerate(both)
     }
-    if lenses != [None, None]:
+    if not are_given:
         alone = each_alone(both, depth, headset, alone)
     worst = _worst(both, fit, T_H_D, T_D_B)
     apart = differences(T_H_D, alone.T_H_D)
@@ -184,6 +187,22 @@ def _solved(views: Sequence[BoardImage], which: str, settings: CameraSettings) -
     if calibration.verdict.name == "bad":
         raise ViewsError(f"{which} camera: {calibration.verdict.reason}")
     return calibration
+
+
+def _as_solved(
+    pairs: Sequence[tuple[BoardImage, BoardImage]],
+    both: Mapping[str, Pair],
+    depth: CameraCalibration,
+    headset: CameraCalibration,
+) -> Alone:
+    """Return the board's poses in the images as the solutions of the cameras have them."""
+    names = [(first.name, second.name) for first, second in pairs if first.name in both]
+    residuals_px = [(depth.residuals_px[a], headset.residuals_px[b]) for a, b in names]
+    return Alone(
+        np.stack([depth.T_C_B[name] for name, _ in names]),
+        np.stack([headset.T_C_B[name] for _, name in names]),
+        np.sqrt(np.mean(np.square(residuals_px), axis=1)),
+    )
 
 
 def _fit(

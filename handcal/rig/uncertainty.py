@@ -7,7 +7,7 @@ out, since the pose of a camera is always solved with its intrinsics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from handcal.frozen import freeze
 from handcal.geometry import rigid
-from handcal.rig.board import BoardView
-from handcal.rig.bundle import Setup, Sighting, board_in, linearised
+from handcal.rig.bundle import Setup, foreseen
 from handcal.rig.lens import Camera, LensModel, pixels_of, predict, to_plane
 from handcal.types import Float64
 
@@ -118,7 +117,7 @@ def next_view(
     information = np.asarray(np.linalg.inv(covariance), np.float64)
     best: NextView | None = None
     most = -1
-    for words, pose in candidate_views(camera, points_m):
+    for words, pose in zip(*candidate_views(camera, points_m), strict=True):
         pixels, derivatives = predict(points_m, pose, camera)
         is_seen = _inside(pixels, camera)
         new = 0 if hits is None else _new_cells(pixels[is_seen], camera, hits)
@@ -156,37 +155,20 @@ def next_pair(
     limits : (float, float)
         Rotation, rad, and translation, m, that count the same.
     """
-    information = np.asarray(np.linalg.inv(covariance), np.float64)
-    scale = np.repeat(limits, 3)
-    best: NextView | None = None
-    shown: list[tuple[str, Float64]] = []
-    sightings: list[Sighting] = []
-    for words, pose in candidate_views(setup.cameras[0], points_m):
-        trial = replace(setup, poses=(pose,))
-        of_pair = []
-        for number, camera in enumerate(setup.cameras):
-            pixels = pixels_of(points_m, board_in(trial, 0, number), camera)
-            seen = _inside(pixels, camera)
-            ids = np.flatnonzero(seen)
-            view = BoardView(points_m[seen], pixels[seen], (camera.width, camera.height), ids, 2.0)
-            of_pair.append(Sighting(len(shown), number, view))
-        if min(len(one.seen.ids) for one in of_pair) >= _LEAST_SEEN_SHARE * len(points_m):
-            shown.append((words, pose))
-            sightings += of_pair
-    if not shown:
+    words, poses = candidate_views(setup.cameras[0], points_m)
+    if not words:
         return None
-    trials = replace(setup, poses=tuple(pose for _, pose in shown))
-    blocks = linearised(sightings, trials, lenses)
-    for (words, pose), (shared, own, _) in zip(shown, blocks, strict=True):
-        basis, _ = np.linalg.qr(own)
-        shared = (shared - basis @ (basis.T @ shared)) / noise_px
-        after = np.linalg.inv(information + shared.T @ shared)[:6, :6] / np.outer(scale, scale)
-        worst = float(
-            max(np.linalg.eigvalsh(part).max() for part in (after[:3, :3], after[3:, 3:]))
-        )
-        if best is None or worst < best.uncertainty:
-            best = NextView(words, pose, worst)
-    return best
+    new, seen_share = foreseen(points_m, replace(setup, poses=tuple(poses)), lenses)
+    shown = np.flatnonzero((seen_share >= _LEAST_SEEN_SHARE).all(axis=1))
+    if not len(shown):
+        return None
+    after = np.linalg.inv(np.linalg.inv(covariance) + new[shown] / noise_px**2)[:, :6, :6]
+    after /= np.outer(*2 * [np.repeat(limits, 3)])
+    worst = np.max(
+        [np.linalg.eigvalsh(part)[:, -1] for part in (after[:, :3, :3], after[:, 3:, 3:])], axis=0
+    )
+    least = int(worst.argmin())
+    return NextView(words[shown[least]], poses[shown[least]], float(worst[least]))
 
 
 def _new_cells(pixels: Float64, camera: Camera, hits: NDArray[np.int64]) -> int:
@@ -198,29 +180,37 @@ def _new_cells(pixels: Float64, camera: Camera, hits: NDArray[np.int64]) -> int:
     return int((reached & (hits == 0)).sum())
 
 
-def candidate_views(camera: Camera, points_m: Float64) -> Iterator[tuple[str, Float64]]:
-    """Yield views that show most of a board, as words and as its pose (6,)."""
+def candidate_views(camera: Camera, points_m: Float64) -> tuple[list[str], Float64]:
+    """Return views that show most of a board, as words and as its poses (N, 6)."""
     middle_m = (points_m.min(axis=0) + points_m.max(axis=0)) / 2
     width_m = float(np.ptp(points_m[:, 0]))
     size = np.array([camera.width, camera.height])
     tilts = {how: rigid(_TILT_RAD * np.array([*axis, 0.0]))[:3, :3] for how, axis in _TILTS.items()}
+    planes = to_plane(np.array(list(_PLACES.values())) * size, camera)
+    turns = []
+    for where, plane in zip(_PLACES, planes, strict=True):
+        ray = np.array([*plane, 1.0]) / np.linalg.norm([*plane, 1.0])
+        facing = _facing(ray)
+        for how, tilt in tilts.items():
+            turn = facing @ tilt
+            turns.append((f"{where}, {how}", ray, turn, cv2.Rodrigues(turn)[0].ravel()))
+    words, poses, placed_m, distances_m = [], [], [], []
     for share in _WIDTH_SHARES:
         distance_m = camera.fx * width_m / (share * camera.width)
-        for where, place in _PLACES.items():
-            plane = to_plane(np.array([place]) * size, camera)[0]
-            ray = np.array([*plane, 1.0]) / np.linalg.norm([*plane, 1.0])
-            facing = _facing(ray)
-            for how, tilt in tilts.items():
-                turn = facing @ tilt
-                rotation = cv2.Rodrigues(turn)[0].ravel()
-                pose = np.concatenate([rotation, distance_m * ray - turn @ middle_m])
-                in_front = (points_m @ turn.T + pose[3:])[:, 2].min() > 0.1 * distance_m
-                if (
-                    in_front
-                    and _inside(pixels_of(points_m, pose, camera), camera).mean()
-                    > _LEAST_SEEN_SHARE
-                ):
-                    yield f"{where}, {how}, {100 * share:.0f} % of the image wide", pose
+        for how, ray, turn, rotation in turns:
+            words.append(f"{how}, {100 * share:.0f} % of the image wide")
+            poses.append(np.concatenate([rotation, distance_m * ray - turn @ middle_m]))
+            placed_m.append(points_m @ turn.T + poses[-1][3:])
+            distances_m.append(distance_m)
+    in_camera_m = np.stack(placed_m)
+    pixels = pixels_of(in_camera_m.reshape(-1, 3), np.zeros(6), camera)
+    is_seen = _inside(pixels.reshape(*in_camera_m.shape[:2], 2), camera)
+    shown = (in_camera_m[:, :, 2].min(axis=1) > 0.1 * np.array(distances_m)) & (
+        is_seen.mean(axis=1) > _LEAST_SEEN_SHARE
+    )
+    return [one for one, is_shown in zip(words, shown, strict=True) if is_shown], np.array(poses)[
+        shown
+    ]
 
 
 def _facing(ray: Float64) -> Float64:
@@ -232,7 +222,7 @@ def _facing(ray: Float64) -> Float64:
 
 def _inside(pixels: Float64, camera: Camera) -> NDArray[np.bool_]:
     size = [camera.width - 1, camera.height - 1]
-    return np.asarray(((pixels > 0) & (pixels < size)).all(axis=1))
+    return np.asarray(((pixels > 0) & (pixels < size)).all(axis=-1))
 
 
 def _derivatives(camera: Camera, solved: list[int]) -> Float64:

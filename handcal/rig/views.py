@@ -11,7 +11,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import IMAGE_SUFFIXES, read_image
@@ -355,8 +354,8 @@ def _unlike(
 
 
 def _square_px(seen: BoardView) -> float:
-    distances = np.asarray(cKDTree(seen.pixels).query(seen.pixels, k=2)[0])
-    return float(np.median(distances[:, 1]))
+    apart_px = seen.pixels - seen.pixels[seen.beside[:, 0]]
+    return float(np.median(np.linalg.norm(apart_px, axis=1)))
 
 
 def _reach(seen: BoardView) -> float:
@@ -367,6 +366,6 @@ def _reach(seen: BoardView) -> float:
 
 def _alike_beside(seen: BoardView, off_px: Float64) -> float:
     """Return the correlation of residuals between nearest corners: 1 if alike, 0 if by chance."""
-    beside = np.asarray(cKDTree(seen.pixels).query(seen.pixels, k=2)[1])[:, 1]
+    beside = seen.beside[:, 0]
     square = float(np.sum(off_px**2))
     return float(np.sum(off_px * off_px[beside])) / square if square > 0 else 0.0

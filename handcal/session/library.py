@@ -37,6 +37,8 @@ class EyeOutcome:
     """The result of one eye as the session holds it."""
 
     verdict: str
+    before_arcmin: float | None
+    """Error that is expected without the calibration."""
     expected_arcmin: float | None
     measured_arcmin: float | None
     """Error after the wearer's check; None if the eye was not checked."""
@@ -163,13 +165,20 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         wearer=state.wearer,
         rig=_rig_name(path, state),
         headset=state.facts.headset.name if state.facts.headset else "",
-        eyes=MappingProxyType(_outcomes(_results(path, replayed))),
+        eyes=MappingProxyType(eye_outcomes(path, replayed)),
         alignments=len(state.alignments.active),
         trials=len(trials),
         trials_arcmin=_mean_arcmin(trials),
         is_finished=state.is_finished,
         damaged=len(replayed.damaged) + _damaged_files(path, state),
     )
+
+
+def eye_outcomes(path: Path, replayed: Replayed) -> dict[Eye, EyeOutcome]:
+    """Return the results of a session's eyes; those that it does not hold are left out."""
+    found = _results(path, replayed).get("eyes")
+    eyes = found if isinstance(found, dict) else {}
+    return {eye: _outcome(eyes[eye]) for eye in EYES if isinstance(eyes.get(eye), dict)}
 
 
 def _damaged_files(path: Path, state: SessionState) -> int:
@@ -213,18 +222,14 @@ def _results(path: Path, replayed: Replayed) -> dict[str, Any]:
     return state.results or {}
 
 
-def _outcomes(results: Mapping[str, Any]) -> dict[Eye, EyeOutcome]:
-    found = results.get("eyes")
-    eyes = found if isinstance(found, dict) else {}
-    return {eye: _outcome(eyes[eye]) for eye in EYES if isinstance(eyes.get(eye), dict)}
-
-
 def _outcome(one: Mapping[str, Any]) -> EyeOutcome:
     """Return an eye's result; whatever is missing or not a number is unknown."""
     benefit, measured = one.get("benefit"), one.get("measured_arcmin")
+    expected = benefit if isinstance(benefit, dict) else {}
     return EyeOutcome(
         str(one.get("verdict", "")),
-        _number(benefit.get("after_arcmin")) if isinstance(benefit, dict) else None,
+        _number(expected.get("without_arcmin")),
+        _number(expected.get("after_arcmin")),
         _number(measured[1]) if isinstance(measured, list) and len(measured) == 2 else None,
     )
 

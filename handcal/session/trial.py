@@ -30,6 +30,8 @@ _SHAPES: dict[str, tuple[int, ...]] = {
     "error_px": (4,),
     "error_arcmin": (4,),
 }
+_MOST = 1e9
+"""Limit of a length in metres or pixels, so that no product of two overflows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +41,7 @@ class Trial:
     Raises
     ------
     ValueError
-        For a wrong shape, a number that is not finite, or an unknown eye.
+        For a wrong shape, a number that is not finite or beyond all lengths, or an unknown eye.
     """
 
     eye: Eye
@@ -65,8 +67,8 @@ class Trial:
         for name, shape in _SHAPES.items():
             freeze(self, name, np.float64, *shape)
         for name in ("target_depth_m", *_SHAPES):
-            if not np.isfinite(getattr(self, name)).all():
-                raise ValueError(f"Trial.{name}: must be finite")
+            if not (np.abs(getattr(self, name)) < _MOST).all():
+                raise ValueError(f"Trial.{name}: must be finite and less than {_MOST:g}")
 
 
 @dataclass(frozen=True, slots=True)

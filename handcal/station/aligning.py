@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from handcal.camera.clock import INFORM_NS
 from handcal.display import view_of_eye
 from handcal.errors import HandError, PoseError, PosePendingError
 from handcal.geometry import invert
@@ -100,11 +101,27 @@ class Aligning:
         self._guard = RotationGuard(cursor.points_W_m, cursor.cloud.is_cut)
         self._shape: ShapeChange | None = None
         self._shape_ns = 0
+        self._followed: Observation | None = None
+        self._followed_ns = 0
         self._advice = ""
         self._advised_ns = 0
 
     def follow(self, observation: Observation, hand: PlacedHand) -> Observation:
-        """Return the observation with rotation and change of shape of the live hand."""
+        """Return the observation with rotation and change of shape of the live hand.
+
+        Frames closer than `INFORM_NS` to the last hand followed show that hand's, without a
+        `guard_ms`: it informs the wearer, and a confirmation is judged by a measurement of its own.
+        """
+        last = self._followed
+        if last is not None and 0 <= hand.t_host_ns - self._followed_ns < INFORM_NS:
+            return replace(
+                observation,
+                rotation_rad=last.rotation_rad,
+                shape_change_m=last.shape_change_m,
+                shape_text=last.shape_text,
+                has_changed=last.has_changed,
+                is_over_limit=last.is_over_limit,
+            )
         started_s = time.perf_counter()
         try:
             rotation_W = self._guard.follow(hand.points_W_m, hand.cloud.is_cut)
@@ -114,10 +131,12 @@ class Aligning:
                 )
                 self._shape_ns = hand.t_host_ns
         except HandError as error:
+            self._followed = None
             return replace(observation, hand=None, problem=str(error))
         shape = self._shape
         R_D_W = hand.T_W_D[:3, :3].T
-        return replace(
+        self._followed_ns = hand.t_host_ns
+        self._followed = replace(
             observation,
             rotation_rad=R_D_W @ rotation_W,
             shape_change_m=None if shape is None else shape.rms_m,
@@ -126,6 +145,7 @@ class Aligning:
             is_over_limit=self._is_over_limit(rotation_W) or self._has_changed(shape),
             guard_ms=1e3 * (time.perf_counter() - started_s),
         )
+        return self._followed
 
     def advise(self, observation: Observation) -> str | None:
         """Return a new prompt for the wearer, to turn the hand back or to stop; else None."""

@@ -291,7 +291,7 @@ class AlignmentSteps:
             observation = aligning.follow(observation, observation.hand)
             if (prompt := aligning.advise(observation)) is not None:
                 self._link.send_prompt(prompt, self.eyes)
-        if observation.hand is not None:
+        if observation.hand is not None and observation.guard_ms is not None:
             self._link.send_live_hand(observation.hand.points_W_m, observation.is_over_limit)
         for confirmation in self._link.confirmations():
             if confirmation.cursor_id == self._cursor_id:

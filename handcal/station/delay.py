@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from handcal.camera.clock import FrameClock
+from handcal.camera.clock import INFORM_NS, FrameClock
 from handcal.errors import PoseError, PosePendingError
 from handcal.geometry import invert
 from handcal.station.background import Background, follow, make_background
@@ -112,6 +112,7 @@ class DelayMeter:
         self._backgrounds: deque[Background] = deque()
         self._poses: deque[tuple[int, Float64]] = deque()
         self._next_pose_ns = self._next_ns = self._newest_ns = self._frames = 0
+        self._looked_ns = -INFORM_NS
         self._followed_ns: int | None = None
         self._is_still = False
         self._sigma_s = settings.assumed_sigma_s
@@ -152,19 +153,28 @@ class DelayMeter:
             self._clock.measured_ns = None
             self._sigma_s = self._settings.assumed_sigma_s
             self._next_ns, self._is_still, self._followed_ns = 0, False, None
+            self._looked_ns = -INFORM_NS
         if frame.t_camera_ns == self._newest_ns:
             return False
         self._newest_ns = frame.t_camera_ns
+        if frame.t_camera_ns - self._looked_ns < INFORM_NS:
+            return False
+        self._looked_ns = frame.t_camera_ns
         if self._followed_ns is None:
             self._followed_ns = frame.t_camera_ns
         is_known = self._clock.measured_ns is not None
         self._frames += 1
         if not is_known or self._frames % _EVERY_FRAME_KNOWN == 0:
             self._follow(frame)
+        self._read_poses()  # those of 5 s at once would take longer than the time between frames
         if frame.t_host_ns < self._next_ns:
             return False
         self._next_ns = frame.t_host_ns + (_EVERY_KNOWN_NS if is_known else _EVERY_NS)
-        times_ns, poses = self._read_poses()
+        times_ns = np.array([t_ns for t_ns, _ in self._poses], dtype=np.int64)
+        poses = np.array([T for _, T in self._poses]).reshape(-1, 4, 4)
+        self._is_still = _is_still(poses)
+        if self._is_still:  # its movement would show nothing, after 30 ms of searching
+            return False
         found = measure_offset(
             self._backgrounds, times_ns, poses, self._T_H_D, self._clock.earliest_ns
         )
@@ -172,7 +182,6 @@ class DelayMeter:
             self._clock.measured_ns = found.offset_ns
             self._sigma_s = found.sigma_s
             self._next_ns = frame.t_host_ns + _EVERY_KNOWN_NS
-        self._is_still = _is_still(poses)
         return not is_known and self._clock.measured_ns is not None
 
     def time_sigma_m(
@@ -239,8 +248,8 @@ class DelayMeter:
             return False
         return True
 
-    def _read_poses(self) -> tuple[_Int64, Float64]:
-        """Return times (N,), host ns, and poses T_W_H (N, 4, 4) since the first frame kept."""
+    def _read_poses(self) -> None:
+        """Keep the poses since the first frame kept, and those since the last call."""
         first_ns = self._backgrounds[0].times_ns[0] if self._backgrounds else self._newest_ns
         earliest_ns = self._clock.earliest_ns
         begin_ns = first_ns + earliest_ns - round(1e9 * _LARGEST_S) - 2 * _REACH_NS
@@ -256,8 +265,6 @@ class DelayMeter:
             except PoseError:
                 pass
             self._next_pose_ns += _STEP_NS
-        times_ns = np.array([t_ns for t_ns, _ in self._poses], dtype=np.int64)
-        return times_ns, np.array([T for _, T in self._poses]).reshape(-1, 4, 4)
 
 
 def _movement(poses: Float64) -> Float64:

@@ -16,7 +16,7 @@ from enum import Enum
 from pathlib import Path
 
 from handcal.camera.camera import Camera
-from handcal.camera.sdk_devices import Device, connected_devices
+from handcal.camera.sdk_devices import Device, devices_by_child
 from handcal.camera.usb import explain_absence
 from handcal.errors import CancelledError, HandcalError
 from handcal.hand.shipped import load_detector
@@ -222,7 +222,7 @@ def _rig(path: Path | None) -> list[Finding]:
 
 def _cameras(rig: Path | None) -> list[Finding]:
     try:
-        devices = connected_devices()
+        devices = devices_by_child()
     except HandcalError as error:
         return [Finding("RealSense SDK", Health.LIMITED, str(error), "needed for real cameras")]
     if not devices:

@@ -19,7 +19,7 @@ from handcal.geometry import invert
 from handcal.rig.compare import compare_camera
 from handcal.rig.report import depth_finding, display_finding
 from handcal.rig_types import Rig
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics
+from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, UInt16
 
 FROZEN_FRAMES = 4
 """Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""
@@ -91,7 +91,7 @@ class Evidence:
                     "camera, or choose the rig file of this one",
                 )
         last, self._last = self._last, frame
-        is_equal = last is not None and np.array_equal(last.depth, frame.depth)
+        is_equal = last is not None and _is_same(last.depth, frame.depth)
         self._equal = self._equal + 1 if is_equal else 0
         if self._equal < FROZEN_FRAMES:
             return None
@@ -161,3 +161,8 @@ class Evidence:
 
     def _add(self, name: str, text: str) -> None:
         self._found[name] = Contradiction(name, text)
+
+
+def _is_same(one: UInt16, other: UInt16) -> bool:
+    """Compare two pictures; a few rows tell those of a live camera apart in a tenth of the time."""
+    return all(np.array_equal(one[::every], other[::every]) for every in (16, 1))

@@ -11,8 +11,13 @@ import numpy as np
 
 from handcal.errors import FileError
 from handcal.progress import Progress
-from handcal.register.fuse import observe_eye_distance
-from handcal.register.prior import LearnedPrior, Observed, PriorSettings, learn_prior
+from handcal.register.prior import (
+    LearnedPrior,
+    Observed,
+    PriorSettings,
+    learn_prior,
+    observe_eye_distance,
+)
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
 from handcal.session.facts import read_facts

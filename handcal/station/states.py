@@ -80,7 +80,7 @@ class Observation:
     """True if the rotation or the change of shape exceeds the guard's limit."""
     segment_ms: float | None = None
     guard_ms: float | None = None
-    """Durations of these stages."""
+    """Durations of these stages; None if one did not run in this step."""
     contradiction: Contradiction | None = None
     """Evidence that forbids using this frame."""
     needs_delay: bool = False

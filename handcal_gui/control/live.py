@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,6 +12,7 @@ from typing import Literal
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.bridge.bridges import BridgeSettings
+from handcal.camera.clock import INFORM_NS
 from handcal.errors import FileError
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings
@@ -96,6 +98,7 @@ class CalibrationController(QObject):
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
         self._failed_command = ""
+        self._shown_ns = 0
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -299,9 +302,9 @@ class CalibrationController(QObject):
 
     def _poll(self) -> None:
         snapshot, shown = self._engine.newest() if self._engine is not None else (None, 0)
-        if snapshot is None or snapshot is self._snapshot:
+        if snapshot is None or snapshot is self._snapshot or self._is_early(snapshot):
             return
-        self._shown = shown
+        self._shown, self._shown_ns = shown, time.monotonic_ns()
         condition = self._conditions.condition(snapshot)
         snapshot = self._conditions.calm(snapshot)
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
@@ -329,6 +332,14 @@ class CalibrationController(QObject):
         self._hold_plan(isinstance(wizard, PlannedWizard) and wizard.holds_plan)
         self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
+
+    def _is_early(self, snapshot: Snapshot) -> bool:
+        """Return True for a frame soon after the one shown, until one in time would have come."""
+        last = self._snapshot and self._snapshot.frame
+        if last is None or snapshot.frame is None:
+            return False
+        is_soon = 0 <= snapshot.frame.t_host_ns - last.t_host_ns < INFORM_NS
+        return is_soon and time.monotonic_ns() - self._shown_ns < 2 * INFORM_NS
 
     def _catch_up(self, panel: Panel, is_visible: bool) -> None:
         """Update a panel at once when it becomes visible."""

@@ -40,6 +40,8 @@ class ImageView(QWidget):
         self.setAccessibleName(name)
         self.setMinimumSize(120, 68)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        # It fills itself, so the widgets that it lies on need not be painted for every frame.
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self._colorize = colorize
         self._overlay: Callable[[QPainter], None] | None = None
         self._image: Image | None = None

@@ -34,18 +34,22 @@ class NumberTable(QTableWidget):
     Parameters
     ----------
     name : str
-        For screen readers and, in lower case with dashes, as object name.
+        Object name, the same in every language.
+    label : str
+        For screen readers.
     parent : QWidget or None
     hides : bool
         Where not all columns fit, the last ones are hidden and are in the tooltips; otherwise the
         table scrolls.
     """
 
-    def __init__(self, name: str, parent: QWidget | None = None, *, hides: bool = False) -> None:
+    def __init__(
+        self, name: str, label: str, parent: QWidget | None = None, *, hides: bool = False
+    ) -> None:
         super().__init__(parent)
         self._hides = hides
-        self.setObjectName(name.lower().replace(" ", "-"))
-        self.setAccessibleName(name)
+        self.setObjectName(name)
+        self.setAccessibleName(label)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setTabKeyNavigation(False)

@@ -15,6 +15,7 @@ pg.setConfigOptions(antialias=True)
 
 _LINE_PX = 2
 _SYMBOL_PX = 6
+_LEGEND_COLUMNS = 9
 
 
 class Plot(QWidget):
@@ -23,7 +24,9 @@ class Plot(QWidget):
     Parameters
     ----------
     name : str
-        For screen readers and, in lower case with dashes, as object name.
+        Object name, the same in every language.
+    label : str
+        For screen readers.
     x_label, y_label : str
         With their units.
     parent : QWidget or None
@@ -35,11 +38,11 @@ class Plot(QWidget):
     """
 
     def __init__(
-        self, name: str, x_label: str, y_label: str, parent: QWidget | None = None
+        self, name: str, label: str, x_label: str, y_label: str, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self.setObjectName(name.lower().replace(" ", "-"))
-        self.setAccessibleName(name)
+        self.setObjectName(name)
+        self.setAccessibleName(label)
         self._lines: list[tuple[pg.PlotDataItem, str, bool]] = []
         self._texts: list[pg.TextItem] = []
         self._view = pg.PlotWidget()
@@ -50,9 +53,9 @@ class Plot(QWidget):
         self.item.hideButtons()
         self.item.setContentsMargins(*4 * (SPACING_PX // 2,))
         self.item.setMouseEnabled(x=False, y=False)
-        for side, label in (("bottom", x_label), ("left", y_label)):
+        for side, axis_label in (("bottom", x_label), ("left", y_label)):
             self.item.getAxis(side).enableAutoSIPrefix(False)
-            self.item.setLabel(side, label)
+            self.item.setLabel(side, axis_label)
         vbox(self._view, on=self, margins=0)
         follow_theme(self, self._recolor)
 
@@ -61,8 +64,13 @@ class Plot(QWidget):
         return QSize(300, 200)
 
     def show_legend(self) -> None:
-        """Show a legend in the upper right corner, with each name once."""
-        self.item.addLegend(offset=(-1, 1))
+        """Show a legend in a row above the plot, with each name once."""
+        legend = pg.LegendItem(colCount=_LEGEND_COLUMNS, verSpacing=0)
+        legend.layout.setContentsMargins(0, 0, 0, 0)
+        legend.setParentItem(self.item)
+        legend.anchor((1, 0), (1, 0))
+        self.item.legend = legend
+        self.item.layout.setRowFixedHeight(0, self.fontMetrics().height() + SPACING_PX // 2)
         self._recolor()
 
     def add_line(

@@ -42,7 +42,9 @@ class RecordTable(QTableView):
     Parameters
     ----------
     name : str
-        For screen readers and, in lower case with dashes, as object name.
+        Object name, the same in every language.
+    label : str
+        For screen readers.
     columns : sequence of RecordColumn
     empty_text : str
         Hint shown while the table is empty.
@@ -58,13 +60,14 @@ class RecordTable(QTableView):
     def __init__(
         self,
         name: str,
+        label: str,
         columns: Sequence[RecordColumn],
         empty_text: str,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.setObjectName(name.lower().replace(" ", "-"))
-        self.setAccessibleName(name)
+        self.setObjectName(name)
+        self.setAccessibleName(label)
         self._empty_text = empty_text
         self._is_read_only = False
         self._records = _Records(columns)

@@ -1,8 +1,9 @@
-"""Writes what the Windows setup carries, from the lock: requirements.txt, and tools.txt with uv.
+"""Writes what the Windows setup carries, from the locks of the program without and with Open3D.
 
-    python installer/windows/requirements.py LOCK FOLDER
+    python installer/windows/requirements.py LOCK OPEN3D_LOCK FOLDER
 
-The lock holds all platforms; pip judges its markers by the computer on which it runs.
+It writes requirements.txt, requirements-open3d.txt (what Open3D needs in addition) and tools.txt
+(uv). The locks hold all platforms; pip judges their markers by the computer on which it runs.
 """
 
 from __future__ import annotations
@@ -52,8 +53,13 @@ def needed(blocks: dict[str, str]) -> set[str]:
 
 
 if __name__ == "__main__":
-    blocks = windows_blocks(Path(sys.argv[1]).read_text("utf-8"))
-    folder = Path(sys.argv[2])
-    program = "".join(block for name, block in blocks.items() if name in needed(blocks))
-    (folder / "requirements.txt").write_text(program, "utf-8")
-    (folder / "tools.txt").write_text(blocks["uv"], "utf-8")
+    blocks, with_open3d = (windows_blocks(Path(lock).read_text("utf-8")) for lock in sys.argv[1:3])
+    folder = Path(sys.argv[3])
+    program = needed(blocks)
+    added = needed(with_open3d) - program
+    for name, chosen in {
+        "requirements.txt": [block for name, block in blocks.items() if name in program],
+        "requirements-open3d.txt": [with_open3d[name] for name in sorted(added)],
+        "tools.txt": [blocks["uv"]],
+    }.items():
+        (folder / name).write_text("".join(chosen), "utf-8")

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from handcal.camera import sdk_devices
-from handcal.camera.sdk_devices import Device, choose_device, connected_devices, librealsense
+from handcal.camera.sdk_devices import (
+    Device,
+    choose_device,
+    connected_devices,
+    devices_by_child,
+    librealsense,
+)
 from handcal.errors import CameraError
 from handcal.types import CameraIdentity
 
@@ -53,6 +61,35 @@ def test_a_missing_sdk_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> 
         librealsense()
     with pytest.raises(CameraError, match="pip install pyrealsense2"):
         connected_devices()
+
+
+@pytest.mark.process
+def test_another_process_lists_the_same_devices() -> None:
+    pytest.importorskip("pyrealsense2")
+    assert devices_by_child() == connected_devices()
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("module", "reason"),
+    [
+        ("import os; os.abort()", r"librealsense crashed \(status [-1-9]\S*\): unplug"),
+        ("import os; context = os.abort", r"librealsense crashed \(status [-1-9]\S*\): unplug"),
+        ("raise OSError('no entry point')", r"\(status 1, OSError: no entry point\): unplug"),
+        ("import time; time.sleep(600)", "lists no devices within 0.5 s: unplug"),
+        ("raise ImportError", "pip install pyrealsense2"),
+    ],
+)
+def test_an_sdk_that_crashes_or_hangs_is_one_clear_line(
+    module: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pyrealsense2.py").write_text(f"print('loading'); {module}\n")
+    path = [str(tmp_path), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, path)))
+    if "sleep" in module:
+        monkeypatch.setattr(sdk_devices, "_LONGEST_LISTING_S", 0.5)
+    with pytest.raises(CameraError, match=reason):
+        devices_by_child()
 
 
 @pytest.mark.parametrize(

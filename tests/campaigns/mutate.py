@@ -7,6 +7,7 @@ import random
 import re
 import struct
 import zlib
+from copy import deepcopy
 from typing import Any
 
 _WORDS = (
@@ -100,15 +101,16 @@ def _json(data: bytes, chance: random.Random) -> bytes:
         if not places:
             return json.dumps(chance.choice(_VALUES)).encode()
         holder, key = chance.choice(places)
+        again = deepcopy(holder[key])  # a value in two places could come to hold itself
         match chance.randrange(4):
             case 0 | 1:
-                holder[key] = chance.choice(_VALUES)
+                holder[key] = deepcopy(chance.choice(_VALUES))
             case 2:
                 del holder[key]
             case _ if isinstance(holder, dict):
-                holder[chance.choice(("x", "", "__proto__", f"{key}2"))] = holder[key]
+                holder[chance.choice(("x", "", "__proto__", f"{key}2"))] = again
             case _:
-                holder.append(holder[key])
+                holder.append(again)
     return json.dumps(value).encode()
 
 

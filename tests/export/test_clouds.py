@@ -72,6 +72,28 @@ def test_a_text_of_numbers_is_a_cloud_without_cuts(tmp_path: Path) -> None:
     assert is_cut is None
 
 
+PLY = b"""ply
+format ascii 1.0
+element vertex %s
+property float x
+property float y
+property float z
+end_header
+%s
+"""
+PCD = b"""VERSION 0.7
+FIELDS x y z
+SIZE 4 4 4
+TYPE F F F
+COUNT 1 1 1
+WIDTH 1
+HEIGHT 1
+POINTS 1
+DATA ascii
+%s
+"""
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
@@ -87,6 +109,18 @@ def test_a_text_of_numbers_is_a_cloud_without_cuts(tmp_path: Path) -> None:
             b"property double x\nproperty double y\nproperty double z\nend_header\n",
             "announces more than 2,000,000 points",
         ),
+        ("digits.ply", PLY % (b"9" * 5000, b"1 2 3"), "damaged"),
+        ("word.ply", b"ply\ncomment " + b"x" * 5000 + PLY[3:] % (b"1", b"1 2 3"), "damaged"),
+        ("comma.ply", PLY % (b"1", b"1,5 2 3"), "no number"),
+        ("comma.pcd", PCD % b"1,5 2 3", "no number"),
+        ("long.ply", PLY % (b"1", b"1" * 400 + b" 2 3"), "without a position"),
+        (
+            "faces.ply",
+            b"ply\nformat ascii 1.0\nelement face 1\nproperty int a"
+            + PLY[20:] % (b"1", b"1\n1 2 3"),
+            "does not begin with its points",
+        ),
+        ("wide.ply", PLY % (b"1", b"1 2 3 4"), "damaged"),
         (
             "large.pcd",
             b"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\n"
@@ -104,6 +138,16 @@ def test_what_is_no_cloud_is_refused_in_one_line(
     with pytest.raises(FileError, match=message) as raised:
         read_cloud(tmp_path / name)
     assert "\n" not in str(raised.value)
+
+
+def test_a_ply_file_of_text_with_cuts_and_other_properties(tmp_path: Path) -> None:
+    pytest.importorskip("open3d")
+    header = PLY.replace(b"end_header", b"property uchar is_cut\nproperty float r\nend_header")
+    (tmp_path / "a.ply").write_bytes(header % (b"2", b"1 2 3 1.0 nan\n4 5 6 0 0.1"))
+    points_m, is_cut = read_cloud(tmp_path / "a.ply")
+    assert points_m.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+    assert is_cut is not None
+    assert is_cut.tolist() == [True, False]
 
 
 @pytest.mark.parametrize("suffix", ["ply", "pcd"])

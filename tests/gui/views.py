@@ -1,4 +1,4 @@
-"""Everything that the wizard can show."""
+"""Everything that the wizard can show, and snapshots for it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from handcal.station.plan import NextStep, StepName
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
 from handcal.station.verifying import VerifyingView
-from handcal.types import EYES, Eye
+from handcal.types import EYES, Eye, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import Action, Step, WizardView
@@ -31,6 +31,26 @@ PLANNED: dict[StepName, tuple[State, tuple[Eye, ...]]] = {
     StepName.DONE: (State.APPLIED, ()),
 }
 """State and eyes with each next step of a plan."""
+Maker = Callable[..., Snapshot]
+VERIFIED = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0))
+
+
+def judged(
+    snapshot: Maker, left: VerdictName, right: VerdictName, state: State, **changes: Any
+) -> Snapshot:
+    """Return a snapshot with these verdicts, of eyes that were verified."""
+    seen = snapshot(state, procedure={"verifications": dict.fromkeys(EYES, VERIFIED)}, **changes)
+    assert seen.procedure.results is not None
+    verdicts: dict[Eye, Verdict] = {
+        "left": Verdict(left, "as told"),
+        "right": Verdict(right, "as told"),
+    }
+    results = replace(seen.procedure.results, verdicts=verdicts)
+    return replace(seen, procedure=replace(seen.procedure, results=results))
+
+
+def actions(view: WizardView) -> list[Action]:
+    return [offer.action for offer in view.others]
 
 
 def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[WizardView]:

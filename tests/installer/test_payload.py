@@ -15,13 +15,19 @@ import pytest
 from tests.helpers import ROOT
 
 LOCK = ROOT / "installer/requirements-build.lock"
+OPEN3D_LOCK = ROOT / "installer/requirements-open3d.lock"
 
 
 @pytest.fixture
-def requirements(tmp_path: Path) -> dict[str, str]:
+def written(tmp_path: Path) -> Path:
     script = ROOT / "installer/windows/requirements.py"
-    subprocess.run([sys.executable, script, LOCK, tmp_path], check=True)
-    text = "".join((tmp_path / name).read_text() for name in ("requirements.txt", "tools.txt"))
+    subprocess.run([sys.executable, script, LOCK, OPEN3D_LOCK, tmp_path], check=True)
+    return tmp_path
+
+
+@pytest.fixture
+def requirements(written: Path) -> dict[str, str]:
+    text = "".join((written / name).read_text() for name in ("requirements.txt", "tools.txt"))
     blocks = re.findall(r"^([\w.-]+)==(\S+) \\\n((?: +--hash.*\n)+)", text, re.MULTILINE)
     assert len(blocks) == len(re.findall(r"^\S+==", text, re.MULTILINE))
     return {name: version for name, version, _ in blocks}
@@ -37,6 +43,23 @@ def test_the_setup_has_every_package_that_the_program_needs_and_no_tool(
         assert name in requirements
     assert {"hatchling", "pyinstaller", "macholib", "pefile"}.isdisjoint(requirements)
     assert {"uv", "shiboken6", "flatbuffers"} <= set(requirements)
+
+
+@pytest.mark.process
+def test_open3d_adds_what_the_setup_has_not(written: Path, requirements: dict[str, str]) -> None:
+    text = (written / "requirements-open3d.txt").read_text()
+    added = set(re.findall(r"^([\w.-]+)==\S+ \\\n +--hash", text, re.MULTILINE))
+    assert {"open3d", "dash", "werkzeug"} <= added
+    assert added.isdisjoint(requirements)
+    assert {"open3d-cpu", "numpy", "pexpect"}.isdisjoint(added)  # Linux; there already; Unix
+
+
+def test_both_locks_have_the_same_versions() -> None:
+    of_program, of_all = (
+        set(re.findall(r"^([\w.-]+==\S+)", lock.read_text(), re.MULTILINE))
+        for lock in (LOCK, OPEN3D_LOCK)
+    )
+    assert of_program < of_all
 
 
 @pytest.mark.process

@@ -29,6 +29,7 @@ KEY = r"HKCU\Software\Microsoft\Windows\CurrentVersion\Uninstall\handcal"
 PAYLOAD = {
     "uv.exe": "not a program",
     "requirements.txt": "",
+    "requirements-open3d.txt": "open3d",
     "setup-environment.cmd": "",
     "handcal.ico": "",
     "licences/LICENSE": "the licence",
@@ -38,6 +39,9 @@ PAYLOAD = {
 
 def of_small_payload(folder: Path) -> Path:
     """Return a setup with small files in place of the wheels."""
+    (folder / "handcal-open3d/licences/open3d").mkdir(parents=True)
+    (folder / "handcal-open3d/open3d-1.0-py3-none-any.whl").write_text("a wheel")
+    (folder / "handcal-open3d/licences/open3d/LICENSE").write_text("its licence")
     for name, text in PAYLOAD.items():
         (folder / "payload" / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / "payload" / name).write_text(text)
@@ -99,6 +103,13 @@ def test_it_is_installed_and_removed(make: object, wine: Wine, tmp_path: Path) -
     assert len(list(folder.glob("wheels/handcal-*.whl"))) == 1
     shortcuts = sorted(path.name for path in wine.drive.glob("users/*/AppData/**/handcal/*.lnk"))
     assert shortcuts == ["handcal commands.lnk", "handcal.lnk"]
+    assert not (folder / "requirements-open3d.txt").exists()  # Open3D is not chosen by default
+    assert not list(folder.glob("wheels/open3d-*.whl"))
+    if (setup.parent / "handcal-open3d").exists():
+        assert wine.run(setup, "/S", "/UNPACK", "/OPEN3D", r"/D=C:\Jürgen").returncode == 0
+        assert (folder / "requirements-open3d.txt").is_file()
+        assert (folder / "licences/open3d/LICENSE").is_file()
+        assert len(list(folder.glob("wheels/open3d-*.whl"))) == 1
     told = wine.run("reg", "query", KEY).stdout
     assert "uninstall.exe" in told  # written in the code page of the console
 

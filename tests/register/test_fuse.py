@@ -11,10 +11,9 @@ from handcal.register.fuse import (
     Fused,
     FuseSettings,
     fuse_alignments,
-    with_eye_box,
 )
 from handcal.register.prior import PriorSettings
-from handcal.register.solve import solve_alignment
+from handcal.register.solve import solve_alignment, with_eye_box
 from handcal.register.surface import describe_surface
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
 from handcal.rig_types import DepthCheck

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.register.fuse import Fused, Observation, eye_slice
-from handcal.register.prior import eye_prior
+from handcal.register.fuse import Fused, Observation
+from handcal.register.prior import eye_prior, eye_slice
 from handcal.register.verdict import (
     Advice,
     VerdictSettings,

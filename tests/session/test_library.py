@@ -26,7 +26,7 @@ RESULTS = {
     "eyes": {
         "left": {
             "verdict": "accept",
-            "benefit": {"after_arcmin": 7.5},
+            "benefit": {"without_arcmin": 28.0, "after_arcmin": 7.5},
             "measured_arcmin": [11.0, 4.5],
         },
         "right": {"verdict": "repeat", "benefit": {"after_arcmin": 16.0}},

@@ -83,6 +83,8 @@ def test_it_comes_back_from_json_bit_for_bit() -> None:
         ({"truth_px": [[1.0, 2.0]]}, "truth_px: expected an array of shape 4×2, got 1×2"),
         ({"error_px": [1.0, 2.0, 3.0, None]}, "error_px"),
         ({"error_px": [1.0, 2.0, 3.0, float("nan")]}, "error_px: must be finite"),
+        ({"adjusted_shift_m": [0.0, 1e308, 0.0]}, "adjusted_shift_m: must be finite and less"),
+        ({"target_depth_m": -1e308}, "target_depth_m: must be finite and less"),
         ({"error_px": {"a": 1}}, "something other than numbers"),
         ({"adjusted_shift_m": [0, 0, 10**400]}, "something other than numbers"),
     ],

@@ -77,6 +77,20 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
     assert len(stage.calibration.alignments) == 1
 
 
+def test_of_a_fast_camera_every_third_hand_is_followed_but_the_confirmed_one_is_judged(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage.make_cursor()
+    monkeypatch.setattr("tests.station.stage.PERIOD_NS", 11_111_112)
+    seen = [stage.see(T_D_NEAR) for _ in range(3)]
+    assert [one.guard_ms is not None for one in seen] == [True, False, False]
+    assert all(one.rotation_rad is seen[0].rotation_rad for one in seen)
+    assert stage.see(T_D_TURNED).is_over_limit
+    assert stage.see(T_D_NEAR).is_over_limit, "it shows the hand before"
+    stage.press()
+    assert stage.see(T_D_NEAR).state is State.ALIGNED
+
+
 def test_a_hand_of_another_shape_is_refused_and_told(stage: Stage, session: Session) -> None:
     stage.make_cursor()
     seen = [stage.see(thumb_out_rad=0.4) for _ in range(5)][-1]

@@ -32,9 +32,10 @@ def fail_with(error: Exception) -> object:
 
 
 @pytest.fixture(autouse=True)
-def quick_detector(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Spare each test the trial of both models."""
+def quick_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spare each test the trial of both models, and the process that lists cameras."""
     monkeypatch.setattr(doctor, "load_detector", lambda: SimpleNamespace(model=Path("some.onnx")))
+    monkeypatch.setattr(doctor, "devices_by_child", tuple)
 
 
 def of(what: str, rig: Path | None = None) -> Finding:
@@ -96,7 +97,6 @@ def test_on_windows_the_network_and_the_camera_have_advice_of_their_own(
 ) -> None:
     monkeypatch.setattr(doctor, "sys", SimpleNamespace(version_info=(3, 13), platform="win32"))
     monkeypatch.setattr(doctor, "UdpTransport", fail_with(LinkError("blocked")))
-    monkeypatch.setattr(doctor, "connected_devices", tuple)
     assert "Windows Security" in of("Network").advice
     assert "Privacy" in of("Camera").advice
 
@@ -153,7 +153,7 @@ def test_the_pairing_key(
 def test_the_camera(
     monkeypatch: pytest.MonkeyPatch, devices: list[Device], found: str, health: Health
 ) -> None:
-    monkeypatch.setattr(doctor, "connected_devices", lambda: devices)
+    monkeypatch.setattr(doctor, "devices_by_child", lambda: devices)
     monkeypatch.setattr(doctor, "explain_absence", lambda: explain_absence(Path("nowhere")))
     assert found in of("Camera").found
     assert of("Camera").health is health
@@ -163,7 +163,7 @@ def test_another_camera_than_the_rig_s_is_reported(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     d415, path = Device("D415", "123", "5.16", "3.2"), tmp_path / "rig.yaml"
-    monkeypatch.setattr(doctor, "connected_devices", lambda: [d415])
+    monkeypatch.setattr(doctor, "devices_by_child", lambda: [d415])
     write_rig(path, replace(example_rig(), depth_camera=d415.identity))
     assert of("Camera", path).health is Health.GOOD
     write_rig(path, replace(example_rig(), depth_camera=CameraIdentity("D435", "456")))
@@ -176,7 +176,7 @@ def test_another_camera_than_the_rig_s_is_reported(
 
 
 def test_a_missing_camera_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "connected_devices", fail_with(CameraError("no SDK")))
+    monkeypatch.setattr(doctor, "devices_by_child", fail_with(CameraError("no SDK")))
     assert of("RealSense SDK").found == "no SDK"
     assert of("RealSense SDK").health is Health.LIMITED
 
@@ -208,10 +208,10 @@ def test_the_screen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_disk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     full = shutil.disk_usage(tmp_path)._replace(free=100 * 2**20)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
-    assert of("Disk").found == "0.1 GiB free here"
-    assert of("Disk").health is Health.BROKEN
-    monkeypatch.undo()
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "disk_usage", lambda _: full)
+        assert of("Disk").found == "0.1 GiB free here"
+        assert of("Disk").health is Health.BROKEN
     monkeypatch.chdir(tmp_path)
     tmp_path.rmdir()
     assert of("Disk").health is Health.BROKEN

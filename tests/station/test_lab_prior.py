@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from handcal.progress import Progress
-from handcal.register.fuse import eye_position_m
-from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
+from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_position_m, eye_prior
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.rig_types import Rig

@@ -28,13 +28,23 @@ def measure_cuts(settings: BenchSettings, progress: Progress) -> Measured:
     def solve(angle_deg: float, trial: int) -> Errors:
         rng = np.random.default_rng([trial, 1])
         made = measured_alignment(rng, trial, angle_deg, _CUT_SIGMA_M, settings.points)
-        error_m = solve_trial(made, "consistent").shift_m - made.shift_m
-        return {"floor": floor_error_m(made, exact=True), "consistent": error_m}
+        solved = solve_trial(made, "consistent")
+        error_m = solved.shift_m - made.shift_m
+        return {
+            "floor": floor_error_m(made, exact=True),
+            "consistent": error_m,
+            "whitened": np.linalg.solve(np.linalg.cholesky(solved.covariance_m2), error_m),
+        }
 
     by_angle = collect_errors(solve, settings.cut_angles_deg, settings.trials, progress)
     rows = [
-        {"angle_deg": angle_deg, "trials": settings.trials}
-        | {f"{name}_mean_mm": mean_length_mm(errors_m) for name, errors_m in errors.items()}
+        {
+            "angle_deg": angle_deg,
+            "trials": settings.trials,
+            "floor_mean_mm": mean_length_mm(errors["floor"]),
+            "consistent_mean_mm": mean_length_mm(errors["consistent"]),
+            "normalised_squared_error_mean": float(np.mean(np.sum(errors["whitened"] ** 2, 1))),
+        }
         for angle_deg, errors in by_angle.items()
     ]
     straight, *turned = rows

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from handcal.errors import FileError
+from handcal.session.library import EyeOutcome, eye_outcomes
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
+from handcal.types import Eye
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.times import local_time
@@ -24,6 +26,8 @@ class Entry:
     """True if it can be chosen; otherwise `text` contains the reason."""
     wearer: str = ""
     """Name or code; empty if it is not known."""
+    eyes: Mapping[Eye, EyeOutcome] = field(default_factory=dict)
+    """Results of the eyes, as far as they are known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +84,7 @@ def _recent(path: Path) -> Entry | None:
     if not (alignments.active or alignments.deleted or trials.active or trials.deleted):
         return None
     text = _text(state.wearer, events[0].time, len(alignments.active), len(trials.active))
-    return Entry(path, text, wearer=state.wearer)
+    return Entry(path, text, wearer=state.wearer, eyes=eye_outcomes(path, replayed))
 
 
 def _text(wearer: str, started: str, alignments: int, trials: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QListWidget,
@@ -15,7 +16,8 @@ from PySide6.QtWidgets import (
 )
 
 from handcal_gui.pages.start.session_entries import Entry
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, follow_theme, icon
+from handcal_gui.widgets.error_bars import PICTURE_PX, error_bars, error_text
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
 
@@ -50,6 +52,7 @@ class SessionList(QWidget):
         self._list.setMinimumHeight(9 * SPACING_PX)
         self._list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._list.setAlternatingRowColors(True)
+        self._list.setIconSize(PICTURE_PX)
         self._button = button("choose", verb)
         self._list.itemActivated.connect(self._choose)
         self._list.currentItemChanged.connect(self._refresh)
@@ -63,10 +66,13 @@ class SessionList(QWidget):
         self._buttons.addStretch(1)
         self._buttons.addWidget(self._button)
         layout.addLayout(self._buttons)
-        self.show_entries(())
+        self._entries: Sequence[Entry] = ()
+        follow_theme(self, lambda: self.show_entries(self._entries))
 
     def show_entries(self, entries: Sequence[Entry]) -> None:
         """Replace the entries, keeping the selection if it is still listed."""
+        self._entries = entries
+        has_pictures = any(entry.eyes for entry in entries)
         kept = self._list.currentItem()
         kept_path = kept.data(Qt.ItemDataRole.UserRole) if kept is not None else None
         self._list.clear()
@@ -75,7 +81,9 @@ class SessionList(QWidget):
         for entry in entries:
             item = QListWidgetItem(entry.text)
             item.setData(Qt.ItemDataRole.UserRole, entry.path)
-            item.setToolTip(str(entry.path))
+            item.setToolTip("\n".join(filter(None, (str(entry.path), error_text(entry.eyes)))))
+            if has_pictures:
+                item.setIcon(QIcon(error_bars(entry.eyes)))
             if not entry.is_enabled:
                 item.setFlags(Qt.ItemFlag.ItemIsEnabled)
                 item.setIcon(icon("warning"))

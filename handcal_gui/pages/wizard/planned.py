@@ -15,7 +15,15 @@ from handcal_gui.pages.wizard.checks import (
     still_check,
     verdict_checks,
 )
-from handcal_gui.pages.wizard.steps import DISTANCE, UNUSABLE, Wizard, eye_names, nudge_view
+from handcal_gui.pages.wizard.step_views import (
+    UNUSABLE,
+    align_view,
+    connect_view,
+    eye_names,
+    nudge_view,
+    save_view,
+)
+from handcal_gui.pages.wizard.steps import DISTANCE, Wizard
 from handcal_gui.pages.wizard.view import EYE_WORDS, Action, ButtonSpec, Step, WizardView
 from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
@@ -96,11 +104,11 @@ class PlannedWizard(Wizard):
         """Return the view of a snapshot."""
         step, procedure = self.step(snapshot), snapshot.procedure
         if step is Step.CONNECT:
-            return self._connect(snapshot)
+            return connect_view(snapshot)
         if step is Step.SAVE:
             return self._saved(snapshot)
         if procedure.state is State.ALIGN:
-            view = self._align(snapshot)
+            view = align_view(snapshot)
             return replace(view, sentence=tr("{} The hand stays up.").format(view.sentence))
         if procedure.verifying is not None:
             return nudge_view(snapshot, procedure.verifying)
@@ -214,7 +222,7 @@ class PlannedWizard(Wizard):
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:
-        view = replace(self._save(snapshot), fact=_drawn_otherwise(snapshot.procedure))
+        view = replace(save_view(snapshot), fact=_drawn_otherwise(snapshot.procedure))
         if not snapshot.record.is_finished:
             return view
         slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))

@@ -34,9 +34,9 @@ class HandOverlay:
         if not len(self.image_px):
             return
         color = QColor(colors().red if self.is_red else colors().live)
-        self._draw_mask(painter, QColor(color))
         # A contour follows pixels anyway, and antialiasing is five times slower.
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
+        self._draw_mask(painter, QColor(color))
         strays_px = _SMOOTHED_PX / painter.deviceTransform().m11()
         for points_px, is_cut in contour_runs(self.image_px, self.cloud.contour_is_cut):
             _set_pen(painter, color, Qt.PenStyle.DashLine if is_cut else Qt.PenStyle.SolidLine)
@@ -46,13 +46,18 @@ class HandOverlay:
     def _draw_mask(self, painter: QPainter, color: QColor) -> None:
         x0, y0, x1, y1 = self.cloud.box_px
         step = max(1, int(1.0 / painter.deviceTransform().m11()))
-        shown = self.cloud.mask[y0:y1:step, x0:x1:step] & np.uint8(1)
+        argb = _MASK_ALPHA << 24
+        for channel, shift in ((color.red(), 16), (color.green(), 8), (color.blue(), 0)):
+            argb |= channel * _MASK_ALPHA // 255 << shift
+        shown = (self.cloud.mask[y0:y1:step, x0:x1:step] & np.uint8(1)) * np.uint32(argb)
         height, width = shown.shape
-        mask = QImage(shown.data, width, height, width, QImage.Format.Format_Indexed8)
-        color.setAlpha(_MASK_ALPHA)
-        mask.setColorTable([0, color.rgba()])
+        # Premultiplied, the one format that Qt need not convert.
+        mask = QImage(
+            shown.data, width, height, 4 * width, QImage.Format.Format_ARGB32_Premultiplied
+        )
         painter.save()
-        painter.setTransform(_fit(self.depth_px, self.image_px), combine=True)
+        if self.image_px is not self.depth_px:
+            painter.setTransform(_fit(self.depth_px, self.image_px), combine=True)
         painter.drawImage(QRectF(x0 - 0.5, y0 - 0.5, step * width, step * height), mask)
         _set_pen(painter, QColor(colors().muted), Qt.PenStyle.SolidLine)
         painter.drawRect(QRectF(x0 - 0.5, y0 - 0.5, x1 - x0, y1 - y0))
@@ -86,8 +91,9 @@ def contour_runs(points_px: Float64, is_cut: Bool) -> list[tuple[Float64, bool]]
 
 def _fit(source_px: Float64, target_px: Float64) -> QTransform:
     """Return the scale and shift that map the bounding box of points to that of others."""
-    (x0, y0), (x1, y1) = source_px.min(axis=0), source_px.max(axis=0)
-    (u0, v0), (u1, v1) = target_px.min(axis=0), target_px.max(axis=0)
+    # Column by column: ten times as fast as a reduction along the first axis.
+    x0, x1, y0, y1 = (end for column in source_px.T for end in (column.min(), column.max()))
+    u0, u1, v0, v1 = (end for column in target_px.T for end in (column.min(), column.max()))
     fit = QTransform.fromTranslate(u0, v0)
     fit.scale((u1 - u0) / max(x1 - x0, 1.0), (v1 - v0) / max(y1 - y0, 1.0))
     return fit.translate(-x0, -y0)

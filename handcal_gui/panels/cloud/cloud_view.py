@@ -56,6 +56,7 @@ class CloudView(QWidget):
         self.setMinimumSize(160, 120)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # as ImageView
         self._points_mm, self._colors = _NONE, np.empty((0, 3), np.uint8)
         self._from_mm = self._to_mm = _NONE
         self._text = ""

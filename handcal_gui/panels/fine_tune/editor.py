@@ -24,6 +24,7 @@ from handcal_gui.widgets.numbers import signed
 
 _SLIDER_MAX_MM = 15.0
 _SLIDER_STEPS_PER_MM = 100
+_SLIDER_MIN_PX = 4 * SPACING_PX
 _DIRECTIONS = (
     tr("to the right of the rig's viewpoint (φ1); negative is to the left"),
     tr("below the rig's viewpoint (φ2); negative is above"),
@@ -127,6 +128,7 @@ class EyeShiftEditor(QWidget):
 
     def _make_slider(self, title: str, axis: int) -> QSlider:
         slider = QSlider(Qt.Orientation.Horizontal)
+        slider.setMinimumWidth(_SLIDER_MIN_PX)
         slider.setObjectName(f"slider{axis + 1}")
         slider.setAccessibleName(f"{title} φ{axis + 1}")
         slider.setToolTip(
@@ -147,10 +149,11 @@ class EyeShiftEditor(QWidget):
         for axis in range(3):
             name = QLabel(f"φ{axis + 1}")
             name.setToolTip(_tooltip(axis))
-            grid.addWidget(name, 2 * axis, 0)
-            grid.addWidget(self._fields[axis], 2 * axis, 1)
-            grid.addWidget(self._sliders[axis], 2 * axis + 1, 0, 1, 2)
-        grid.setColumnStretch(1, 1)
+            grid.addWidget(name, axis, 0)
+            grid.addWidget(self._fields[axis], axis, 1)
+            grid.addWidget(self._sliders[axis], axis, 2)
+        grid.setHorizontalSpacing(SPACING_PX // 2)
+        grid.setColumnStretch(2, 1)
         return grid
 
     def _lay_out_effects(self) -> QGridLayout:

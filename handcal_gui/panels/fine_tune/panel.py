@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QScrollArea,
     QSizePolicy,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -281,6 +280,8 @@ class FineTunePanel(QWidget):
             tr("Reset to offline"), "", tr("Set φ to 0, the offline calibration")
         )
         self._reset_offline.triggered.connect(lambda: self._reset(_OFFLINE))
+        self.reset_action.setIconText(tr("Solved"))
+        self._reset_offline.setIconText(tr("Offline"))
         looks = QActionGroup(self)
         looks.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
         looks.triggered.connect(self._show)
@@ -290,6 +291,8 @@ class FineTunePanel(QWidget):
         self._show_offline = add(
             tr("Show offline"), "B", tr("Show φ = 0 in the headset while checked")
         )
+        self._show_solved.setIconText(tr("Solved"))
+        self._show_offline.setIconText(tr("Offline"))
         for action in (self._show_solved, self._show_offline):
             action.setCheckable(True)
             looks.addAction(action)
@@ -326,24 +329,31 @@ class FineTunePanel(QWidget):
         self._status.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         hint = QLabel(text=_KEYS, wordWrap=True)
         body = QWidget()
-        layout = QVBoxLayout(body)
         steps = self._steps.actions()
-        layout.addLayout(
-            _row(QLabel(tr("Step")), *steps, QLabel("mm"), None, self._both, self._undo, self._redo)
+        show, reset = QLabel(tr("Show")), QLabel(tr("Reset to"))
+        vbox(
+            _row(
+                QLabel(tr("Step")), *steps, QLabel("mm"), None, self._both, self._undo, self._redo
+            ),
+            _row(self._editors["left"], self._editors["right"]),
+            _row(QLabel(tr("Effect at")), self._depth, self._against, None),
+            _row(
+                *(show, self._show_solved, self._show_offline, None),
+                *(reset, self.reset_action, self._reset_offline),
+            ),
+            hint,
+            1,
+            on=body,
+            margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, 0),
+            spacing=SPACING_PX // 2,
         )
-        layout.addLayout(_row(self._editors["left"], self._editors["right"]))
-        layout.addLayout(_row(QLabel(tr("Effect at")), self._depth, self._against, None))
-        layout.addLayout(_row(self._show_solved, self.reset_action, None))
-        layout.addLayout(_row(self._show_offline, self._reset_offline, None))
-        layout.addWidget(hint)
-        layout.addStretch(1)
         area = _QuietScrollArea(widgetResizable=True)
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         area.setWidget(body)
         outer = vbox((area, 1), on=self, margins=0)
         status = _row(self._sign, self._status)
-        status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX)
+        status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
         outer.addLayout(status)
 
 
@@ -364,6 +374,7 @@ def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
         elif isinstance(item, QAction):
             button = tool_button()
             button.setDefaultAction(item)
+            button.setAccessibleName(item.text())
             if not item.icon().isNull():
                 button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
             row.addWidget(button)

@@ -29,10 +29,13 @@ class LinkHistory(QWidget):
         self.setObjectName("link-history")
         self._moments: deque[tuple[float, float, float, float]] = deque()
         self._latency = _plot(
-            tr("Latency history"), tr("Latency, last {:g} s").format(_LASTS_S), "ms"
+            "latency-history",
+            tr("Latency history"),
+            tr("Latency, last {:g} s").format(_LASTS_S),
+            "ms",
         )
         self._latency.setToolTip(tr("Latency of the last {:g} s, in milliseconds").format(_LASTS_S))
-        self._loss = _plot(tr("Loss history"), tr("Lost: — to, - - from"), "%")
+        self._loss = _plot("loss-history", tr("Loss history"), tr("Lost: — to, - - from"), "%")
         self._loss.setToolTip(
             tr(
                 "Share of the datagrams of the last {:g} s that did not arrive: to the "
@@ -66,8 +69,8 @@ class LinkHistory(QWidget):
             line.clear()
 
 
-def _plot(name: str, label: str, unit: str) -> Plot:
-    plot = Plot(name, label, "")
+def _plot(name: str, label: str, x_label: str, unit: str) -> Plot:
+    plot = Plot(name, label, x_label, "")
     plot.item.setXRange(-_LASTS_S, 0.0, padding=0.0)
     plot.item.getAxis("bottom").setStyle(showValues=False, tickLength=0)
     _scale(plot, np.empty(0), unit)

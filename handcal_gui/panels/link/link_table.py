@@ -56,7 +56,7 @@ _ROWS = {
 }
 """Captions, and what the numbers mean by column."""
 REJECTIONS = {
-    Rejection.UNPAIRED: tr("Signed with another pairing key: enter the key below in the headset"),
+    Rejection.UNPAIRED: tr("Signed with another pairing key: enter the key above in the headset"),
     Rejection.CORRUPT: tr("Damaged in transit, or not meant for handcal"),
     Rejection.REPLAYED: tr(
         "Arrived twice or much too late; a few are normal in a wireless network"
@@ -77,7 +77,7 @@ class LinkTable(QWidget):
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(2 * SPACING_PX)
-        self._grid.setVerticalSpacing(SPACING_PX // 4)
+        self._grid.setVerticalSpacing(0)
         self._grid.setColumnStretch(0, 1)
         for column, heading in ((_OUT, tr("To headset")), (_IN, tr("From headset"))):
             self._grid.addWidget(QLabel(heading), 0, column, Qt.AlignmentFlag.AlignRight)

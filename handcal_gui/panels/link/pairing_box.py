@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QGroupBox, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.translation import tr
@@ -14,22 +14,19 @@ from handcal_gui.widgets.layouts import hbox
 _RENEWING = tr("The new key must then be entered in the headset.")
 
 
-class PairingBox(QGroupBox):
+class PairingBox(QWidget):
     """The address to connect to, and the pairing key, hidden until requested.
 
     Attributes
     ----------
     new_key_requested : Signal()
         The user requests another key.
-    connect_requested : Signal()
-        The user wants to pair or try a headset.
     """
 
     new_key_requested = Signal()
-    connect_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(tr("Pairing"), parent)
+        super().__init__(parent)
         self.setObjectName("pairing")
         self._address = QLabel()
         self._address.setObjectName("pairing-address")
@@ -42,23 +39,19 @@ class PairingBox(QGroupBox):
         self._key = KeyField()
         renew = button("newKey", tr("New key…"), tr("Make a new pairing key"), _RENEWING)
         renew.clicked.connect(self.new_key_requested)
-        connect = button("connect", tr("Connect…"), tr("Pair a headset by QR code, and try it"))
-        connect.clicked.connect(self.connect_requested)
-        self._lay_out(connect, renew)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(SPACING_PX)
+        grid.setVerticalSpacing(SPACING_PX // 2)
+        key_label = QLabel(tr("&Key"))
+        key_label.setBuddy(self._key)
+        grid.addWidget(QLabel(tr("Address")), 0, 0)
+        grid.addLayout(hbox((self._address, 1), renew, spacing=SPACING_PX), 0, 1)
+        grid.addWidget(key_label, 1, 0)
+        grid.addWidget(self._key, 1, 1)
+        grid.setColumnStretch(1, 1)
 
     def show_pairing(self, address: str, key: str) -> None:
         """Show an address, as host:port, and a key, hidden at first."""
         self._address.setText(address)
         self._key.set_key(key)
-
-    def _lay_out(self, connect: QPushButton, renew: QPushButton) -> None:
-        grid = QGridLayout(self)
-        grid.setSpacing(SPACING_PX)
-        key_label = QLabel(tr("&Key"))
-        key_label.setBuddy(self._key)
-        grid.addWidget(QLabel(tr("Address")), 0, 0)
-        grid.addWidget(self._address, 0, 1)
-        grid.addWidget(key_label, 1, 0)
-        grid.addWidget(self._key, 1, 1)
-        grid.addLayout(hbox(1, connect, renew, spacing=SPACING_PX), 2, 1)
-        grid.setColumnStretch(1, 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QScrollArea, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QWidget
 
 from handcal.link.rates import link_rates
 from handcal.link.statistics import LinkStatistics
@@ -15,6 +15,7 @@ from handcal_gui.panels.link.link_table import RATES_S, LinkTable
 from handcal_gui.panels.link.pairing_box import PairingBox
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.sentence import sentence
 
@@ -49,15 +50,22 @@ class LinkPanel(QWidget):
         self._state = QLabel()
         self._state.setObjectName("link-state")
         self._state.setWordWrap(True)
-        self._restart = QPushButton(tr("Restart headset"))
-        self._restart.setToolTip(tr("Restart the virtual headset's program"))
+        self._connect = button(
+            "connect", tr("Connect…"), tr("Pair a headset by QR code, and try it")
+        )
+        self._connect.hide()
+        self._connect.clicked.connect(self.connect_requested)
+        self._restart = button(
+            "restartHeadset",
+            tr("Restart headset"),
+            help_text=tr("Restart the virtual headset's program"),
+        )
         self._restart.clicked.connect(self.restart_headset_requested)
         self._restart.hide()
         self._table = LinkTable()
         self._history = LinkHistory()
         self._pairing = PairingBox()
         self._pairing.new_key_requested.connect(self.new_key_requested)
-        self._pairing.connect_requested.connect(self.connect_requested)
         self._pairing.hide()
         self._lay_out()
         self._show_state(is_connected=False, problem=tr("Open a session on the start page."))
@@ -79,6 +87,7 @@ class LinkPanel(QWidget):
         self._history.clear()
         self._pairing.show_pairing(address, key)
         self._pairing.show()
+        self._connect.show()
         self._restart.setVisible(is_virtual)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
@@ -116,16 +125,17 @@ class LinkPanel(QWidget):
         top.addWidget(self._sign, 0, Qt.AlignmentFlag.AlignTop)
         top.addWidget(self._state, 1)
         top.addWidget(self._restart, 0, Qt.AlignmentFlag.AlignTop)
+        top.addWidget(self._connect, 0, Qt.AlignmentFlag.AlignTop)
         content = QWidget()
         vbox(
             top,
+            self._pairing,
             self._table,
             self._history,
-            self._pairing,
             0,
             on=content,
-            margins=SPACING_PX,
-            spacing=SPACING_PX,
+            margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
+            spacing=SPACING_PX // 2,
         )
         area = QScrollArea()
         area.setWidget(content)

@@ -52,7 +52,7 @@ class CompareTab(QWidget):
         self.setObjectName("comparison")
         self._results: Results | None = None
         self._rig: Rig | None = None
-        self.table = NumberTable(tr("Comparison of methods"))
+        self.table = NumberTable("comparison-of-methods", tr("Comparison of methods"))
         _keep_space(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")

@@ -18,7 +18,9 @@ class ConvergencePlot(Plot):
     """Shows the distance between hand and cursor by iteration, for each alignment and eye."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(tr("Convergence"), tr("Iteration"), tr("RMS distance (mm)"), parent)
+        super().__init__(
+            "convergence", tr("Convergence"), tr("Iteration"), tr("RMS distance (mm)"), parent
+        )
         self.setToolTip(
             tr(
                 "RMS distance between matched points of hand and cursor at each iteration\n"
@@ -48,6 +50,6 @@ class ConvergencePlot(Plot):
         longest = max(map(len, histories), default=1)
         largest_mm = 1e3 * max((float(np.sqrt(max(one))) for one in histories), default=1e-3)
         self.item.setXRange(1, 1.1 * longest)  # with space for the numbers
-        self.item.setYRange(0.0, 1.4 * largest_mm)  # and for the legend
+        self.item.setYRange(0.0, 1.1 * largest_mm)
         spacing = max(1, longest // 5)
         self.item.getAxis("bottom").setTickSpacing(spacing, spacing)

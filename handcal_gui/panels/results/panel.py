@@ -57,10 +57,10 @@ class ResultsPanel(QWidget):
         self.setAccessibleName(tr("Results"))
         self._results: Results | None = None
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
-        self._numbers = NumberTable(tr("Numbers of both eyes"))
+        self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
         self._residuals = ResidualsTab()
-        self._alignments = NumberTable(tr("Each alignment alone"))
+        self._alignments = NumberTable("each-alignment-alone", tr("Each alignment alone"))
         self._another = QLabel()
         self._another.setWordWrap(True)
         self._compare = CompareTab()

@@ -51,7 +51,9 @@ class RotationPanel(QWidget):
         self._advice = _text_label("rotation-advice", scale=1.2)
         self._advice.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._refusals = _text_label("rotation-refusals")
-        self._plot = Plot(tr("Rotation history"), tr("Last {:g} s").format(_HISTORY_S), "")
+        self._plot = Plot(
+            "rotation-history", tr("Rotation history"), tr("Last {:g} s").format(_HISTORY_S), ""
+        )
         self._plot.item.setXRange(-_HISTORY_S, 0.0, padding=0.0)
         self._plot.item.getAxis("bottom").setStyle(showValues=False, tickLength=0)
         self._limit_line = self._plot.add_line("red", dashed=True)

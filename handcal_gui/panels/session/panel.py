@@ -79,11 +79,17 @@ class SessionPanel(QWidget):
         self._eye_distance.editingFinished.connect(self._take_eye_distance)
         self._eye_distance_problem = paragraph("eyeDistanceProblem")
         self._alignments = RecordTable(
-            tr("Alignments"), ALIGNMENT_COLUMNS, tr("Confirmed alignments appear here")
+            "alignments",
+            tr("Alignments"),
+            ALIGNMENT_COLUMNS,
+            tr("Confirmed alignments appear here"),
         )
         self._alignments.delete_requested.connect(partial(self.delete_requested.emit, "alignment"))
         self._trials = RecordTable(
-            tr("Trials of the session"), TRIAL_COLUMNS, tr("Recorded trials appear here")
+            "trials-of-the-session",
+            tr("Trials of the session"),
+            TRIAL_COLUMNS,
+            tr("Recorded trials appear here"),
         )
         self._trials.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
         self._notes = NotesEditor()

@@ -110,10 +110,12 @@ class TrialsPanel(QWidget):
         self._message = paragraph("message")
         self._summary = paragraph("summary")
         self._table = RecordTable(
-            tr("Trials"), TRIAL_COLUMNS, tr("Trials appear here as they are recorded")
+            "trials", tr("Trials"), TRIAL_COLUMNS, tr("Trials appear here as they are recorded")
         )
         self._table.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
-        self._statistics = NumberTable(tr("Statistics of trials"), hides=True)
+        self._statistics = NumberTable(
+            "statistics-of-trials", tr("Statistics of trials"), hides=True
+        )
         self._plot = TrialPlot()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(

@@ -18,7 +18,6 @@ _SIGNS: dict[Eye, tuple[str, float]] = {"left": ("o", -0.012), "right": ("t1", 0
 """Symbol, and an offset in metres so that the eyes do not hide each other."""
 _MEDIAN_HALF_WIDTH_M = 0.025
 _MARGIN_M = 0.05
-_LEGEND_M = 0.08
 
 
 class TrialPlot(Plot):
@@ -26,13 +25,14 @@ class TrialPlot(Plot):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
-            tr("Errors of trials"), tr("Distance of the target (m)"), tr("Error (′)"), parent
+            "errors-of-trials",
+            tr("Errors of trials"),
+            tr("Distance of the target (m)"),
+            tr("Error (′)"),
+            parent,
         )
         self.item.getAxis("bottom").setTicks([[(m, f"{m:g}") for m in TARGET_DEPTHS_M]])
-        self.item.setXRange(
-            min(TARGET_DEPTHS_M) - _MARGIN_M, max(TARGET_DEPTHS_M) + _MARGIN_M + _LEGEND_M
-        )
-        self.item.setLimits(yMin=0.0)
+        self.item.setXRange(min(TARGET_DEPTHS_M) - _MARGIN_M, max(TARGET_DEPTHS_M) + _MARGIN_M)
         self.show_legend()
         self._median = self.add_line("muted", name=tr("Median"))
         self._errors = {
@@ -50,6 +50,8 @@ class TrialPlot(Plot):
         depths_m = np.array(list(statistics.by_depth_m))
         ends_m = np.add.outer(depths_m, (-_MEDIAN_HALF_WIDTH_M, _MEDIAN_HALF_WIDTH_M)).ravel()
         medians = [errors.arcmin.median for errors in statistics.by_depth_m.values()]
+        largest = max((float(trial.error_arcmin.max()) for trial in trials), default=1.0)
+        self.item.setYRange(0.0, 1.1 * max(largest, 1.0), padding=0.0)
         self._median.setData(*_unjoined(ends_m, np.repeat(medians, 2), 2))
 
 

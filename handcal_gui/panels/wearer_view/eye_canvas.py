@@ -46,6 +46,7 @@ class EyeCanvas(QWidget):
         self.setAccessibleName(name)
         self.setMinimumSize(120, 80)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # as ImageView
         self._view: EyeView | None = None
         self._image = QImage()
         self._message = ""

@@ -115,7 +115,7 @@ def _key_tables(report: Report) -> list[Table]:
 
 
 def _table_page(table: Table) -> QWidget:
-    view = NumberTable(tr("Numbers"))
+    view = NumberTable("numbers", tr("Numbers"))
     titles = [column.title for column in table.columns[1:]]
     view.show_rows(titles, [Row(cells[0], tuple(cells[1:])) for cells in table.rows])
     return _page(view, table.caption)

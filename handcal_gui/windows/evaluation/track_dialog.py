@@ -83,7 +83,7 @@ class TrackDialog(PreparationDialog):
         self._view = ImageView(tr("Depth camera, colour"))
         self._view.setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)
         self._view.show_text(message=tr("No image yet"))
-        self._pose = NumberTable(tr("Pose of the cube"))
+        self._pose = NumberTable("pose-of-the-cube", tr("Pose of the cube"))
         self._pose.setMinimumWidth(44 * SPACING_PX)
         self._found = FindingLine("track")
         self._bar = JobBar(tr("Stop"))

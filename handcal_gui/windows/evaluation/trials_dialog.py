@@ -163,7 +163,7 @@ class TrialsDialog(PreparationDialog):
         self._next = main_button("next", tr("They coincide"))
         self._next.setMinimumWidth(self._next.sizeHint().width())
         self._close = button("close", tr("Close"))
-        self._table = NumberTable(tr("Trials recorded"))
+        self._table = NumberTable("trials-recorded", tr("Trials recorded"))
         self._moves = {
             name: button(name, text, help_text=tr("{} ({:g} mm of φ)").format(text, 1e3 * STEP_M))
             for name, (text, *_) in _MOVES.items()

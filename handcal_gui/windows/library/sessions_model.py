@@ -18,6 +18,7 @@ from handcal.session.library import LibraryEntry
 from handcal.types import EYES, VerdictName
 from handcal_gui.theme import number_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.error_bars import error_bars, error_text
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.times import local_time
@@ -191,10 +192,13 @@ class SessionsModel(QAbstractTableModel):
         match role:
             case Qt.ItemDataRole.DisplayRole:
                 return column.text(entry)
+            case Qt.ItemDataRole.DecorationRole if index.column() == 0:
+                return error_bars(entry.eyes)
             case Qt.ItemDataRole.UserRole:
                 return column.key(entry)
             case Qt.ItemDataRole.ToolTipRole:
-                return f"{column.text(entry)}\n{entry.problem or entry.path}"  # it may be elided
+                lines = column.text(entry), entry.problem or str(entry.path), error_text(entry.eyes)
+                return "\n".join(filter(None, lines))  # the cell's text may be elided
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font
             case Qt.ItemDataRole.TextAlignmentRole:

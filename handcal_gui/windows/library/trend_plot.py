@@ -21,10 +21,13 @@ class TrendPlot(Plot):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
-            tr("Trend"), tr("Calibration of this wearer, oldest first"), tr("Error (′)"), parent
+            "trend",
+            tr("Trend"),
+            tr("Calibration of this wearer, oldest first"),
+            tr("Error (′)"),
+            parent,
         )
         self.show_legend()
-        self.item.setLimits(yMin=0.0)
         self._measured = {
             eye: self.add_line(
                 eye, name=tr("{}, measured").format(EYE_NAMES[eye]), symbol=_SYMBOLS[eye]
@@ -43,16 +46,21 @@ class TrendPlot(Plot):
 
     def show_calibrations(self, entries: Sequence[LibraryEntry]) -> None:
         """Show the solved sessions of one wearer, the oldest first."""
-        numbers = np.arange(1.0, len(entries) + 1.0)
+        numbers, largest = np.arange(1.0, len(entries) + 1.0), 1.0
         for eye in EYES:
             outcomes = [entry.eyes.get(eye) for entry in entries]
             measured = [None if one is None else one.measured_arcmin for one in outcomes]
             expected = [None if one is None else one.expected_arcmin for one in outcomes]
             for line, errors in ((self._measured, measured), (self._expected, expected)):
                 known = [np.nan if error is None else error for error in errors]
-                line[eye].setData(numbers, np.array(known, dtype=np.float64))
+                largest = max(largest, *(error or 0.0 for error in errors))
+                if any(error is not None for error in errors):
+                    line[eye].setData(numbers, np.array(known, dtype=np.float64))
+                else:
+                    line[eye].clear()
+        self.item.setYRange(0.0, 1.1 * largest, padding=0.0)
         count = max(len(entries), 2)
-        self.item.setXRange(0.8, count + 0.2 + 0.3 * count)  # the legend is at the right
+        self.item.setXRange(0.8, count + 0.2)
         self.item.getAxis("bottom").setTicks([[(number, f"{number:g}") for number in numbers]])
 
 

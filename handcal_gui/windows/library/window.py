@@ -32,6 +32,7 @@ from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX, flat_header
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import button, choice, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
@@ -390,7 +391,9 @@ def _table(model: SessionsFilter) -> QTableView:
     table.sortByColumn(1, Qt.SortOrder.DescendingOrder)
     table.setMinimumHeight(12 * SPACING_PX)
     table.verticalHeader().hide()
-    table.verticalHeader().setDefaultSectionSize(table.fontMetrics().height() + SPACING_PX // 2)
+    table.setIconSize(PICTURE_PX)
+    row_px = max(table.fontMetrics().height(), PICTURE_PX.height()) + SPACING_PX // 2
+    table.verticalHeader().setDefaultSectionSize(row_px)
     across = table.horizontalHeader()
     flat_header(across)
     across.setHighlightSections(False)

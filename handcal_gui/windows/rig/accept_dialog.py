@@ -60,7 +60,7 @@ class AcceptDialog(QDialog):
         self._page: Path | None = None
         self._counts = {eye: QLabel() for eye in EYES}
         self._found = FindingLine("accepted")
-        self._table = NumberTable(tr("Drawn and seen corners"))
+        self._table = NumberTable("drawn-against-seen", tr("Drawn and seen corners"))
         self._bar = JobBar()
         self._run = main_button("runAcceptance", tr("Accept"))
         self._open = button("openPage", tr("Open page"))

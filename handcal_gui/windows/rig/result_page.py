@@ -56,9 +56,9 @@ class ResultPage(QWidget):
         self._acceptance: AcceptDialog | None = None
         self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", tr("Name of the rig"))
         self._findings = FindingList(tr("Check of the rig"))
-        self._numbers = NumberTable(tr("Numbers of the rig"))
+        self._numbers = NumberTable("numbers-of-the-rig", tr("Numbers of the rig"))
         self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
-        self._differences = NumberTable(tr("Differences"))
+        self._differences = NumberTable("differences", tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
         self._save = main_button("saveRig", tr("Save rig file…"))

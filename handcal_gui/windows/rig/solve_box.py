@@ -44,7 +44,7 @@ class SolveBox(QWidget):
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
         self._lenses = paragraph("lenses")
-        self._table = NumberTable(tr("Numbers"))
+        self._table = NumberTable("numbers", tr("Numbers"))
         self._table.setMinimumWidth(40 * SPACING_PX)
         self._lay_out()
         self.show_origin(None)

@@ -13,7 +13,7 @@ ROWS = (
 
 
 def test_rows_are_shown_right_aligned_and_explained(qtbot: QtBot) -> None:
-    table = NumberTable("Some numbers")
+    table = NumberTable("some-numbers", "Some numbers")
     qtbot.addWidget(table)
     table.show_rows(("Left eye", "Right eye"), ROWS)
     item, label = table.item(0, 1), table.verticalHeaderItem(0)
@@ -26,7 +26,7 @@ def test_rows_are_shown_right_aligned_and_explained(qtbot: QtBot) -> None:
 
 
 def test_other_rows_leave_nothing_of_the_first(qtbot: QtBot) -> None:
-    table = NumberTable("Some numbers")
+    table = NumberTable("some-numbers", "Some numbers")
     qtbot.addWidget(table)
     table.show_rows(("Left eye", "Right eye"), ROWS)
     table.show_rows(("a", "b"), (Row("one", ("1", "2")), Row("two", ("3", "4"))))
@@ -35,7 +35,7 @@ def test_other_rows_leave_nothing_of_the_first(qtbot: QtBot) -> None:
 
 
 def test_columns_share_the_room_and_cut_no_number_short(qtbot: QtBot) -> None:
-    table = NumberTable("Some numbers")
+    table = NumberTable("some-numbers", "Some numbers")
     qtbot.addWidget(table)
     table.show_rows(("Left eye", "Right eye"), ROWS)
     table.show()
@@ -48,7 +48,7 @@ def test_columns_share_the_room_and_cut_no_number_short(qtbot: QtBot) -> None:
 
 
 def test_last_columns_that_do_not_fit_may_be_in_the_tooltips(qtbot: QtBot) -> None:
-    table = NumberTable("Some numbers", hides=True)
+    table = NumberTable("some-numbers", "Some numbers", hides=True)
     qtbot.addWidget(table)
     table.show_rows(("Mean ′", "Max ′"), (Row("All", ("2.5", "4.0"), "each counts once"),))
     table.show()

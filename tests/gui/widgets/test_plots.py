@@ -11,7 +11,7 @@ from handcal_gui.widgets.plots import Plot
 
 @pytest.fixture
 def plot(qtbot: QtBot) -> Plot:
-    plot = Plot("Some plot", "Time (s)", "Distance (mm)")
+    plot = Plot("some-plot", "Some plot", "Time (s)", "Distance (mm)")
     qtbot.addWidget(plot)
     plot.resize(300, 200)
     return plot

@@ -16,7 +16,7 @@ def rows_of(*numbers: int) -> dict[int, tuple[str, ...]]:
 
 @pytest.fixture
 def table(qtbot: QtBot) -> RecordTable:
-    table = RecordTable("Things", COLUMNS, "Things appear here")
+    table = RecordTable("things", "Things", COLUMNS, "Things appear here")
     qtbot.addWidget(table)
     table.show()
     return table
@@ -86,7 +86,7 @@ def test_columns_that_do_not_fit_are_in_the_tooltip_of_the_row(qtbot: QtBot) -> 
         RecordColumn("Size mm", "Its size", rank=2),
         RecordColumn("Name", "Its name", is_number=False, rank=1),
     )
-    table = RecordTable("Things", columns, "Things appear here")
+    table = RecordTable("things", "Things", columns, "Things appear here")
     qtbot.addWidget(table)
     table.show()
     table.show_rows({7: ("7", "1.25", "a name of some length")})

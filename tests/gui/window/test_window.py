@@ -9,7 +9,7 @@ from typing import Literal
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QScrollArea
+from PySide6.QtWidgets import QApplication, QScrollArea, QTabBar, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
@@ -167,6 +167,36 @@ def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: M
     for name in ("wearer_view", "trials", "session"):
         window.docks[name].hide()
     qtbot.waitUntil(lambda: has_title(window, "results"))
+
+
+@pytest.mark.parametrize("size_px", [(960, 510), (1280, 690), (1920, 1050)])
+def test_every_tab_is_in_sight_and_says_what_it_is(
+    qtbot: QtBot, window: MainWindow, size_px: tuple[int, int]
+) -> None:
+    window.resize(*size_px)
+    window.show_page("live")
+    window.reset_layout()
+    is_small = size_px == (960, 510)
+    group = set(window.docks) if is_small else set(TABBED)
+
+    def tabs() -> QTabBar:
+        bars = [one for one in window.findChildren(QTabBar) if one.isVisible()]
+        return max(bars, key=QTabBar.count)
+
+    def are_in_sight() -> bool:
+        bar = tabs()
+        return all(bar.rect().contains(bar.tabRect(i)) for i in range(bar.count()))
+
+    qtbot.waitUntil(are_in_sight)
+    bar = tabs()
+    assert {bar.tabText(i) for i in range(bar.count())} == {
+        window.docks[name].windowTitle() for name in group
+    }
+    for i in range(bar.count()):
+        assert bar.tabIcon(i).isNull() != is_small
+        assert bar.tabToolTip(i) == bar.tabText(i)
+    assert not any(arrow.isVisible() for arrow in bar.findChildren(QToolButton))
+    assert all(has_title(window, name) == is_small for name in group)
 
 
 def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:

@@ -1,4 +1,5 @@
 using System;
+using System.Text;
 using Handcal.Link;
 using UnityEngine;
 using Cursor = Handcal.Link.Cursor;
@@ -14,10 +15,12 @@ namespace Handcal
         static readonly int[] Quadrilateral = { 0, 1, 1, 2, 2, 3, 3, 0 };
         static readonly int[] Cube = { 0, 1, 1, 2, 2, 3, 3, 0, 4, 5, 5, 6, 6, 7, 7, 4, 0, 4, 1, 5, 2, 6, 3, 7 };
         static readonly Color Blue = new Color(0.2f, 0.5f, 1), Red = new Color(1, 0.15f, 0.1f);
-        const float DotPx = 3, LinePx = 2, TextDistanceM = 2;
+        const float DotPx = 3, LinePx = 2, TextDistanceM = 2, LineHeight = 0.02f;  // 1.1 degrees
+        const int LineCharacters = 32;  // some 18 degrees, less than the narrowest display
 
         readonly Strokes cursor, live, shape, target;
         readonly TextMesh text;
+        string shownLine = "";
         Cursor shownCursor;
         LiveHand shownLive;
         Shape shownShape;
@@ -32,17 +35,20 @@ namespace Handcal
             target = new Strokes("target", head, Color.white, LinePx, true);
             var holder = new GameObject("handcal text");
             holder.transform.SetParent(head, false);
-            holder.transform.localPosition = new Vector3(0, -0.12f * TextDistanceM, TextDistanceM);
+            holder.transform.localPosition = new Vector3(0, -7 * LineHeight * TextDistanceM, TextDistanceM);
             text = holder.AddComponent<TextMesh>();
-            text.anchor = TextAnchor.UpperCenter;
+            text.anchor = TextAnchor.LowerCenter;
             text.alignment = TextAlignment.Center;
             text.fontSize = 64;
-            text.characterSize = 0.006f * TextDistanceM;
+            text.characterSize = 10 * LineHeight * TextDistanceM / text.fontSize;
         }
+
+        /// <summary>Draws in the space of this parent, in which the camera moves.</summary>
+        public Transform Parent { set { cursor.Parent = live.Parent = shape.Parent = value; } }
 
         public void Show(HeadsetState state, string line)
         {
-            if (text.text != line) text.text = line;
+            if (shownLine != line) text.text = Wrapped(shownLine = line);
             ShowCursor(state.Cursor);
             ShowLive(state.Live);
             if (shownShape != state.Shape) ShowShape(state.Shape);
@@ -65,6 +71,24 @@ namespace Handcal
             shape.Dispose();
             target.Dispose();
             UnityEngine.Object.Destroy(text.gameObject);
+        }
+
+        /// <summary>Breaks lines between words; Unity's TextMesh does not.</summary>
+        static string Wrapped(string line)
+        {
+            var wrapped = new StringBuilder();
+            foreach (string paragraph in line.Split('\n'))
+            {
+                int width = 0;
+                foreach (string word in paragraph.Split(' '))
+                {
+                    bool fits = width == 0 || width + 1 + word.Length <= LineCharacters;
+                    if (wrapped.Length > 0) wrapped.Append(width > 0 && fits ? ' ' : '\n');
+                    wrapped.Append(word);
+                    width = fits && width > 0 ? width + 1 + word.Length : word.Length;
+                }
+            }
+            return wrapped.ToString();
         }
 
         void ShowCursor(Cursor shown)

@@ -28,8 +28,7 @@ namespace Handcal
 
         public void Apply(HeadsetState state)
         {
-            Transform head = camera.transform;
-            Matrix4x4 headFromWorld = Matrix4x4.TRS(head.position, head.rotation, Vector3.one).inverse;
+            Matrix4x4 headFromWorld = WorldFromHead().inverse;
             if (!camera.stereoEnabled)
             {
                 if (state.Left == null) return;
@@ -61,7 +60,9 @@ namespace Handcal
         /// </summary>
         public void SetFocusPlane(float distanceM)
         {
-            Transform head = camera.transform;
+            Matrix4x4 worldFromHead = WorldFromHead();
+            Vector3 head = worldFromHead.MultiplyPoint3x4(Vector3.zero);
+            Vector3 point = worldFromHead.MultiplyPoint3x4(new Vector3(0, 0, distanceM));
 #if UNITY_2020_2_OR_NEWER
             SubsystemManager.GetSubsystems(displays);
 #else
@@ -69,7 +70,18 @@ namespace Handcal
 #endif
             foreach (XRDisplaySubsystem display in displays)
                 if (display.running)
-                    display.SetFocusPlane(head.position + distanceM * head.forward, -head.forward, Vector3.zero);
+                    display.SetFocusPlane(point, Vector3.Normalize(head - point), Vector3.zero);
+        }
+
+        /// <summary>
+        /// From the head's metres to the world: the pose that is sent, in the space of the camera's
+        /// parent, which may be moved, turned and scaled.
+        /// </summary>
+        Matrix4x4 WorldFromHead()
+        {
+            Transform head = camera.transform;
+            Matrix4x4 parentFromHead = Matrix4x4.TRS(head.localPosition, head.localRotation, Vector3.one);
+            return head.parent == null ? parentFromHead : head.parent.localToWorldMatrix * parentFromHead;
         }
 
         void Set(Camera.StereoscopicEye eye, Projection one, bool isOffline, Matrix4x4 headFromWorld)

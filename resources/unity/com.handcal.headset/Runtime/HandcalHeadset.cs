@@ -18,7 +18,8 @@ namespace Handcal
     [AddComponentMenu("handcal/handcal headset")]
     public sealed class HandcalHeadset : MonoBehaviour
     {
-        [Tooltip("The text under the PC's QR code (handcal pair). Empty: connect as paired before, or call Pair.")]
+        [Tooltip("The text under the PC's QR code (handcal pair), or its address and 8 digits, as "
+            + "192.168.1.20 12345678. Used once; afterwards the app connects as paired, until you enter another text.")]
         public string invitation = "";
 
         [Tooltip("Name by which the PC calls this headset. Empty: the device's own.")]
@@ -48,7 +49,10 @@ namespace Handcal
         /// </summary>
         public Func<long> PoseTimeNs;
 
+        const string HowToPair = "On the PC, run handcal pair. Then scan its QR code, or type its address "
+            + "and the 8 digits, as 192.168.1.20 12345678";
         const double PairPatienceS = 5;
+        const float GreetingS = 3;
         readonly ConcurrentQueue<Action> agreed = new ConcurrentQueue<Action>();  // from another thread
         HeadsetLink link;
         PairingFile pairing;
@@ -59,7 +63,10 @@ namespace Handcal
         RuntimeViews views;
         NudgeSum moved;
         uint movedId;
-        string warning = "";
+        string pairingProblem = "", warning = "";
+        int pairings;  // that go on
+        float connectedS = float.NegativeInfinity;
+        bool wasConnected;
 
         /// <summary>The state that is drawn.</summary>
         public HeadsetState State { get { return drawn; } }
@@ -69,20 +76,33 @@ namespace Handcal
 
         public bool IsPaired { get { return pairing != null && pairing.IsPaired; } }
 
+        /// <summary>True while digits are agreed on with the PC.</summary>
+        public bool IsPairing { get { return pairings > 0; } }
+
+        /// <summary>The reason why the last pairing failed; empty if it did not.</summary>
+        public string PairingProblem { get { return pairingProblem; } }
+
         public bool IsConnected { get { return link != null && link.IsConnected; } }
 
         /// <summary>The fault that keeps the calibration from being drawn as it should; empty if there is none.</summary>
         public string Warning { get { return warning; } }
 
-        /// <summary>The prompt, or without a connection its state and whose calibration is shown.</summary>
+        /// <summary>
+        /// The prompt; a setting of the project that makes calibrations worthless; or without a
+        /// connection its state, and whose calibration is shown.
+        /// </summary>
         public string Text
         {
             get
             {
-                if (IsConnected) return drawn.Prompt;
+                if (views != null && views.ProjectFault.Length > 0) return views.ProjectFault;
+                bool isNew = Time.realtimeSinceStartup < connectedS + GreetingS;
+                if (IsConnected) return drawn.Prompt.Length == 0 && isNew ? "Connected to the PC" : drawn.Prompt;
                 string whose = drawn.Left == null && drawn.Right == null
                     ? "" : "\nShowing the calibration of " + drawn.Wearer + ", rig " + drawn.Rig;
-                if (!pairing.IsPaired) return "Scan the QR code that handcal shows on the PC, or type its address and digits" + whose;
+                if (IsPairing) return "Pairing…";
+                if (pairingProblem.Length > 0) return pairingProblem + whose;
+                if (!IsPaired) return HowToPair + whose;
                 return (link != null && link.Problem.Length > 0 ? link.Problem : "Waiting for the PC") + whose;
             }
         }
@@ -107,32 +127,42 @@ namespace Handcal
 
         /// <summary>
         /// Pairs with the PC by the text of its QR code, scanned or typed; or by its address and the
-        /// 8 digits that it shows, "192.168.1.20:47800 12345678". False if the text is neither.
+        /// 8 digits that it shows, "192.168.1.20 12345678". False if the text is neither, or the
+        /// component is disabled. Digits take a moment: see IsPairing and PairingProblem.
         /// </summary>
         public bool Pair(string text)
         {
+            if (drawing == null) return false;
             if (Invitation.TryRead(text, out Invitation one))
             {
-                pairing.Store(one.Host, one.Port, one.Key);
-                Connect();
+                Paired(one.Host, one.Port, one.Key);
                 return true;
             }
-            string[] parts = (text ?? "").Trim().Split(new[] { ' ' }, 2);
-            if (parts.Length < 2 || !Invitation.TrySplit(parts[0], out string host, out int port)) return false;
+            if (!Invitation.TrySplitTyped(text, out string host, out int port, out string digits))
+            {
+                FailPairing("\"" + text + "\" is not understood. " + HowToPair);
+                return false;
+            }
             ulong device = pairing.DeviceId;
             string name = Introduction().Name;
+            pairings++;
             Task.Run(() =>
             {
-                byte[] key = Digits.Pair(host, port, parts[1], device, name, PairPatienceS, out string problem);
+                byte[] key = null;
+                string problem;
+                try
+                {
+                    key = Digits.Pair(host, port, digits, device, name, PairPatienceS, out problem);
+                }
+                catch (Exception error)  // of a name that is none
+                {
+                    problem = "The PC at " + host + " cannot be reached: " + error.Message;
+                }
                 agreed.Enqueue(() =>
                 {
-                    if (key == null)
-                    {
-                        Warn(problem);
-                        return;
-                    }
-                    pairing.Store(host, port, key);
-                    Connect();
+                    pairings--;
+                    if (key == null) FailPairing(problem);
+                    else Paired(host, port, key);
                 });
             });
             return true;
@@ -173,9 +203,9 @@ namespace Handcal
             presses = new Presses(confirmWord, ConfirmAt);
             views = new RuntimeViews(eyes);
             Application.onBeforeRender += SendPose;
-            if (invitation.Length > 0 && !Pair(invitation))
-                Warn("The invitation is not from handcal: copy the whole text under the QR code.");
-            else if (link == null) Connect();
+            if (pairing.Problem.Length > 0) Warn(pairing.Problem);
+            Connect();
+            if (invitation.Length > 0 && invitation != pairing.UsedInvitation) Pair(invitation);
         }
 
         void OnDisable()
@@ -184,12 +214,23 @@ namespace Handcal
             Disconnect();
             presses.Dispose();
             drawing.Dispose();
+            drawing = null;
             cameras.Reset();
+        }
+
+        void OnTransformParentChanged()
+        {
+            if (drawing != null) drawing.Parent = transform.parent;
         }
 
         void Update()
         {
             while (agreed.TryDequeue(out Action connect)) connect();
+            views.CheckProject();
+            if (views.ProjectFault.Length > 0 && warning != views.ProjectFault) Warn(views.ProjectFault);
+            if (views.Movement.Length > 0 && warning.Length == 0) Warn(views.Movement);
+            if (IsConnected && !wasConnected) connectedS = Time.realtimeSinceStartup;
+            wasConnected = IsConnected;
             if (link == null)
             {
                 drawing.Show(drawn, showsText ? Text : "");
@@ -203,9 +244,8 @@ namespace Handcal
             }
             drawn = link.State();
             byte[] kept = link.TakeKept();
-            if (kept != null) pairing.StoreKept(kept);
+            if (kept != null && !pairing.StoreKept(kept)) Warn(pairing.Problem);
             if (views.HasChanged()) link.SetDevice(Introduction());
-            if (views.Problem.Length > 0 && views.Problem != warning) Warn(views.Problem);
             drawing.Show(drawn, showsText ? Text : "");
         }
 
@@ -252,12 +292,24 @@ namespace Handcal
         void Connect()
         {
             Disconnect();
-            Kept kept = pairing.ReadKept();
-            if (pairing.Problem.Length > 0) Warn(pairing.Problem);
+            if (!pairing.TryReadKept(out Kept kept)) Warn(pairing.Problem);
             if (!pairing.IsPaired && kept.Count == 0) return;
             // Without a pairing nobody is called, but the kept calibration is drawn.
             link = new HeadsetLink(
                 pairing.Host, pairing.Port, pairing.Key, pairing.DeviceId, Introduction(), kept, NowNs);
+        }
+
+        void Paired(string host, int port, byte[] key)
+        {
+            pairingProblem = "";
+            if (!pairing.Store(host, port, key, invitation)) Warn(pairing.Problem);
+            Connect();
+        }
+
+        void FailPairing(string problem)
+        {
+            pairingProblem = problem;
+            Debug.LogWarning("handcal: " + problem, this);
         }
 
         Device Introduction()

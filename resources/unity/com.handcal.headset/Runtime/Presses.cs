@@ -27,11 +27,18 @@ namespace Handcal
         {
 #if UNITY_WSA || UNITY_STANDALONE_WIN || UNITY_EDITOR_WIN
             if (word.Length == 0 || !PhraseRecognitionSystem.isSupported) return;
-            recognizer = new KeywordRecognizer(new[] { word });
-            // The hand keeps still while the word is said, and may have moved since.
-            recognizer.OnPhraseRecognized += said =>
-                confirmAt(HandcalHeadset.NowNs() - 100 * AgeTicks(said.phraseStartTime));
-            recognizer.Start();
+            try
+            {
+                recognizer = new KeywordRecognizer(new[] { word });
+                // The hand keeps still while the word is said, and may have moved since.
+                recognizer.OnPhraseRecognized += said =>
+                    confirmAt(HandcalHeadset.NowNs() - 100 * AgeTicks(said.phraseStartTime));
+                recognizer.Start();
+            }
+            catch (UnityException error)  // speech is off in Windows' privacy settings, or no microphone
+            {
+                Debug.LogWarning("handcal: the spoken word does not confirm: " + error.Message);
+            }
 #endif
         }
 

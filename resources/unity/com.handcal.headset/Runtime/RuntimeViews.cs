@@ -24,20 +24,28 @@ namespace Handcal
             this.camera = camera;
         }
 
-        /// <summary>The fault that keeps the calibration from being drawn as it should; empty if there is none.</summary>
-        public string Problem { get; private set; } = "";
+        /// <summary>The setting of the project that keeps calibrations from being drawn; empty if there is none.</summary>
+        public string ProjectFault { get; private set; } = "";
+
+        /// <summary>Says that the runtime moves its view; empty if it does not.</summary>
+        public string Movement { get; private set; } = "";
+
+        /// <summary>Checks the project. Scriptable pipelines call neither OnPreCull nor OnPreRender: do it in Update.</summary>
+        public void CheckProject()
+        {
+            if (camera.stereoEnabled && XRSettings.stereoRenderingMode != XRSettings.StereoRenderingMode.MultiPass)
+                ProjectFault = "The project renders in a single pass, which ignores calibrated projections: "
+                    + "set XR Plug-in Management > Render Mode to Multi Pass.";
+            if (UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline != null)
+                ProjectFault = "The project uses a scriptable render pipeline, which ignores calibrated projections: "
+                    + "clear Project Settings > Graphics and the pipelines of Quality.";
+        }
 
         /// <summary>Reads the runtime's views; call before they are overridden.</summary>
         public void Read()
         {
             if (!camera.stereoEnabled || Time.realtimeSinceStartup < nextS) return;
             nextS = Time.realtimeSinceStartup + PeriodS;
-            if (XRSettings.stereoRenderingMode != XRSettings.StereoRenderingMode.MultiPass)
-                Problem = "The project renders in a single pass, which ignores calibrated projections: "
-                    + "set XR Plug-in Management > Render Mode to Multi Pass.";
-            else if (UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline != null)
-                Problem = "The project uses a scriptable render pipeline, which ignores calibrated projections: "
-                    + "use the built-in one.";
             var found = new List<View>();
             AddView(found, Eyes.Left, Camera.StereoscopicEye.Left, CommonUsages.leftEyePosition, CommonUsages.leftEyeRotation);
             AddView(found, Eyes.Right, Camera.StereoscopicEye.Right, CommonUsages.rightEyePosition, CommonUsages.rightEyeRotation);
@@ -45,8 +53,8 @@ namespace Handcal
             if (found.Count < 2) return;
             first = first ?? found;
             double movedM = Moved(first, found);
-            if (movedM > WarnedMoveM && Problem.Length == 0)
-                Problem = "The runtime has moved its view by " + (1000 * movedM).ToString("0.0")
+            if (movedM > WarnedMoveM && Movement.Length == 0)
+                Movement = "The runtime has moved its view by " + (1000 * movedM).ToString("0.0")
                     + " mm since the start. handcal draws with the rig's view; switch the runtime's own "
                     + "calibration off if you can.";
         }
@@ -62,12 +70,19 @@ namespace Handcal
             reported = views;
             return new Device
             {
-                Name = name.Length > 0 ? name : SystemInfo.deviceName,
+                Name = name.Length > 0 ? name : DeviceName(),
                 Runtime = XRSettings.loadedDeviceName + " " + SystemInfo.operatingSystem,
                 App = Application.productName + " " + Application.version,
                 Views = views,
                 EyeDistanceM = eyeDistanceM,
             };
+        }
+
+        /// <summary>The device's own name, or on Android, which may not tell it, its model.</summary>
+        static string DeviceName()
+        {
+            string name = SystemInfo.deviceName;
+            return name.Length == 0 || name == "<unknown>" || name == "n/a" ? SystemInfo.deviceModel : name;
         }
 
         void AddView(

@@ -16,6 +16,7 @@ namespace Handcal
         readonly Mesh mesh;
         readonly Material material;
         Vector3[] ends = new Vector3[0], others = new Vector3[0];
+        int[] indices = new int[0];
         int count;
 
         public Strokes(string name, Transform parent, Color color, float widthPx, bool isInView)
@@ -46,12 +47,14 @@ namespace Handcal
             material.SetFloat("_IsHidden", (Eyes & eye) == 0 ? 1 : 0);
         }
 
+        /// <summary>Draws in the space of this parent.</summary>
+        public Transform Parent { set { holder.transform.SetParent(value, false); } }
+
         public void Begin(int strokes)
         {
-            bool isOther = strokes != count;
+            if (ends.Length < 4 * strokes) Grow(Math.Max(4 * strokes, 2 * ends.Length));
+            if (strokes != count) mesh.SetIndices(indices, 0, 6 * strokes, MeshTopology.Triangles, 0, false);
             count = strokes;
-            if (ends.Length < 4 * strokes) Grow(4 * strokes);
-            if (isOther) mesh.SetIndices(Indices(strokes), MeshTopology.Triangles, 0, false);
         }
 
         public void Set(int stroke, Vector3 from, Vector3 to)
@@ -78,6 +81,7 @@ namespace Handcal
         {
             Array.Resize(ref ends, vertices);
             Array.Resize(ref others, vertices);
+            indices = Indices(vertices / 4);
             var corners = new Vector2[vertices];
             for (int i = 0; i < vertices; i++) corners[i] = new Vector2(i % 4 < 2 ? -1 : 1, i % 2 == 0 ? -1 : 1);
             mesh.Clear();

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from handcal.rig.example import example_rig
+from handcal.session.library import EyeOutcome
 from handcal.session.session import Session
 from handcal.types import Alignment
 from handcal_gui.pages.start.session_entries import find_sessions
@@ -66,3 +67,18 @@ def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(
     assert recent[0].text.startswith("Without a name · ")
     assert recent[0].text.endswith(" · 1 alignment")
     assert "journal.jsonl" in recent[1].text
+
+
+def test_a_recent_session_shows_its_results_unless_they_are_damaged(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    path = make(tmp_path, "Ada", [alignment], is_done=False)
+    left = {"verdict": "accept", "benefit": {"without_arcmin": 20.0, "after_arcmin": 3.0}}
+    with Session(path) as session:
+        session.save_results({"version": 2, "eyes": {"left": left, "right": "damaged"}})
+    (entry,) = find_sessions(tmp_path, [path]).recent
+    assert entry.eyes == {"left": EyeOutcome("accept", 20.0, 3.0, None)}
+    with Session(path) as session:
+        session.save_results({"version": 2, "eyes": ["damaged"]})
+    (entry,) = find_sessions(tmp_path, [path]).recent
+    assert entry.eyes == {}

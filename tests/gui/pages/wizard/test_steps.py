@@ -1,33 +1,24 @@
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
-from handcal.errors import FileError
-from handcal.link.nudges import NudgeSum
 from handcal.register.verdict import Advice
 from handcal.session.session import SessionRecord
 from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
-from handcal.station.verifying import VerifyingView
-from handcal.types import EYES, Alignment, Eye, EyePlan, Verdict, VerdictName, Verification
+from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
 from handcal_gui.pages.wizard.steps import Wizard, is_complete, next_eyes
-from handcal_gui.pages.wizard.view import STEPS, Action, Step, WizardView
-
-Maker = Callable[..., Snapshot]
-VERIFIED = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0))
+from handcal_gui.pages.wizard.view import STEPS, Action, Step
+from tests.gui.views import VERIFIED, Maker, actions, judged
 
 
 def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
     while wizard.step(snapshot) is not step:
         wizard.move(Action.NEXT, snapshot)
-
-
-def actions(view: WizardView) -> list[Action]:
-    return [offer.action for offer in view.others]
 
 
 def aligned(record: SessionRecord, alignment: Alignment, *eyes: tuple[Eye, ...]) -> SessionRecord:
@@ -103,28 +94,6 @@ def test_the_whole_way_of_one_eye_after_the_other(
     ]
 
 
-@pytest.mark.parametrize(
-    ("changes", "complaint"),
-    [
-        ({"camera": {"problem": "no camera is connected; plug one in"}}, "No image"),
-        ({"link": {"connected": False}, "link_problem": "no headset is connected"}, "No headset"),
-        ({"link": {"pose_rate_hz": 0.0}}, "No pose"),
-    ],
-)
-def test_connect_waits_for_camera_headset_and_poses(
-    snapshot: Maker, changes: dict[str, Any], complaint: str
-) -> None:
-    view = Wizard().view(snapshot(State.SHOW_HAND, **changes))
-    assert not view.main.is_enabled
-    assert [check for check in view.checks if complaint in check.text and not check.holds]
-
-
-def test_a_camera_against_which_there_is_evidence_is_not_ticked(snapshot: Maker) -> None:
-    seen = replace(snapshot(State.SHOW_HAND), contradiction="the camera is not the rig's")
-    camera = Wizard().view(seen).checks[0]
-    assert (camera.text, camera.holds) == ("The camera is not the rig's", False)
-
-
 def test_a_hand_is_needed_and_the_engine_s_reason_is_given(start: Snapshot) -> None:
     wizard = Wizard()
     reach(wizard, start, Step.SHOW_HAND)
@@ -147,85 +116,6 @@ def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
     restless = replace(start, observation=replace(start.observation, is_steady=False))
     assert not wizard.view(restless).main.is_enabled
     assert wizard.view(start).main.is_enabled
-
-
-def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) -> None:
-    refusal = "Your hand is turned by 14.0°, more than 9°."
-    seen = {"is_over_limit": True}
-    view = Wizard().view(
-        snapshot(procedure={"eyes": ("left",), "refusal": refusal}, observation=seen)
-    )
-    assert view.sentence.startswith("Close the right eye.")
-    assert view.note == refusal
-    assert not view.checks[1].holds
-    assert Wizard().view(snapshot()).checks[1].holds
-
-
-def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot: Maker) -> None:
-    now = snapshot()
-    assert not Wizard().view(now).main.is_enabled
-    later = replace(now, t_host_ns=now.t_host_ns + 2_000_000_000)
-    assert Wizard().view(later).main.is_enabled
-
-
-def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> None:
-    view = Wizard().view(snapshot(State.SOLVED, problem="the disk is full; free some space"))
-    assert [check.text.split(":")[0] for check in view.checks[1:]] == ["Left eye", "Right eye"]
-    assert view.note == "the disk is full; free some space"
-    assert actions(view) == [Action.REDO]
-    assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
-
-
-def judged(
-    snapshot: Maker, left: VerdictName, right: VerdictName, state: State, **changes: Any
-) -> Snapshot:
-    """Return a snapshot with these verdicts, of eyes that were verified."""
-    seen = snapshot(state, procedure={"verifications": dict.fromkeys(EYES, VERIFIED)}, **changes)
-    assert seen.procedure.results is not None
-    verdicts: dict[Eye, Verdict] = {
-        "left": Verdict(left, "as told"),
-        "right": Verdict(right, "as told"),
-    }
-    results = replace(seen.procedure.results, verdicts=verdicts)
-    return replace(seen, procedure=replace(seen.procedure, results=results))
-
-
-def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
-    for name in get_args(VerdictName):
-        checks = Wizard().view(judged(snapshot, name, "accept", State.SOLVED)).checks
-        assert [(c.verdict, c.holds) for c in checks[1:]] == [
-            (name, name == "accept"),
-            ("accept", True),
-        ]
-
-
-@pytest.mark.parametrize("name", ["implausible", "contradicted"])
-def test_no_key_sends_a_result_that_must_not_be_used(snapshot: Maker, name: VerdictName) -> None:
-    view = Wizard().view(judged(snapshot, "accept", name, State.SOLVED))
-    assert view.sentence.startswith("Do not use this result.")
-    assert not view.main.is_enabled
-    assert actions(view) == [Action.REDO, Action.APPLY]
-    assert all(offer.discards for offer in view.others)
-
-
-@pytest.mark.parametrize(
-    ("left", "right", "sentence", "label"),
-    [
-        ("keep", "keep", "Keep the offline calibration of both eyes.", "Keep offline"),
-        (
-            "keep",
-            "accept",
-            "Send the projections to the headset, those of the left eye offline.",
-            "Send to the headset",
-        ),
-    ],
-)
-def test_solve_says_which_offline_calibration_is_kept(
-    snapshot: Maker, left: VerdictName, right: VerdictName, sentence: str, label: str
-) -> None:
-    view = Wizard().view(judged(snapshot, left, right, State.SOLVED))
-    assert (view.sentence, view.main.label) == (sentence, label)
-    assert view.main.is_enabled
 
 
 def test_verify_points_at_the_advice_while_an_eye_is_not_accepted(snapshot: Maker) -> None:
@@ -343,39 +233,11 @@ def test_a_restless_hand_is_not_verified(snapshot: Maker) -> None:
     assert not wizard.view(restless).main.is_enabled
 
 
-def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> None:
-    triple = (0.0, 0.0, 0.0)
-    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, 0.006), triple, triple, True, False)
-    seen = snapshot(
-        State.VERIFY, procedure={"verifying": moved, "refusal": "Hold your hand still."}
-    )
-    view = Wizard().view(seen)
-    assert view.step is Step.VERIFY
-    assert view.sentence.startswith("Close the right eye.")
-    assert view.fact == "Left eye moved by 5.0′: 3.0′ left, 4.0′ down, size +0.6 %"
-    assert view.note == "Hold your hand still."
-    assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
-    assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]
-
-
 def test_what_a_verification_leads_to_is_sent_at_the_same_step(snapshot: Maker) -> None:
     verified = {"verifications": {"left": VERIFIED}}
     view = Wizard().view(snapshot(State.APPLYING, procedure=verified))
     assert view.step is Step.VERIFY
     assert not view.main.is_enabled
-
-
-def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
-    repeat = judged(snapshot, "repeat", "accept", State.APPLIED)
-    wizard.view(accepted)
-    wizard.move(Action.NEXT, accepted)
-    assert not wizard.view(accepted).unearned
-    view = wizard.view(repeat)
-    assert view.unearned == {Step.VERIFY}
-    assert [check.holds for check in view.checks[1:]] == [False, True]
 
 
 def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> None:
@@ -461,16 +323,6 @@ def test_a_plan_of_one_eye_is_complete_with_it(
     one = aligned(record, alignments[0], ("left",))
     applied = judged(snapshot, "accept", "accept", State.APPLIED, record=one)
     assert wizard.view(applied).main.label == "Finish"
-
-
-def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
-    wizard = Wizard()
-    wizard.view(snapshot(State.SOLVED))
-    full = snapshot(State.APPLIED, problem=str(FileError("the disk is full")))
-    wizard.move(Action.NEXT, full)
-    view = wizard.view(full)
-    assert not view.checks[0].holds
-    assert view.note == "the disk is full"
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,13 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QAction, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QApplication,
     QComboBox,
     QDoubleSpinBox,
     QLabel,
     QRadioButton,
+    QScrollArea,
     QSlider,
     QWidget,
 )
@@ -437,3 +439,17 @@ def test_every_field_has_a_name_and_an_explanation(panel: FineTunePanel) -> None
         "Left eye",
         "Right eye",
     }
+
+
+def test_a_low_panel_needs_no_scrolling(panel: FineTunePanel, show: Show) -> None:
+    panel.resize(384, 304)
+    show()
+    QApplication.processEvents()
+    [area] = panel.findChildren(QScrollArea)
+    assert area.horizontalScrollBar().maximum() == 0
+    kinds = QAbstractButton, QDoubleSpinBox, QSlider, QComboBox
+    for control in panel.findChildren(QWidget):
+        if isinstance(control, kinds) and control.isVisible():
+            assert control.visibleRegion().boundingRect() == control.rect(), (
+                control.accessibleName()
+            )

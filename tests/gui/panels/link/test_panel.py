@@ -6,7 +6,14 @@ from typing import Any
 import pyqtgraph as pg
 import pytest
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.link.wire import Rejection
@@ -159,3 +166,15 @@ def test_another_link_starts_again(panel: LinkPanel, snapshot: Maker) -> None:
     panel.show_pairing("127.0.0.1:50123", KEY)
     panel.show_snapshot(later(snapshot, 0.1, sent=10, bytes_sent=100))
     assert text(panel, "data-1") == "–"
+
+
+def test_a_low_panel_shows_every_control_and_number_without_scrolling(
+    panel: LinkPanel, snapshot: Maker
+) -> None:
+    panel.resize(384, 300)
+    panel.show_pairing("192.168.100.200:55555", "key", is_virtual=True)
+    panel.show_snapshot(snapshot())
+    QApplication.processEvents()
+    for control in panel.findChildren(QWidget):
+        if isinstance(control, QAbstractButton | NumberLabel) and control.isVisible():
+            assert control.visibleRegion().boundingRect() == control.rect(), control.objectName()

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QComboBox, QPushButton, QToolButton, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QPushButton,
+    QTabWidget,
+    QToolButton,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
@@ -21,7 +29,7 @@ from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
-from tests.gui.helpers import button, show, text
+from tests.gui.helpers import button, child, show, text
 
 
 @pytest.fixture
@@ -286,3 +294,17 @@ def test_a_blinded_comparison_is_asked_for_step_by_step(
         button(panel, QPushButton, "Cancel").click()
     panel.show_snapshot(applied)
     assert begin.isVisible()
+
+
+def test_the_legend_of_a_low_plot_is_above_it_and_whole(
+    panel: TrialsPanel, tried: SessionRecord
+) -> None:
+    panel.resize(384, 300)
+    panel.show_record(tried)
+    child(panel, QTabWidget).setCurrentIndex(2)
+    QApplication.processEvents()
+    plot = child(panel, TrialPlot).item
+    legend = plot.legend.mapRectToScene(plot.legend.boundingRect())
+    assert [label.text for _, label in plot.legend.items] == ["Median", "Left eye", "Right eye"]
+    assert plot.scene().sceneRect().contains(legend)
+    assert not legend.intersects(plot.vb.mapRectToScene(plot.vb.boundingRect()))

@@ -200,10 +200,10 @@ namespace Handcal.Link
                     if (IsHarmless(error)) Thread.Sleep(IdleWaitUs / 1000);
                     else Lose(error);
                 }
-                catch (Exception error)
+                // Of a name that is none, or a socket that the system took away while suspended.
+                catch (Exception error) when (!(error is ThreadAbortException))
                 {
-                    lock (gate) problem = "The link has stopped: " + error.Message;
-                    isClosing = true;
+                    Lose(error);
                 }
             }
             socket?.Close();
@@ -232,7 +232,7 @@ namespace Handcal.Link
         }
 
         /// <summary>Closes the socket, as after a suspension or without a network, and waits.</summary>
-        void Lose(SocketException error)
+        void Lose(Exception error)
         {
             lock (gate)
             {

@@ -10,7 +10,7 @@ namespace Handcal.Link
     public sealed class Invitation
     {
         const string Scheme = "HANDCAL://";
-        const int CodeCharacters = 26;
+        const int CodeCharacters = 26, DefaultPort = 47800;
         public readonly string Host;
         public readonly int Port;
         public readonly byte[] Key;
@@ -53,7 +53,25 @@ namespace Handcal.Link
             return host.Length > 0
                 && int.TryParse(address.Substring(colon + 1), System.Globalization.NumberStyles.None,
                     System.Globalization.CultureInfo.InvariantCulture, out port)
-                && port > 0 && port < 65536;
+                && IsPort(port);
+        }
+
+        /// <summary>
+        /// Splits what is typed to pair by digits, "192.168.1.20 12345678", also with a port;
+        /// false if there is no address or nothing behind it.
+        /// </summary>
+        public static bool TrySplitTyped(string text, out string host, out int port, out string digits)
+        {
+            string[] parts = (text ?? "").Trim().Split(new[] { ' ' }, 2);
+            string address = parts[0];
+            if (address.IndexOf(':') < 0 || address.EndsWith("]", StringComparison.Ordinal)) address += ":" + DefaultPort;
+            digits = parts.Length < 2 ? "" : parts[1];
+            return TrySplit(address, out host, out port) && digits.Length > 0;
+        }
+
+        public static bool IsPort(int number)
+        {
+            return number > 0 && number < 65536;
         }
     }
 }

@@ -1,0 +1,219 @@
+"""Views of the wizard's steps that the snapshot alone decides; without Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from handcal.station.procedure import State
+from handcal.station.snapshot import Snapshot
+from handcal.station.verifying import VerifyingView
+from handcal.types import Eye, VerdictName
+from handcal_gui.pages.wizard.checks import (
+    hand_check,
+    is_placed,
+    is_steady,
+    still_check,
+    verdict_checks,
+)
+from handcal_gui.pages.wizard.view import (
+    EYE_WORDS,
+    Action,
+    ButtonSpec,
+    Precondition,
+    Step,
+    WizardView,
+)
+from handcal_gui.translation import tr
+from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.sentence import sentence
+
+SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
+"""Waiting times of steps that run by themselves: for the hand, and to read a text or an advice."""
+UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
+_LEAST_ALIGN_NS = 1_500_000_000
+_SENDS_UNUSABLE = tr("Draws with a result that should not be used")
+
+
+def connect_view(snapshot: Snapshot) -> WizardView:
+    """Return the view while camera and headset are connected."""
+    camera, link = snapshot.camera, snapshot.link
+    checks = (
+        Precondition(
+            tr("No image from the camera")
+            if camera.problem
+            else tr("Camera: {}").format(camera.name),
+            not camera.problem and camera.rate_hz > 0,
+        ),
+        Precondition(sentence(snapshot.link_problem) or tr("Headset connected"), link.connected),
+        Precondition(
+            tr("Headset pose: {:.0f} Hz").format(link.pose_rate_hz)
+            if link.pose_rate_hz
+            else tr("No pose from the headset yet"),
+            link.pose_rate_hz > 0,
+        ),
+    )
+    is_ready = all(check.holds for check in checks)
+    if snapshot.contradiction and not camera.problem:
+        checks = (Precondition(sentence(snapshot.contradiction), False), *checks[1:])
+    return WizardView(
+        Step.CONNECT,
+        tr("Put the headset on the wearer and wait until camera and headset are connected."),
+        checks,
+        ButtonSpec(Action.NEXT, tr("Begin"), is_ready),
+    )
+
+
+def align_view(snapshot: Snapshot) -> WizardView:
+    """Return the view while the wearer overlays the cursor."""
+    procedure, seen = snapshot.procedure, snapshot.observation
+    hand = hand_check(snapshot)
+    is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
+    limit_deg = round(float(np.degrees(procedure.guard_limit_rad)), 1)
+    cursor = procedure.cursor
+    # A second press of the key that made the cursor must not confirm a hand that has not moved.
+    is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_ALIGN_NS
+    close = ""
+    if len(procedure.eyes) == 1:
+        close = tr("Close the {} eye. ").format(
+            EYE_WORDS["right" if procedure.eyes[0] == "left" else "left"]
+        )
+    return WizardView(
+        Step.ALIGN,
+        tr("{}Move the hand until it lies under the cursor, then confirm in the headset.").format(
+            close
+        ),
+        (
+            hand,
+            Precondition(tr("Hand rotated by less than {:g}°").format(limit_deg), is_straight),
+        ),
+        ButtonSpec(Action.CONFIRM, tr("Confirm for the wearer"), is_placed(snapshot) and is_due),
+        (ButtonSpec(Action.REDO, tr("&Make another cursor"), discards=tr("Discards this cursor")),),
+        procedure.refusal,
+    )
+
+
+def solve_view(snapshot: Snapshot) -> WizardView:
+    """Return the view of alignments to solve, or of a result to send."""
+    procedure = snapshot.procedure
+    count = len(snapshot.procedure.alignments)
+    aligned = Precondition(
+        tr("{} confirmed").format(pluralize(count, tr("alignment"), tr("alignments"))), True
+    )
+    redo = ButtonSpec(
+        Action.REDO,
+        tr("&Discard and repeat"),
+        discards=tr("Deletes the last alignment; the session panel can restore it"),
+    )
+    if procedure.state is State.ALIGNED or procedure.results is None:
+        return WizardView(
+            Step.SOLVE,
+            tr("The wearer may lower the hand. Solve for the positions of the eyes."),
+            (aligned,),
+            ButtonSpec(Action.SOLVE, tr("Solve")),
+            (redo,),
+            runs_after_s=SHOWN_S,
+        )
+    verdicts = verdict_checks(snapshot)
+    if procedure.state is State.APPLYING:
+        wait = tr("Waiting for the headset to acknowledge its projections.")
+        return WizardView(
+            Step.SOLVE,
+            wait,
+            (aligned, *verdicts),
+            ButtonSpec(Action.APPLY, tr("Sending…"), False),
+        )
+    names = {eye: verdict.name for eye, verdict in procedure.results.verdicts.items()}
+    others: tuple[ButtonSpec, ...] = (redo,)
+    send = ButtonSpec(Action.APPLY, tr("Send to the headset"))
+    instruction = tr("Send the corrected projections to the headset.")
+    kept = tuple(eye for eye, name in names.items() if name == "keep")
+    if UNUSABLE.intersection(names.values()):
+        instruction = tr("Do not use this result. Follow the advice below, then repeat.")
+        send = ButtonSpec(Action.APPLY, tr("Send to the headset"), False)
+        others += (ButtonSpec(Action.APPLY, tr("Send &anyway"), discards=_SENDS_UNUSABLE),)
+    elif len(kept) == len(names):
+        instruction = tr("Keep the offline calibration of {}.").format(eye_names(kept))
+        send = ButtonSpec(Action.APPLY, tr("Keep offline"))
+    elif kept:
+        instruction = tr("Send the projections to the headset, those of {} offline.").format(
+            eye_names(kept)
+        )
+    return WizardView(
+        Step.SOLVE,
+        instruction,
+        (aligned, *verdicts),
+        send,
+        others,
+        snapshot.problem,
+        runs_after_s=READ_S,
+    )
+
+
+def nudge_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
+    """Return the view while an eye's outline is moved until it covers the hand."""
+    eye, moved = verifying.eye, verifying.moved
+    other: Eye = "right" if eye == "left" else "left"
+    across = EYE_WORDS["left" if moved.right_arcmin < 0 else "right"]
+    along = tr("up") if moved.down_arcmin < 0 else tr("down")
+    total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
+    return WizardView(
+        Step.VERIFY,
+        tr(
+            "Close the {} eye. Arrow keys move the outline, + and − change its size, "
+            "until it covers the hand."
+        ).format(EYE_WORDS[other]),
+        (hand_check(snapshot), still_check(snapshot)),
+        ButtonSpec(Action.VERIFIED, tr("It covers the hand"), is_steady(snapshot)),
+        (
+            ButtonSpec(Action.UNDO_NUDGE, tr("&Undo"), verifying.can_undo),
+            ButtonSpec(Action.SKIP, tr("&Skip")),
+        ),
+        snapshot.procedure.refusal,
+        fact=tr("{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %").format(
+            EYE_WORDS[eye].capitalize(),
+            total_arcmin,
+            abs(moved.right_arcmin),
+            across,
+            abs(moved.down_arcmin),
+            along,
+            100 * moved.size,
+        ),
+    )
+
+
+def save_view(snapshot: Snapshot) -> WizardView:
+    """Return the view of a session to finish, or finished."""
+    checks = (
+        Precondition(tr("Saved in {}").format(snapshot.session_path), not snapshot.problem),
+        *verdict_checks(snapshot),
+    )
+    others = (ButtonSpec(Action.EXPORT, tr("E&xport…")), ButtonSpec(Action.BACK, tr("&Back")))
+    is_accepted = len(checks) > 1 and all(check.holds for check in checks[1:])
+    is_verified = is_accepted and len(snapshot.procedure.verifications) == len(checks) - 1
+    unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
+    if snapshot.record.is_finished:
+        return WizardView(
+            Step.SAVE,
+            tr("The session is complete. Take the headset off, or continue with the next wearer."),
+            checks,
+            ButtonSpec(Action.NEXT_WEARER, tr("Next wearer")),
+            others,
+            unearned=unearned,
+        )
+    return WizardView(
+        Step.SAVE,
+        tr("Everything is already saved. Finish the session when you are done."),
+        checks,
+        ButtonSpec(Action.FINISH, tr("Finish session")),
+        others,
+        snapshot.problem,
+        runs_after_s=None if snapshot.problem else READ_S,
+        unearned=unearned,
+    )
+
+
+def eye_names(eyes: Sequence[Eye]) -> str:
+    """Return eyes in words."""
+    return tr("both eyes") if len(eyes) == 2 else tr("the {} eye").format(EYE_WORDS[eyes[0]])

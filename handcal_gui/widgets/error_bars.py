@@ -1,0 +1,75 @@
+"""A small picture of a session's result: the error of each eye before and after, as bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import cast
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPixmap
+
+from handcal.session.library import EyeOutcome
+from handcal.types import EYES, Eye, VerdictName
+from handcal_gui.theme import Colors, colors
+from handcal_gui.translation import tr
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS
+
+PICTURE_PX = QSize(56, 23)
+_BAR_PX = 4
+_SCALE_ARCMIN = 30.0
+"""Error of a bar as wide as the picture, the same for all sessions; larger ones are cut."""
+
+
+def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
+    """Return a picture of two bars for each eye; an after bar is full if the eye is accepted."""
+    bars = tuple(eyes.get(eye) for eye in EYES)
+    return _draw(bars, colors(), QGuiApplication.primaryScreen().devicePixelRatio())
+
+
+def error_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
+    """Return the same as text, a line for each eye."""
+    return "\n".join(
+        tr("{}: {} before, {} after").format(
+            EYE_NAMES[eye], _arcmin(one.before_arcmin), _arcmin(_after(one))
+        )
+        for eye, one in eyes.items()
+    )
+
+
+def _after(one: EyeOutcome) -> float | None:
+    return one.expected_arcmin if one.measured_arcmin is None else one.measured_arcmin
+
+
+def _arcmin(error: float | None) -> str:
+    return NOTHING if error is None else f"{error:.1f}′"
+
+
+@lru_cache(maxsize=512)
+def _draw(eyes: tuple[EyeOutcome | None, ...], now: Colors, ratio: float) -> QPixmap:
+    picture = QPixmap(PICTURE_PX * ratio)
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(Qt.GlobalColor.transparent)
+    if not any(eyes):
+        return picture
+    painter = QPainter(picture)
+    painter.fillRect(QRectF(0, 0, PICTURE_PX.width(), PICTURE_PX.height()), QColor(now.canvas))
+    for i, one in enumerate(eyes):
+        if one is None:
+            continue
+        top = 1.0 + i * (2 * _BAR_PX + 4)
+        painter.fillRect(_bar(one.before_arcmin, top), QColor(now.muted))
+        shade = QColor(getattr(now, VERDICT_COLORS.get(cast(VerdictName, one.verdict), "muted")))
+        after = _bar(_after(one), top + _BAR_PX + 1)
+        if one.verdict == "accept":
+            painter.fillRect(after, shade)
+        else:
+            painter.setPen(shade)
+            painter.drawRect(after.adjusted(0.5, 0.5, -0.5, -0.5))
+    painter.end()
+    return picture
+
+
+def _bar(error_arcmin: float | None, top: float) -> QRectF:
+    share = min(max(error_arcmin or 0.0, 0.0) / _SCALE_ARCMIN, 1.0)
+    return QRectF(1.0, top, share * (PICTURE_PX.width() - 2), _BAR_PX)

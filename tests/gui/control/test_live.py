@@ -1,0 +1,94 @@
+"""Snapshots of a fast camera on their way to the panels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from handcal.station.snapshot import Snapshot
+from handcal_gui.engine.engine_thread import EngineThread
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
+
+MakeSnapshot = Callable[..., Snapshot]
+
+
+class Stream:
+    """A running calibration whose frames arrive at `rate_hz`, with all panels visible.
+
+    Attributes
+    ----------
+    polled : list of Snapshot
+        Snapshots shown by the guide.
+    shown : dict of str to list of Snapshot
+        Those shown by each panel.
+    """
+
+    def __init__(self, program: Program, snapshot: MakeSnapshot, patch: pytest.MonkeyPatch) -> None:
+        self.polled: list[Snapshot] = []
+        self.shown: dict[str, list[Snapshot]] = {name: [] for name in program.window.docks}
+        self.rate_hz = 30
+        self._make = snapshot
+        self._now_ns = self._number = 0
+        self._newest: Snapshot | None = None
+        self._controller = program.live
+        panels = program.window.panels
+        for name, shown in self.shown.items():
+            patch.setattr(getattr(panels, name), "show_snapshot", shown.append)
+        engine = Mock(spec=EngineThread, newest=lambda: (self._newest, 0), submit=lambda *_: 0)
+        patch.setattr(self._controller, "_engine", engine)
+        patch.setattr(self._controller, "_visible", set(panels.all()))
+        patch.setattr(
+            "handcal_gui.control.live.time", SimpleNamespace(monotonic_ns=lambda: self._now_ns)
+        )
+        self._controller.polled.connect(self.polled.append)
+
+    def see(self, rotation_rad: float) -> Snapshot:
+        """Let a frame with a hand so rotated arrive, and poll until the next could."""
+        self._number += 1
+        made = self._make()
+        assert made.frame is not None
+        frame = replace(made.frame, t_host_ns=self._now_ns)
+        seen = {"rotation_rad": np.array([0.0, 0.0, rotation_rad])}
+        self._newest = self._make(
+            observation=seen, frame=frame, number=self._number, t_host_ns=self._now_ns
+        )
+        self.wait(1_000_000_000 // self.rate_hz)
+        return self._newest
+
+    def wait(self, time_ns: int) -> None:
+        """Poll for a while as the timer does, without a new frame."""
+        for _ in range(4):
+            self._controller._poll()
+            self._now_ns += time_ns // 4
+
+
+@pytest.fixture
+def stream(
+    qtbot: QtBot, tmp_path: Path, snapshot: MakeSnapshot, monkeypatch: pytest.MonkeyPatch
+) -> Stream:
+    program = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(program.window)
+    return Stream(program, snapshot, monkeypatch)
+
+
+def test_thirty_frames_a_second_are_shown_and_the_last_by_every_panel(stream: Stream) -> None:
+    for rate_hz, every in ((30, 1), (60, 2), (90, 3)):
+        stream.rate_hz = rate_hz
+        stream.polled.clear()
+        moving = [stream.see(0.01 * i) for i in range(12)]
+        assert stream.polled == moving[::every]
+        still = [stream.see(0.2) for _ in range(4 * every)]
+        for name, shown in stream.shown.items():
+            assert shown[-1] in still, name
+        last = stream.see(0.3)
+        stream.wait(100_000_000)
+        assert stream.polled[-1] is last
+        assert len(stream.polled) == len(set(map(id, stream.polled)))

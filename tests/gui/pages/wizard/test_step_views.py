@@ -1,0 +1,142 @@
+"""The views that the snapshot alone decides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, get_args
+
+import pytest
+
+from handcal.errors import FileError
+from handcal.link.nudges import NudgeSum
+from handcal.station.procedure import State
+from handcal.station.verifying import VerifyingView
+from handcal.types import VerdictName
+from handcal_gui.pages.wizard.steps import Wizard
+from handcal_gui.pages.wizard.view import Action, Step
+from tests.gui.views import Maker, actions, judged
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"camera": {"problem": "no camera is connected; plug one in"}}, "No image"),
+        ({"link": {"connected": False}, "link_problem": "no headset is connected"}, "No headset"),
+        ({"link": {"pose_rate_hz": 0.0}}, "No pose"),
+    ],
+)
+def test_connect_waits_for_camera_headset_and_poses(
+    snapshot: Maker, changes: dict[str, Any], complaint: str
+) -> None:
+    view = Wizard().view(snapshot(State.SHOW_HAND, **changes))
+    assert not view.main.is_enabled
+    assert [check for check in view.checks if complaint in check.text and not check.holds]
+
+
+def test_a_camera_against_which_there_is_evidence_is_not_ticked(snapshot: Maker) -> None:
+    seen = replace(snapshot(State.SHOW_HAND), contradiction="the camera is not the rig's")
+    camera = Wizard().view(seen).checks[0]
+    assert (camera.text, camera.holds) == ("The camera is not the rig's", False)
+
+
+def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) -> None:
+    refusal = "Your hand is turned by 14.0°, more than 9°."
+    seen = {"is_over_limit": True}
+    view = Wizard().view(
+        snapshot(procedure={"eyes": ("left",), "refusal": refusal}, observation=seen)
+    )
+    assert view.sentence.startswith("Close the right eye.")
+    assert view.note == refusal
+    assert not view.checks[1].holds
+    assert Wizard().view(snapshot()).checks[1].holds
+
+
+def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot: Maker) -> None:
+    now = snapshot()
+    assert not Wizard().view(now).main.is_enabled
+    later = replace(now, t_host_ns=now.t_host_ns + 2_000_000_000)
+    assert Wizard().view(later).main.is_enabled
+
+
+def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> None:
+    view = Wizard().view(snapshot(State.SOLVED, problem="the disk is full; free some space"))
+    assert [check.text.split(":")[0] for check in view.checks[1:]] == ["Left eye", "Right eye"]
+    assert view.note == "the disk is full; free some space"
+    assert actions(view) == [Action.REDO]
+    assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
+
+
+def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
+    for name in get_args(VerdictName):
+        checks = Wizard().view(judged(snapshot, name, "accept", State.SOLVED)).checks
+        assert [(c.verdict, c.holds) for c in checks[1:]] == [
+            (name, name == "accept"),
+            ("accept", True),
+        ]
+
+
+@pytest.mark.parametrize("name", ["implausible", "contradicted"])
+def test_no_key_sends_a_result_that_must_not_be_used(snapshot: Maker, name: VerdictName) -> None:
+    view = Wizard().view(judged(snapshot, "accept", name, State.SOLVED))
+    assert view.sentence.startswith("Do not use this result.")
+    assert not view.main.is_enabled
+    assert actions(view) == [Action.REDO, Action.APPLY]
+    assert all(offer.discards for offer in view.others)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "sentence", "label"),
+    [
+        ("keep", "keep", "Keep the offline calibration of both eyes.", "Keep offline"),
+        (
+            "keep",
+            "accept",
+            "Send the projections to the headset, those of the left eye offline.",
+            "Send to the headset",
+        ),
+    ],
+)
+def test_solve_says_which_offline_calibration_is_kept(
+    snapshot: Maker, left: VerdictName, right: VerdictName, sentence: str, label: str
+) -> None:
+    view = Wizard().view(judged(snapshot, left, right, State.SOLVED))
+    assert (view.sentence, view.main.label) == (sentence, label)
+    assert view.main.is_enabled
+
+
+def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> None:
+    triple = (0.0, 0.0, 0.0)
+    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, 0.006), triple, triple, True, False)
+    seen = snapshot(
+        State.VERIFY, procedure={"verifying": moved, "refusal": "Hold your hand still."}
+    )
+    view = Wizard().view(seen)
+    assert view.step is Step.VERIFY
+    assert view.sentence.startswith("Close the right eye.")
+    assert view.fact == "Left eye moved by 5.0′: 3.0′ left, 4.0′ down, size +0.6 %"
+    assert view.note == "Hold your hand still."
+    assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
+    assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]
+
+
+def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:
+    wizard = Wizard("both")
+    wizard.view(snapshot(State.SOLVED))
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
+    repeat = judged(snapshot, "repeat", "accept", State.APPLIED)
+    wizard.view(accepted)
+    wizard.move(Action.NEXT, accepted)
+    assert not wizard.view(accepted).unearned
+    view = wizard.view(repeat)
+    assert view.unearned == {Step.VERIFY}
+    assert [check.holds for check in view.checks[1:]] == [False, True]
+
+
+def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
+    wizard = Wizard()
+    wizard.view(snapshot(State.SOLVED))
+    full = snapshot(State.APPLIED, problem=str(FileError("the disk is full")))
+    wizard.move(Action.NEXT, full)
+    view = wizard.view(full)
+    assert not view.checks[0].holds
+    assert view.note == "the disk is full"

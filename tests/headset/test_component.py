@@ -1,0 +1,316 @@
+"""The Unity component and the sample on stubs of Unity, against the real PC's end of the link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handcal.conventions import unity_transform
+from handcal.display import projection_matrix
+from handcal.geometry import project, rigid, transform
+from handcal.link.nudges import VerifyRequest
+from handcal.link.pairing import Pairing, Pairings
+from handcal.link.server import Confirmation, HeadsetServer, Nudge
+from handcal.link.shapes import Shape
+from handcal.rig.example import example_rig
+from handcal.types import EYES, Float64, Projection
+from tests.headset.conftest import PACKAGE
+from tests.headset.unity_player import PATIENCE_S, UnityPlayer, numbers
+from tests.helpers import ROOT, eventually
+
+pytestmark = pytest.mark.process
+DEFINES = "UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"
+CODE = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+SHIFT_M = (0.003, 0.001, 0.005)
+SQUARE_M = np.array(
+    [[x, y, 0.5] for x, y in ((-0.04, -0.03), (0.04, -0.03), (0.04, 0.05), (-0.04, 0.05))]
+)
+
+Start = Callable[..., UnityPlayer]
+
+
+@pytest.fixture(scope="session")
+def player(compiled: Callable[..., Path]) -> Path:
+    folders = ("tests/headset/stubs", "tests/headset/player")
+    package = ("Runtime", "Runtime/Link", "Samples~/Calibration")
+    sources = [*(ROOT / one for one in folders), *(PACKAGE / one for one in package)]
+    return compiled("player.exe", *sources, defines=DEFINES)
+
+
+@pytest.fixture
+def start(player: Path, tmp_path: Path) -> Iterator[Start]:
+    """Return a function that starts the app, whose folder it finds again."""
+    started: list[UnityPlayer] = []
+
+    def begin(**fields: str) -> UnityPlayer:
+        started.append(UnityPlayer(player, tmp_path / "app", **fields))
+        return started[-1]
+
+    yield begin
+    for app in started:
+        app.close()
+
+
+@pytest.fixture
+def pairings(tmp_path: Path) -> Pairings:
+    return Pairings((Pairing(CODE),), tmp_path / "devices.json")
+
+
+@pytest.fixture
+def server(pairings: Pairings) -> Iterator[HeadsetServer]:
+    with HeadsetServer(pairings) as server:
+        yield server
+
+
+def invitation(server: HeadsetServer) -> str:
+    host, port = server.address
+    return f"HANDCAL://{host}:{port}/{CODE}"
+
+
+def is_connected(told: Mapping[str, str]) -> bool:
+    return told["connected"] == "True"
+
+
+def faults(told: Mapping[str, str]) -> list[str]:
+    """Return what the app logs, but for the missing speech of the stubs."""
+    return [line for line in told["log"].split("|") if line and "spoken word" not in line]
+
+
+def send_projections(server: HeadsetServer, wearer: str = "Ada") -> None:
+    for eye, display in example_rig().eyes.items():
+        size = display.width_px, display.height_px
+        P, offline = projection_matrix(display, SHIFT_M), projection_matrix(display)
+        server.send_projection(Projection(eye, P, *size, display.T_V_H, offline, wearer, "rig A"))
+
+
+def test_digits_are_asked_for_until_they_are_right_and_then_never_again(
+    start: Start, server: HeadsetServer
+) -> None:
+    host, port = server.address
+    digits = server.invite().digits
+    app = start()
+    told = app.until(lambda told: told["keyboard"])
+    assert "run handcal pair" in told["text"].replace("/", " ")
+    app.do(f"type {host}")
+    told = app.state(2)
+    assert "is not understood" in told["text"].replace("/", " ")
+    told = app.until(lambda told: told["keyboard"])
+    assert told["keyboard"] == f"open:{host}"  # to be completed
+    app.do(f"type {host}:{port} {(int(digits) + 1) % 10**8:08}")
+    told = app.until(lambda told: "code is wrong" in told["text"].replace("/", " "))
+    app.until(lambda told: told["keyboard"])
+    app.do(f"type {host}:{port} {digits[:4]} {digits[4:]}")
+    told = app.until(is_connected)
+    assert (told["paired"], told["keyboard"]) == ("True", "")
+    assert "Connected" in app.until(lambda told: told["text"])["text"]
+    assert len(faults(told)) == 2  # the two mistakes
+    eventually(lambda: server.device is not None, PATIENCE_S)
+    assert server.device is not None
+    assert server.device.name == "Stub 3"  # the model, as the device has no name
+    app.close()
+    eventually(lambda: not server.connected, PATIENCE_S)
+    again = start()
+    assert not again.until(is_connected)["keyboard"]
+
+
+def test_an_invitation_with_digits_is_used_once(start: Start, server: HeadsetServer) -> None:
+    host, port = server.address
+    text = f"{host}:{port} {server.invite().digits}"
+    app = start(invitation=text)
+    app.until(is_connected)
+    app.close()
+    told = start(invitation=text).until(is_connected)
+    assert faults(told) == []
+
+
+@pytest.mark.parametrize("parent", [None, (1.5, -0.3, 2.0, 0.9, 0.0, 0.3, 0.1, 2.5)])
+def test_points_are_drawn_where_the_eye_needs_them(
+    start: Start, server: HeadsetServer, parent: tuple[float, ...] | None
+) -> None:
+    """The space of the camera's parent may be moved, turned and scaled."""
+    app = start(invitation=invitation(server))
+    T_unity = rigid([0.2, -0.4, 0.1], [0.3, 1.6, -0.7])
+    quaternion = Rotation.from_matrix(T_unity[:3, :3]).as_quat()
+    app.place("head", [*T_unity[:3, 3], *quaternion])
+    if parent is not None:
+        turn = np.array(parent[3:7]) / np.linalg.norm(parent[3:7])
+        app.place("parent", [*parent[:3], *turn, parent[7]])
+    T_W_H = unity_transform(T_unity)
+    square_W = transform(T_W_H, SQUARE_M)
+    app.until(is_connected)
+    send_projections(server)
+    server.send_shape(Shape(square_W))
+    server.send_cursor(square_W, 1)
+    told = app.until(lambda told: told["shape"] and told["cursor"] and told["wearer"] == "Ada")
+    for number, eye in enumerate(EYES):
+        display = example_rig().eyes[eye]
+        P = projection_matrix(display, SHIFT_M)
+        expected_px = project(P, transform(display.T_V_H, SQUARE_M))
+        clip = numbers(told[f"projection{number}"]).reshape(4, 4)
+        clip = clip @ numbers(told[f"view{number}"]).reshape(4, 4)
+        for what, most_px in (("shape", 0.01), ("cursor", 0.3)):  # float32; quanta of 0.1 mm
+            world = numbers(told[what]).reshape(-1, 3)
+            found = np.column_stack([world, np.ones(4)]) @ clip.T
+            ndc = found[:, :3] / found[:, 3:]
+            assert (np.abs(ndc[:, 2]) < 1).all()  # between the camera's planes
+            found_px = (
+                0.5 * (1 + ndc[:, :2] * [1, -1]) * [display.width_px, display.height_px] - 0.5
+            )
+            np.testing.assert_allclose(found_px, expected_px, atol=most_px)
+    # The focus plane is before the head, at the virtual image's distance, in the world.
+    display = example_rig().eyes["left"]
+    distance_m = display.z_C0_S_m - display.t_C0_V_m[2]
+    clip = numbers(told["view0"]).reshape(4, 4)
+    in_V = (clip @ [*numbers(told["focus"]), 1.0])[:3]
+    in_H = display.T_V_H[:3, :3].T @ (in_V * [1, -1, -1] - display.T_V_H[:3, 3])
+    np.testing.assert_allclose(in_H, [0, 0, distance_m], atol=1e-3)
+    assert faults(told) == []
+
+
+def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    send_projections(server)
+    server.send_cursor(SQUARE_M, 7)
+    server.send_prompt("Cover the blue hand with your own, then say confirm or press the trigger.")
+    told = app.until(
+        lambda told: told["cursor"] and told["wearer"] == "Ada" and "Cover" in told["text"]
+    )
+    assert max(map(len, told["text"].split("/"))) <= 32
+    app.do("press Space")
+    confirmations: list[Confirmation] = []
+
+    def is_confirmed(_: object) -> bool:
+        confirmations.extend(server.confirmations())
+        return bool(confirmations)
+
+    app.until(is_confirmed)
+    assert [(one.cursor_id, one.problem) for one in confirmations] == [(7, "")]
+
+    server.send_cursor(np.zeros((0, 3)), 8)
+    server.send_verify(VerifyRequest(3, "right", 1.0, 0.002))
+    app.until(lambda told: not told["cursor"])
+    nudges: list[Nudge] = []
+
+    def is_nudged(order: str) -> bool:
+        app.do(order)  # again, since the request may come after the cursor's removal
+        nudges.extend(server.nudges())
+        return bool(nudges)
+
+    app.until(lambda _: is_nudged("press RightArrow"))
+    app.until(lambda _: is_nudged("press Return") and nudges[-1].fits)
+    last = nudges[-1]
+    assert last.problem == ""
+    assert last.moved.right_arcmin > 0
+    assert (last.moved.down_arcmin, last.moved.size) == (0.0, 0.0)
+
+
+def test_the_calibration_is_kept_when_the_app_and_the_pc_are_gone(
+    start: Start, pairings: Pairings
+) -> None:
+    with HeadsetServer(pairings) as server:
+        app = start(invitation=invitation(server))
+        app.until(is_connected)
+        send_projections(server, "Bea")
+        app.until(lambda told: told["wearer"] == "Bea")
+        send_projections(server, "Ada")
+        shown = app.until(lambda told: told["wearer"] == "Ada" and told["kept"] == "Ada,Bea")
+        app.close()
+    again = start()
+    told = again.state(2)
+    assert (told["wearer"], told["kept"]) == ("Ada", "Ada,Bea")
+    assert told["projection1"] == shown["projection1"]
+    assert "calibration of Ada" in told["text"].replace("/", " ")
+    again.do("kept Bea")
+    assert again.until(lambda told: told["wearer"] == "Bea")["kept"] == "Bea,Ada"
+
+
+@pytest.mark.parametrize(
+    ("order", "said"), [("pipeline", "scriptable render pipeline"), ("single", "single pass")]
+)
+def test_settings_that_make_a_calibration_worthless_are_said_in_view(
+    start: Start, order: str, said: str
+) -> None:
+    app = start()
+    app.do(order)
+    told = app.state(2)
+    assert said in told["text"].replace("/", " ")
+    assert said in told["warning"]
+    assert len(faults(app.state(3))) == 1  # said once
+
+
+def test_a_view_that_moves_is_said_once(start: Start) -> None:
+    app = start()
+    app.place("eyes", [0.0630])
+    app.state(2)
+    app.place("eyes", [0.0650])
+    told = app.until(lambda told: told["warning"])
+    assert "has moved its view by 1" in told["warning"]
+    assert "moved" not in told["text"]
+
+
+def test_live_hands_of_any_size_are_drawn(start: Start, server: HeadsetServer) -> None:
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    for count in (50, 800, 20, 21, 0, 5):
+        outline = np.random.default_rng(count).normal(0.0, 0.05, (count, 3))
+
+        def is_drawn(told: Mapping[str, str], hand: Float64 = outline) -> bool:
+            server.send_live_hand(hand, False, ("left",), is_outline=True)
+            return len(numbers(told["live hand"])) == hand.size
+
+        app.until(is_drawn)
+    assert faults(app.state()) == []
+
+
+def test_a_disabled_component_leaves_nothing_and_comes_back(
+    start: Start, server: HeadsetServer
+) -> None:
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    send_projections(server)
+    app.until(lambda told: told["wearer"] == "Ada")
+    app.do("disable")
+    told = app.state()
+    assert (told["connected"], told["text"]) == ("False", "")
+    assert "cursor" not in told
+    assert numbers(told["projection0"])[0] == 2.0  # the runtime's own
+    eventually(lambda: not server.connected, PATIENCE_S)
+    app.do("enable")
+    app.until(is_connected)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "x",
+        "f" * 17 + "\nh\n1\nQUJD",
+        "00\nhost\n99999999999\nQUJD",
+        "00\nhost\n1\nQUJD",
+        "00\nh\n1\n?",
+    ],
+)
+def test_a_damaged_pairing_is_said_and_asked_for_again(
+    start: Start, tmp_path: Path, content: str
+) -> None:
+    (tmp_path / "app").mkdir()
+    (tmp_path / "app/handcal-pairing.txt").write_text(content)
+    (tmp_path / "app/handcal-calibrations.bin").write_bytes(b"\xff" * 9)
+    app = start()
+    told = app.until(lambda told: told["keyboard"])
+    assert told["paired"] == "False"
+    assert [line[:16] for line in faults(told)] == ["handcal: The pai", "handcal: The kep"]
+    assert told["warning"]
+
+
+def test_an_app_that_cannot_write_says_so_and_is_paired(
+    start: Start, tmp_path: Path, server: HeadsetServer
+) -> None:
+    (tmp_path / "app/handcal-pairing.txt.part").mkdir(parents=True)
+    told = start(invitation=invitation(server)).until(is_connected)
+    assert "Cannot write" in told["warning"]
