@@ -2027,6 +2027,14 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Offline</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Show solved</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2060,6 +2068,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>Distance of the target from the eye, in metres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reset to</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2187,7 +2199,7 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Signed with another pairing key: enter the key below in the headset</source>
+        <source>Signed with another pairing key: enter the key above in the headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2220,10 +2232,6 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>The new key must then be entered in the headset.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Pairing</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5350,6 +5358,10 @@ one turns out.</source>
     </message>
     <message>
         <source>handcal hit an unexpected error ({})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: {} before, {} after</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
