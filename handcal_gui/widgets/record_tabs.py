@@ -16,6 +16,8 @@ class RecordTabs(QTabWidget):
         self._delete = QToolButton()
         self._delete.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the table handles Del
         self.setCornerWidget(self._delete)
+        self.setUsesScrollButtons(False)  # a long title is shortened instead
+        self.setElideMode(Qt.TextElideMode.ElideRight)
         self.currentChanged.connect(self._refresh)
 
     def _refresh(self) -> None:

@@ -56,7 +56,7 @@ class Box:
         return np.array(list(product(*self.sides_mm.T)))
 
 
-def draw_box(painter: QPainter, box: Box, orbit: Orbit) -> None:
+def draw_box(painter: QPainter, box: Box, orbit: Orbit, *, is_labelled: bool = True) -> None:
     """Draw the box's far faces, and ticks labelled in millimetres along its outline.
 
     Parameters
@@ -65,6 +65,8 @@ def draw_box(painter: QPainter, box: Box, orbit: Orbit) -> None:
         With its origin in the centre of the view.
     box : Box
     orbit : Orbit
+    is_labelled : bool
+        False leaves out the labels.
     """
     text, line = painter.pen().color(), QColor(colors().muted)
     line.setAlphaF(0.5)
@@ -75,7 +77,7 @@ def draw_box(painter: QPainter, box: Box, orbit: Orbit) -> None:
     painter.drawLines([QLineF(*end) for end in ends.tolist()])
     painter.setPen(text)
     for axis, step in enumerate(steps):
-        if step is not None:
+        if is_labelled and step is not None:
             _draw_ticks(painter, box, orbit, axis, step, middle)
 
 

@@ -37,6 +37,9 @@ _POINT_MM = 1.5
 _LEAST_POINT_PX, _MOST_POINT_PX = 2.0, 6.0
 _LABELS_EMS = (7.0, 4.5)
 """Space for the box's labels: left and right together, and above and below together."""
+_UNLABELLED_EMS = (1.0, 1.0)
+_LEAST_LABELLED_EMS = 11.0
+"""Height below which the box has no labels: the hand would be too small beside them."""
 _NONE = np.empty((0, 3))
 
 
@@ -116,10 +119,9 @@ class CloudView(QWidget):
             return
         if self._is_fitted:
             em = self.fontMetrics().height()
+            across, down = _LABELS_EMS if self._is_labelled else _UNLABELLED_EMS
             self._orbit = self._orbit.fitted(
-                self._box.corners_mm,
-                self.width() - _LABELS_EMS[0] * em,
-                self.height() - _LABELS_EMS[1] * em,
+                self._box.corners_mm, self.width() - across * em, self.height() - down * em
             )
         painter.drawPixmap(0, 0, self._draw_backdrop(self._box))
         self._paint_points(painter)
@@ -209,9 +211,13 @@ class CloudView(QWidget):
             draw_scale(painter, self._orbit, corner)
             painter.setFont(number_font(0.85))
             painter.translate(self.width() / 2, self.height() / 2)
-            draw_box(painter, box, self._orbit)
+            draw_box(painter, box, self._orbit, is_labelled=self._is_labelled)
             painter.end()
         return self._backdrop
+
+    @property
+    def _is_labelled(self) -> bool:
+        return self.height() >= _LEAST_LABELLED_EMS * self.fontMetrics().height()
 
     def _device_size(self) -> tuple[int, int]:
         ratio = self.devicePixelRatio()

@@ -138,6 +138,8 @@ class ResultsPanel(QWidget):
         tabs = QTabWidget()
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
+        tabs.setUsesScrollButtons(False)  # a long title is shortened instead
+        tabs.setElideMode(Qt.TextElideMode.ElideRight)
         tabs.addTab(self._eyes_tab(), tr("Eyes"))
         tabs.addTab(self._convergence, tr("Iterations"))
         tabs.setTabToolTip(1, tr("Convergence of each registration"))

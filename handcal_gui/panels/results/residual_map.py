@@ -25,7 +25,9 @@ class ResidualMap(Plot):
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(tr("Residual map"), tr("Right (mm)"), tr("Down (mm)"), parent)
+        super().__init__(
+            "residual-map", tr("Residual map"), tr("Right (mm)"), tr("Down (mm)"), parent
+        )
         self._shown = np.empty((0, 2)), np.empty(0)
         self.scatters = (
             pg.ScatterPlotItem(size=4, pen=None),

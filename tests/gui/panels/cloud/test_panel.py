@@ -203,3 +203,12 @@ def test_it_fits_into_a_small_dock(panel: CloudPanel, snapshot: MakeSnapshot) ->
     hint = panel.minimumSizeHint()
     assert hint.width() <= 300
     assert hint.height() <= 220
+
+
+def test_a_low_view_gives_the_room_of_the_labels_to_the_cloud(qtbot: QtBot) -> None:
+    side_mm = np.linspace(-50.0, 50.0, 5)
+    cube_mm = np.stack(np.meshgrid(side_mm, side_mm, side_mm), axis=-1).reshape(-1, 3)
+    view = show(qtbot, CloudView(), 345, 120)
+    view.show_points(cube_mm, np.zeros((len(cube_mm), 3), np.uint8), "mm")
+    view.grab()
+    assert np.ptp(view.orbit.project(cube_mm)[:, 1]) > 0.5 * view.height()
