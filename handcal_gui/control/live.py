@@ -31,7 +31,8 @@ from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow, Panel
 
-_POLL_MS = 4
+_POLL_MS = 25
+"""A snapshot is shown as soon as it arrives; this is for one that was too early and stays."""
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
     Step.SHOW_HAND: "results",
@@ -130,6 +131,7 @@ class CalibrationController(QObject):
         self._conditions = Conditions()
         self._wizard_panel.start(Wizard(plan), is_held=is_held)
         self._engine = EngineThread(lambda: _held(open_station()), self, bridges)
+        self._engine.arrived.connect(self._poll)
         self._engine.told.connect(self._window.banner.show_message)
         self._engine.opened.connect(self._on_opened)
         self._engine.command_done.connect(self._on_command_done)
@@ -145,6 +147,7 @@ class CalibrationController(QObject):
 
     def stop(self) -> None:
         """End the calibration and wait for it; safe to call twice."""
+        self._timer.stop()  # no snapshot that is still on its way is shown
         self._comparison.cancel()
         engine = self._engine
         if engine is not None:
@@ -153,7 +156,6 @@ class CalibrationController(QObject):
             engine.close()
             engine.deleteLater()
         self._engine = None
-        self._timer.stop()
         self._snapshot = self._link = None
         self._window.banner.show_condition("")
 
@@ -301,7 +303,9 @@ class CalibrationController(QObject):
         return self._submit(name, command_station)
 
     def _poll(self) -> None:
-        snapshot, shown = self._engine.newest() if self._engine is not None else (None, 0)
+        if self._engine is None or not self._timer.isActive():
+            return
+        snapshot, shown = self._engine.newest()
         if snapshot is None or snapshot is self._snapshot or self._is_early(snapshot):
             return
         self._shown, self._shown_ns = shown, time.monotonic_ns()

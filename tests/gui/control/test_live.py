@@ -49,6 +49,7 @@ class Stream:
             "handcal_gui.control.live.time", SimpleNamespace(monotonic_ns=lambda: self._now_ns)
         )
         self._controller.polled.connect(self.polled.append)
+        patch.setattr(self._controller, "_timer", Mock(isActive=lambda: True))
 
     def see(self, rotation_rad: float) -> Snapshot:
         """Let a frame with a hand so rotated arrive, and poll until the next could."""
