@@ -43,7 +43,7 @@ _PANELS_OF_STEPS = {
 }
 """The panel to show when a step begins."""
 _SLOW_EVERY = 2
-"""On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
+"""On a slow computer, panels show only every such snapshot of those that the guide shows."""
 _RECORD = tr("record the trial")
 _KINDS = {"alignment": tr("alignment"), "trial": tr("trial")}
 _NO_BRIDGES = BridgeSettings()
@@ -99,7 +99,7 @@ class CalibrationController(QObject):
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
         self._failed_command = ""
-        self._shown_ns = 0
+        self._shown_ns = self._count = 0  # time of the snapshot shown, and number of those shown
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -309,6 +309,7 @@ class CalibrationController(QObject):
         if snapshot is None or snapshot is self._snapshot or self._is_early(snapshot):
             return
         self._shown, self._shown_ns = shown, time.monotonic_ns()
+        self._count += 1
         condition = self._conditions.condition(snapshot)
         snapshot = self._conditions.calm(snapshot)
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
@@ -320,7 +321,7 @@ class CalibrationController(QObject):
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
         # Otherwise, on a slow computer, some panels would never have a turn.
-        shows = not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
+        shows = not self._conditions.is_slow or self._count % _SLOW_EVERY == 0
         if shows:
             self._turns.rotate()
         picture = self._wizard_panel.picture
