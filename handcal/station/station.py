@@ -20,8 +20,8 @@ from handcal.io.closable import Closable
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
-from handcal.link.statistics import LinkStatistics
 from handcal.link.shapes import Target
+from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
