@@ -2,7 +2,7 @@
 
 A camera of rendered frames streams 1280x720 at 30, 60 or 90 Hz through a real station. A
 separate process sends poses in place of a headset and never confirms, so that every frame is
-segmented, checked by the guard and shown in all panels.
+segmented, and about 30 a second are checked by the guard and shown in all panels.
 """
 
 from __future__ import annotations

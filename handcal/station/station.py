@@ -21,6 +21,7 @@ from handcal.link.invitation import Invitation
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.shapes import Target
+from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
@@ -227,14 +228,15 @@ class Station(Closable):
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
         self._number += 1
+        link = self._link.statistics()
         snapshot = Snapshot(
             number=self._number,
             t_host_ns=time.monotonic_ns(),
             frame=self._frame,
             observation=observation,
             camera=self._feed.status,
-            link=self._link.statistics(),
-            link_problem=self._link_problem(),
+            link=link,
+            link_problem=self._link_problem(link),
             problem=self._not_stored or self._not_applied,
             contradiction=self._contradiction(observation),
             procedure=read_procedure(
@@ -425,12 +427,11 @@ class Station(Closable):
         if self.watch_views and not self.comparing.shown:
             self._views.render_next(hand, self._target_E_m, self._is_offline)
 
-    def _link_problem(self) -> str:
+    def _link_problem(self, link: LinkStatistics) -> str:
         try:
             self.require_headset()
         except LinkError as error:
             return str(error)
-        link = self._link.statistics()
         is_awaited = self._simulation is None and not link.connected
         return link_problem(link, self.address if is_awaited else None)
 

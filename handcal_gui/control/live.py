@@ -31,7 +31,8 @@ from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow, Panel
 
-_POLL_MS = 4
+_POLL_MS = 25
+"""A snapshot is shown as soon as it arrives; this is for one that was too early and stays."""
 _PANELS_OF_STEPS = {
     Step.CONNECT: "link",
     Step.SHOW_HAND: "results",
@@ -42,7 +43,7 @@ _PANELS_OF_STEPS = {
 }
 """The panel to show when a step begins."""
 _SLOW_EVERY = 2
-"""On a slow computer, panels show only every such snapshot; the guide and the guard see all."""
+"""On a slow computer, panels show only every such snapshot of those that the guide shows."""
 _RECORD = tr("record the trial")
 _KINDS = {"alignment": tr("alignment"), "trial": tr("trial")}
 _NO_BRIDGES = BridgeSettings()
@@ -98,7 +99,7 @@ class CalibrationController(QObject):
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
         self._failed_command = ""
-        self._shown_ns = 0
+        self._shown_ns = self._count = 0  # time of the snapshot shown, and number of those shown
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -130,6 +131,7 @@ class CalibrationController(QObject):
         self._conditions = Conditions()
         self._wizard_panel.start(Wizard(plan), is_held=is_held)
         self._engine = EngineThread(lambda: _held(open_station()), self, bridges)
+        self._engine.arrived.connect(self._poll)
         self._engine.told.connect(self._window.banner.show_message)
         self._engine.opened.connect(self._on_opened)
         self._engine.command_done.connect(self._on_command_done)
@@ -145,6 +147,7 @@ class CalibrationController(QObject):
 
     def stop(self) -> None:
         """End the calibration and wait for it; safe to call twice."""
+        self._timer.stop()  # no snapshot that is still on its way is shown
         self._comparison.cancel()
         engine = self._engine
         if engine is not None:
@@ -153,7 +156,6 @@ class CalibrationController(QObject):
             engine.close()
             engine.deleteLater()
         self._engine = None
-        self._timer.stop()
         self._snapshot = self._link = None
         self._window.banner.show_condition("")
 
@@ -301,10 +303,13 @@ class CalibrationController(QObject):
         return self._submit(name, command_station)
 
     def _poll(self) -> None:
-        snapshot, shown = self._engine.newest() if self._engine is not None else (None, 0)
+        if self._engine is None or not self._timer.isActive():
+            return
+        snapshot, shown = self._engine.newest()
         if snapshot is None or snapshot is self._snapshot or self._is_early(snapshot):
             return
         self._shown, self._shown_ns = shown, time.monotonic_ns()
+        self._count += 1
         condition = self._conditions.condition(snapshot)
         snapshot = self._conditions.calm(snapshot)
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
@@ -316,7 +321,7 @@ class CalibrationController(QObject):
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
         # Otherwise, on a slow computer, some panels would never have a turn.
-        shows = not self._conditions.is_slow or snapshot.number % _SLOW_EVERY == 0
+        shows = not self._conditions.is_slow or self._count % _SLOW_EVERY == 0
         if shows:
             self._turns.rotate()
         picture = self._wizard_panel.picture

@@ -40,6 +40,8 @@ class EngineThread(Worker):
     ----------
     opened : Signal(Station)
         The station is running. Other threads may only read its constants.
+    arrived : Signal()
+        There is a snapshot that `newest` has not returned yet.
     command_done : Signal(str, object)
         A command has finished: its name and its result.
     failed : Signal(str, str)
@@ -51,6 +53,7 @@ class EngineThread(Worker):
     """
 
     opened = Signal(object)
+    arrived = Signal()
     command_done = Signal(str, object)
     failed = Signal(str, str)
     told = Signal(str)
@@ -68,10 +71,12 @@ class EngineThread(Worker):
         self._commands: queue.SimpleQueue[tuple[str, Command]] = queue.SimpleQueue()
         self._submitted = self._done = 0
         self._newest: tuple[Snapshot | None, int] = None, 0
+        self._is_told = False
         self._closing = threading.Event()
 
     def newest(self) -> tuple[Snapshot | None, int]:
         """Return the newest snapshot, None before the first, and the number of commands in it."""
+        self._is_told = False  # first, so that a snapshot that comes meanwhile is told of
         return self._newest
 
     def submit(self, name: str, command: Command) -> int:
@@ -105,6 +110,9 @@ class EngineThread(Worker):
                 try:
                     while not self._closing.is_set():
                         self._newest = station.step(), self._done
+                        if not self._is_told:
+                            self._is_told = True
+                            self._emit_later(self.arrived.emit)
                         self._run_commands(station)
                 finally:
                     self._run_commands(station)  # those submitted last, such as saving notes

@@ -35,6 +35,8 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.sentence import sentence
 
+_STATUS_NS = 200_000_000
+"""Interval of the numbers below the image; nobody reads faster."""
 _EMPTY = tr("The camera image will appear here. Choose a camera on the start page.")
 _NO_COLOR = tr("This camera has no colour image.")
 
@@ -60,6 +62,7 @@ class CameraPanel(QWidget):
         self.setObjectName("camera-panel")
         self._frame: Frame | None = None
         self._caption = ""
+        self._status_ns = 0
         self._pictures = _Pictures()
         self._status = _Status()
         self._freeze = QAction(tr("Freeze"), self, checkable=True, autoRepeat=False)
@@ -97,6 +100,9 @@ class CameraPanel(QWidget):
         message = tr("No image") if snapshot.camera.problem else "" if self._frame else _EMPTY
         caption = tr("Frozen") if self._freeze.isChecked() else self._caption
         self._pictures.show_text(message=message, caption="" if message else caption)
+        if 0 < snapshot.t_host_ns - self._status_ns < _STATUS_NS:
+            return
+        self._status_ns = snapshot.t_host_ns
         age_ms = (snapshot.t_host_ns - self._frame.t_host_ns) / 1e6 if self._frame else None
         self._status.show_status(snapshot.camera, age_ms)
 

@@ -49,6 +49,11 @@ class Stream:
             "handcal_gui.control.live.time", SimpleNamespace(monotonic_ns=lambda: self._now_ns)
         )
         self._controller.polled.connect(self.polled.append)
+        patch.setattr(self._controller, "_timer", Mock(isActive=lambda: True))
+
+    def be_slow(self) -> None:
+        """Let the computer be slow, as after three seconds with few frames."""
+        self._controller._conditions.is_slow = True
 
     def see(self, rotation_rad: float) -> Snapshot:
         """Let a frame with a hand so rotated arrive, and poll until the next could."""
@@ -77,6 +82,18 @@ def stream(
     program = Program(PreferencesFile(tmp_path / "preferences.json"))
     qtbot.addWidget(program.window)
     return Stream(program, snapshot, monkeypatch)
+
+
+def test_on_a_slow_computer_panels_show_every_second_of_them(stream: Stream) -> None:
+    stream.rate_hz = 60
+    stream.be_slow()
+    for _ in range(32):
+        stream.see(0.0)
+    counts = {name: len(shown) for name, shown in stream.shown.items()}
+    assert len(stream.polled) == 16
+    assert counts["camera"] == counts["results"] == 8
+    assert counts["cloud"] == counts["wearer_view"] == 2
+    assert counts["rotation"] == 16, "guidance comes first"
 
 
 def test_thirty_frames_a_second_are_shown_and_the_last_by_every_panel(stream: Stream) -> None:

@@ -50,6 +50,14 @@ def test_it_tells_how_the_camera_does(panel: CameraPanel, snapshot: Maker) -> No
     assert text(panel, "camera-dropped") == "3"
 
 
+def test_the_numbers_change_five_times_a_second(panel: CameraPanel, snapshot: Maker) -> None:
+    shown = []
+    for i in range(8):
+        panel.show_snapshot(snapshot(camera={"dropped": i}, t_host_ns=NOW_NS + i * 50_000_000))
+        shown.append(text(panel, "camera-dropped"))
+    assert shown == list("00004444")
+
+
 def test_numbers_do_not_move_the_rest(panel: CameraPanel, snapshot: Maker) -> None:
     panel.show_snapshot(snapshot())
     places = [label.geometry() for label in panel.findChildren(QLabel)]
