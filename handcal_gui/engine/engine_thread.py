@@ -76,7 +76,7 @@ class EngineThread(Worker):
 
     def newest(self) -> tuple[Snapshot | None, int]:
         """Return the newest snapshot, None before the first, and the number of commands in it."""
-        self._is_told = False  # first, so that a snapshot that comes meanwhile is told of
+        self._is_told = False  # first, so that a snapshot that arrives meanwhile is signalled
         return self._newest
 
     def submit(self, name: str, command: Command) -> int:
