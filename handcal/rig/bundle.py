@@ -165,9 +165,10 @@ def foreseen(
         Share of the corners that each camera has in its image.
     """
     ids, blank = np.arange(len(points_m)), np.zeros((len(points_m), 2))
+    views = [BoardView(points_m, blank, (one.width, one.height), ids, 2.0) for one in setup.cameras]
     sightings = [
-        Sighting(frame, number, BoardView(points_m, blank, (camera.width, camera.height), ids, 2.0))
-        for number, camera in enumerate(setup.cameras)
+        Sighting(frame, number, seen)
+        for number, seen in enumerate(views)
         for frame in range(len(setup.poses))
     ]
     problem = _Problem(sightings, lenses, setup.place is not None)
@@ -217,6 +218,19 @@ class _Corners(NamedTuple):
     """Numbers of the camera's parameters that are solved for."""
     used: NDArray[np.int64]
     """(Q,); numbers of the shared parameters that concern this camera."""
+    is_even: bool
+    """True if it sees equally many corners in each frame, once."""
+
+    def of_frames(self, rows: Float64, matrices: Float64) -> Float64:
+        """Return rows (N, 3), or two for each corner, times the matrix (3, 3) of their frame."""
+        if self.is_even:  # one call; many small ones take longer than the products
+            even: Float64 = rows.reshape(len(matrices), -1, 3) @ matrices
+            return even.reshape(-1, 3)
+        found, each = np.empty_like(rows), len(rows) // max(len(self.points_m), 1)
+        for _, frame, part in self.parts:
+            of_part = slice(each * part.start, each * part.stop)
+            found[of_part] = rows[of_part] @ matrices[frame]
+        return found
 
 
 class _Problem:
@@ -233,7 +247,13 @@ class _Problem:
         self._count = int(ends[-1])
         self._frames = 1 + max(one.frame for one in sightings)
         self._corners = [
-            _corners_of(sightings, camera, free, np.r_[0 : 6 * (has_place and camera > 0), columns])
+            _corners_of(
+                sightings,
+                camera,
+                free,
+                np.r_[0 : 6 * (has_place and camera > 0), columns],
+                self._frames,
+            )
             for camera, (free, columns) in enumerate(zip(self._free, self._columns, strict=True))
         ]
         coefficients = [number >= 4 for free in self._free for number in free]
@@ -298,19 +318,19 @@ class _Problem:
         """
         found = []
         boards = np.stack(setup.poses)
-        R, J = _rotations(boards[:, :3])
+        turns = boards[:, :3] if setup.place is None else np.vstack([boards, setup.place])[:, :3]
+        R, J = _rotations(turns)
         for number, (camera, corners) in enumerate(zip(setup.cameras, self._corners, strict=True)):
             rows = np.empty((2 * len(corners.pixels), len(corners.used) + 7))
             found.append(rows)
             if not len(rows):
                 continue
-            turned_m = np.empty_like(corners.points_m)
-            for _, frame, part in corners.parts:
-                turned_m[part] = corners.points_m[part] @ R[frame].T
+            of_boards = R[: len(boards)].swapaxes(1, 2)
+            turned_m = corners.of_frames(corners.points_m, of_boards)
             points_m = turned_m + boards[corners.frame, 3:]
             place = setup.place if number > 0 else None
             if place is not None:
-                (R_place,), (J_place,) = _rotations(place[None, :3])
+                R_place, J_place = R[-1], J[-1]
                 replaced_m = points_m @ R_place.T
                 points_m = replaced_m + place[3:]
             pixels, by_point, by_parameters = derivatives_at(points_m, camera)
@@ -321,9 +341,7 @@ class _Problem:
                     rows[:, :3] = _crossed(replaced_m, by_point) @ J_place
                     rows[:, 3:6] = by_point
                 by_point = by_point @ R_place
-            by_turn = _crossed(turned_m, by_point)
-            for _, frame, part in corners.parts:
-                rows[_rows(part), -7:-4] = by_turn[_rows(part)] @ J[frame]
+            rows[:, -7:-4] = corners.of_frames(_crossed(turned_m, by_point), J[: len(boards)])
             rows[:, -4:-1] = by_point
             rows[:, -1] = (corners.pixels - pixels).ravel()
         return found
@@ -341,12 +359,17 @@ class _Problem:
             shared = of_camera[:, : len(used)].T @ of_camera
             U[np.ix_(used, used)] += shared[:, : len(used)]
             g_shared[used] += shared[:, -1]
-            for _, frame, part in corners.parts:
-                rows = of_camera[_rows(part)]
-                own = rows[:, -7:-1].T @ rows
-                W[frame, used] += own[:, : len(used)].T
-                V[frame] += own[:, -7:-1]
-                g_own[frame] += own[:, -1]
+            if corners.is_even:
+                rows = of_camera.reshape(self._frames, -1, of_camera.shape[1])
+                own = rows[:, :, -7:-1].swapaxes(1, 2) @ rows
+            else:
+                own = np.zeros((self._frames, 6, of_camera.shape[1]))
+                for _, frame, part in corners.parts:
+                    rows = of_camera[_rows(part)]
+                    own[frame] += rows[:, -7:-1].T @ rows
+            W[:, used] += own[:, :, : len(used)].swapaxes(1, 2)
+            V += own[:, :, -7:-1]
+            g_own += own[:, :, -1]
         return U, W, V, g_shared, g_own
 
     def foreseen(self, setup: Setup) -> tuple[Float64, Float64]:
@@ -402,11 +425,15 @@ def _step(
     by_shared, by_own = solved[:, :, :-1], solved[:, :, -1]
     if not len(g_shared):
         return g_shared, by_own
-    reduced = U + damping * np.diag(np.diag(U)) - np.einsum("fpk,fkq->pq", W, by_shared)
-    right = g_shared - np.einsum("fpk,fk->p", W, by_own)
+    wide = W.transpose(1, 0, 2).reshape(len(g_shared), -1)
+    reduced = U + damping * np.diag(np.diag(U)) - wide @ by_shared.reshape(-1, len(g_shared))
+    right = g_shared - wide @ by_own.ravel()
     scale = 1.0 / np.sqrt(np.maximum(np.diag(U), 1e-30))
     scaled = reduced * np.outer(scale, scale)
-    shared = scale * np.linalg.lstsq(scaled, scale * right, rcond=1e-15)[0]
+    try:
+        shared = scale * np.linalg.solve(scaled, scale * right)
+    except np.linalg.LinAlgError:  # a parameter that nothing depends on
+        shared = scale * np.linalg.lstsq(scaled, scale * right, rcond=1e-15)[0]
     return shared, by_own - by_shared @ shared
 
 
@@ -417,7 +444,11 @@ def _cost(linear: Sequence[Float64]) -> float:
 
 
 def _corners_of(
-    sightings: Sequence[Sighting], camera: int, free: list[int], used: NDArray[np.int64]
+    sightings: Sequence[Sighting],
+    camera: int,
+    free: list[int],
+    used: NDArray[np.int64],
+    frames: int,
 ) -> _Corners:
     chosen = [(number, one) for number, one in enumerate(sightings) if one.camera == camera]
     ends = np.cumsum([0, *(len(one.seen.pixels) for _, one in chosen)]).tolist()
@@ -432,6 +463,8 @@ def _corners_of(
         parts,
         free,
         used,
+        len({part.stop - part.start for _, _, part in parts}) == 1
+        and [frame for _, frame, _ in parts] == list(range(frames)),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,7 +41,7 @@ class LensFit:
     fit: Adjusted
     held_out_px2: Float64
     """(V,); mean square residual of each view with intrinsics from the others, to first order; over
-    the corners that all models compared have kept."""
+    the corners that all models compared have kept. (0,) if there is no other model."""
     covariance: Float64 | None
     """`Adjusted.covariance`."""
     uncertainty: ProjectionUncertainty | None
@@ -97,7 +98,7 @@ def fit_camera(
 def fit_lens(views: Sequence[BoardView], lens: LensModel) -> LensFit | None:
     """Fit one lens model; None if nothing can be solved."""
     fit = fit_camera(views, lens)
-    return None if fit is None else _judged(lens, fit, fit.kept)
+    return None if fit is None else _judged(lens, fit, np.empty(0))
 
 
 def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
@@ -111,7 +112,7 @@ def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
             start = fit.setup.cameras[0]
     masks = zip(*(fit.kept for fit in fits.values()), strict=True)
     kept = [np.logical_and.reduce(of_view) for of_view in masks]
-    return tuple(_judged(lens, fit, kept) for lens, fit in fits.items())
+    return tuple(_judged(lens, fit, _held_out_px2(fit, kept)) for lens, fit in fits.items())
 
 
 def best_lens(fits: Sequence[LensFit]) -> LensFit:
@@ -138,21 +139,24 @@ def _is_worse(one: LensFit, least: LensFit) -> bool:
     return bool(more_px2.mean() > more_px2.std(ddof=1) / np.sqrt(len(more_px2)))
 
 
-def _judged(lens: LensModel, fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> LensFit:
+def _judged(lens: LensModel, fit: Adjusted, held_out_px2: Float64) -> LensFit:
     covariance = fit.covariance()
     uncertainty = None
     if covariance is not None:
         solved = solved_parameters(lens)
         uncertainty = projection_uncertainty(fit.setup.cameras[0], solved, covariance)
-    return LensFit(lens, fit, _held_out_px2(fit, kept), covariance, uncertainty)
+    return LensFit(lens, fit, held_out_px2, covariance, uncertainty)
 
 
 def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
     """Return the undistorted camera of the focal length that fits best; None if none fits."""
     few = views[:: -(-len(views) // _START_VIEWS)]
+    focals_px = _FOCAL_WIDTHS * few[0].size[0]
+    cameras = [undistorted_camera(lens, few[0].size, focal_px) for focal_px in focals_px]
+    if lens != "fisheye":
+        return cameras[_best_focal(few, cameras[0], focals_px)]
     best, least_px = None, np.inf
-    for width in _FOCAL_WIDTHS:
-        camera = undistorted_camera(lens, few[0].size, width * few[0].size[0])
+    for camera in cameras:
         poses = [first_pose(seen, camera) for seen in few]
         off_px = [
             seen.pixels - pixels_of(seen.points_m, as_vector(pose), camera)
@@ -164,6 +168,29 @@ def _first_camera(views: Sequence[BoardView], lens: LensModel) -> Camera | None:
             if middle_px < least_px:
                 best, least_px = camera, middle_px
     return best
+
+
+def _best_focal(views: Sequence[BoardView], camera: Camera, focals_px: Float64) -> int:
+    """Return the number of the focal length (F,) with the least median error without distortion.
+
+    The pose of each view comes from its homography (Zhang 2000, section 3.1), which all focal
+    lengths share.
+    """
+    off_px = []
+    for seen in views:
+        target_px = seen.pixels - [camera.cx, camera.cy]
+        H = cv2.findHomography(seen.points_m[:, :2], target_px)[0]
+        if H is None:
+            return len(focals_px) // 2
+        columns = H / np.stack([focals_px, focals_px, np.ones_like(focals_px)], 1)[:, :, None]
+        lengths = np.linalg.norm(columns[:, :, :2], axis=1)
+        columns = columns / np.sqrt(lengths.prod(axis=1))[:, None, None]
+        a, b, t = columns.transpose(2, 0, 1)
+        U, _, Vt = np.linalg.svd(np.stack([a, b, np.cross(a, b)], axis=2))
+        in_camera_m = seen.points_m @ (U @ Vt).swapaxes(1, 2) + t[:, None]
+        predicted = in_camera_m[:, :, :2] / in_camera_m[:, :, 2:] * focals_px[:, None, None]
+        off_px.append(np.linalg.norm(predicted - target_px, axis=2))
+    return int(np.median(np.concatenate(off_px, axis=1), axis=1).argmin())
 
 
 def _rms_px(seen: BoardView, pose: Float64, fit: Adjusted) -> float:

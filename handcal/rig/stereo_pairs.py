@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import invert, rigid
+from handcal.geometry import rigid
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import Setup, Sighting, adjust, as_transform, as_vector
 from handcal.rig.fit import rms
@@ -48,7 +48,7 @@ class Alone:
     @property
     def T_H_D(self) -> Float64:
         """The cameras' pose by each pair, (N, 4, 4)."""
-        return np.stack([H @ invert(D) for H, D in zip(self.T_H_B, self.T_D_B, strict=True)])
+        return np.asarray(self.T_H_B @ np.linalg.inv(self.T_D_B), np.float64)
 
 
 def found_by_both(pairs: Sequence[tuple[BoardImage, BoardImage]]) -> dict[str, Pair]:
@@ -136,15 +136,16 @@ def each_alone(
 
 def middle(T_H_D: Float64) -> int:
     """Return which of the poses (N, 4, 4) is nearest to the others."""
-    each = np.stack([_apart(differences(T, T_H_D)) for T in T_H_D])
+    each = _apart(differences(T_H_D[:, None], T_H_D))
     return int(np.median(each, axis=1).argmin())
 
 
 def differences(T: Float64, others: Float64) -> Float64:
-    """Return rotation (rad) and distance (m) between `T` and each of (N, 4, 4) others, (N, 2)."""
-    turns = Rotation.from_matrix(others[:, :3, :3]) * Rotation.from_matrix(T[:3, :3]).inv()
-    shifts_m = np.linalg.norm(others[:, :3, 3] - T[:3, 3], axis=1)
-    return np.stack([turns.magnitude(), shifts_m], axis=1)
+    """Return rotation (rad) and distance (m) between poses (…, 4, 4), (…, 2)."""
+    turns = others[..., :3, :3] @ T[..., :3, :3].swapaxes(-1, -2)
+    turned_rad = Rotation.from_matrix(turns.reshape(-1, 3, 3)).magnitude()
+    shifts_m = np.linalg.norm(others[..., :3, 3] - T[..., :3, 3], axis=-1)
+    return np.stack([turned_rad.reshape(shifts_m.shape), shifts_m], axis=-1)
 
 
 def why_apart(both: Mapping[str, Pair], alone: Alone, joint_px: Float64) -> tuple[str, bool]:
@@ -197,8 +198,8 @@ def why_apart(both: Mapping[str, Pair], alone: Alone, joint_px: Float64) -> tupl
 
 
 def _apart(differences: Float64) -> Float64:
-    """Return the differences (N, 2) as one number each: 1 is as much as good pairs may differ."""
-    worst: Float64 = np.max(differences / [_DISAGREE_RAD, _DISAGREE_M], axis=1)
+    """Return the differences (…, 2) as one number each: 1 is as much as good pairs may differ."""
+    worst: Float64 = np.max(differences / [_DISAGREE_RAD, _DISAGREE_M], axis=-1)
     return worst
 
 

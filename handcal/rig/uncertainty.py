@@ -185,32 +185,26 @@ def candidate_views(camera: Camera, points_m: Float64) -> tuple[list[str], Float
     middle_m = (points_m.min(axis=0) + points_m.max(axis=0)) / 2
     width_m = float(np.ptp(points_m[:, 0]))
     size = np.array([camera.width, camera.height])
-    tilts = {how: rigid(_TILT_RAD * np.array([*axis, 0.0]))[:3, :3] for how, axis in _TILTS.items()}
+    tilts = [rigid(_TILT_RAD * np.array([*axis, 0.0]))[:3, :3] for axis in _TILTS.values()]
     planes = to_plane(np.array(list(_PLACES.values())) * size, camera)
-    turns = []
-    for where, plane in zip(_PLACES, planes, strict=True):
-        ray = np.array([*plane, 1.0]) / np.linalg.norm([*plane, 1.0])
-        facing = _facing(ray)
-        for how, tilt in tilts.items():
-            turn = facing @ tilt
-            turns.append((f"{where}, {how}", ray, turn, cv2.Rodrigues(turn)[0].ravel()))
-    words, poses, placed_m, distances_m = [], [], [], []
+    rays = np.column_stack([planes, np.ones(len(planes))])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    turns = np.stack([_facing(ray) @ tilt for ray in rays for tilt in tilts])
+    rotations = np.stack([cv2.Rodrigues(turn)[0].ravel() for turn in turns])
+    how = [f"{where}, {tilted}" for where in _PLACES for tilted in _TILTS]
+    words, poses = [], []
     for share in _WIDTH_SHARES:
         distance_m = camera.fx * width_m / (share * camera.width)
-        for how, ray, turn, rotation in turns:
-            words.append(f"{how}, {100 * share:.0f} % of the image wide")
-            poses.append(np.concatenate([rotation, distance_m * ray - turn @ middle_m]))
-            placed_m.append(points_m @ turn.T + poses[-1][3:])
-            distances_m.append(distance_m)
-    in_camera_m = np.stack(placed_m)
-    pixels = pixels_of(in_camera_m.reshape(-1, 3), np.zeros(6), camera)
-    is_seen = _inside(pixels.reshape(*in_camera_m.shape[:2], 2), camera)
-    shown = (in_camera_m[:, :, 2].min(axis=1) > 0.1 * np.array(distances_m)) & (
-        is_seen.mean(axis=1) > _LEAST_SEEN_SHARE
-    )
-    return [one for one, is_shown in zip(words, shown, strict=True) if is_shown], np.array(poses)[
-        shown
-    ]
+        shift_m = distance_m * np.repeat(rays, len(tilts), axis=0) - turns @ middle_m
+        in_camera_m = points_m @ turns.swapaxes(1, 2) + shift_m[:, None]
+        pixels = pixels_of(in_camera_m.reshape(-1, 3), np.zeros(6), camera)
+        is_seen = _inside(pixels.reshape(*in_camera_m.shape[:2], 2), camera)
+        is_shown = in_camera_m[:, :, 2].min(axis=1) > 0.1 * distance_m
+        is_shown &= is_seen.mean(axis=1) > _LEAST_SEEN_SHARE
+        ending = f", {100 * share:.0f} % of the image wide"
+        words += [how[number] + ending for number in np.flatnonzero(is_shown)]
+        poses.append(np.hstack([rotations, shift_m])[is_shown])
+    return words, np.concatenate(poses)
 
 
 def _facing(ray: Float64) -> Float64:

@@ -5,6 +5,8 @@
 # network. With DISPLAY set, the window is shown there; otherwise Qt draws it in memory.
 set -euo pipefail
 folder=$1 package=$2
+name=${package##*/}
+name=${name%%_*}
 cp "$package" "$folder/root/"
 screen=QT_QPA_PLATFORM=offscreen
 [[ -n ${DISPLAY:-} ]] && screen=DISPLAY=$DISPLAY
@@ -26,6 +28,10 @@ if grep -q 'Traceback\|No such file' "$log"; then
 fi
 find "$folder/root/demo" -name '*.pdf' -o -name '*.svg' -o -name results.json | sort
 test -n "$(find "$folder/root/demo" -name '*.pdf')"
-inside apt-get remove -y -qq handcal
+if [[ $name == handcal-open3d ]]; then
+    session=$(echo "$folder"/root/demo/session-*[0-9])
+    inside handcal inspect "${session#"$folder"}" --picture /root/view.png
+fi
+inside apt-get remove -y -qq "$name"
 test ! -e "$folder/opt/handcal" -a ! -e "$folder/usr/bin/handcal"
 echo "smoke test passed"

@@ -67,7 +67,7 @@ def test_the_newest_snapshot_waits_and_no_old_one(qtbot: QtBot) -> None:
         assert cast(int, engine.newest()[0]) >= 20
 
 
-def test_a_new_snapshot_is_signalled_of_once_until_it_is_taken(qtbot: QtBot) -> None:
+def test_a_new_snapshot_is_signalled_once_until_it_is_taken(qtbot: QtBot) -> None:
     station = FakeStation()
     told: list[int] = []
     with streaming(qtbot, station) as engine:
