@@ -1393,10 +1393,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Send the projections to the headset, those of {} offline.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The alignments have changed. Solve again.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1482,6 +1478,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send the projections to the headset; {} keeps the offline calibration.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -137,9 +137,9 @@ def solve_view(snapshot: Snapshot) -> WizardView:
         instruction = tr("Keep the offline calibration of {}.").format(eye_names(kept))
         send = ButtonSpec(Action.APPLY, tr("Keep offline"))
     elif kept:
-        instruction = tr("Send the projections to the headset, those of {} offline.").format(
-            eye_names(kept)
-        )
+        instruction = tr(
+            "Send the projections to the headset; {} keeps the offline calibration."
+        ).format(eye_names(kept))
     return WizardView(
         Step.SOLVE,
         instruction,

@@ -91,7 +91,7 @@ def test_no_key_sends_a_result_that_must_not_be_used(snapshot: Maker, name: Verd
         (
             "keep",
             "accept",
-            "Send the projections to the headset, those of the left eye offline.",
+            "Send the projections to the headset; the left eye keeps the offline calibration.",
             "Send to the headset",
         ),
     ],
