@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import sqlite3
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,8 @@ from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.types import CameraIdentity, Float64, Frame
 
 _BEGINNINGS = (b"SQLite format 3\0", b"#ROSBAG V")  # .db3, .bag
+_OPTION = re.compile(r"/option/([^/]*)/")
+_MOST_TOPICS = 10_000
 _POLL_MS = 100
 _COLOR_TIMEOUT_S = 1.0
 _SKIP_TIMEOUT_S = 10.0
@@ -78,6 +82,7 @@ class RecordingCamera(PlayedCamera):
     def _open(self) -> None:
         rs = librealsense()
         try:
+            _require_known_options(rs, self._path)
             self._depth = _Playback(rs, self._path, rs.stream.depth)
             color = self._depth.recorded_profile(rs.stream.color)
             if color is not None:
@@ -85,7 +90,7 @@ class RecordingCamera(PlayedCamera):
                 self._color = _ColorTrack(_Playback(rs, self._path, rs.stream.color), T_C_D)
             self.depth_intrinsics = intrinsics_of(self._depth.profile)
             self.identity = self._depth.identity()
-        except (CameraError, RuntimeError) as error:
+        except (CameraError, RuntimeError, sqlite3.Error) as error:
             self.close()
             raise CameraError(
                 f"{self._path} cannot be played as a RealSense recording with depth: {error}"
@@ -116,6 +121,24 @@ class RecordingCamera(PlayedCamera):
         self._stop()
         self._open()
         self._depth.skip_to(t_camera_ns * 1e-6 - _ROUNDING_MS)
+
+
+def _require_known_options(rs: Any, path: Path) -> None:
+    """Raise CameraError if a .db3 file has an option that librealsense does not know.
+
+    librealsense 2.58 never ends to read it.
+    """
+    if path.suffix.lower() != ".db3":
+        return
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as file:
+        topics = file.execute("SELECT name FROM topics LIMIT ?", (_MOST_TOPICS,)).fetchall()
+    known = {str(option).replace(" ", "_") for option in rs.option.__members__.values()}
+    recorded = {name for (topic,) in topics for name in _OPTION.findall(str(topic))}
+    if unknown := sorted(recorded - known):
+        raise CameraError(
+            f"it has the option {unknown[0][:40]!r}, which this pyrealsense2 does not know; "
+            "install that with which it was recorded"
+        )
 
 
 class _Playback:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sqlite3
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +76,18 @@ def test_missing_and_damaged_recordings_are_refused(tmp_path: Path) -> None:
     damaged.write_bytes(SQLITE + b"not a data base" * 100)
     with pytest.raises(CameraError, match="cannot be played"):
         RecordingCamera(damaged)
+
+
+def test_an_option_that_librealsense_does_not_know_is_refused(
+    tmp_path: Path, make_frames: MakeFrames
+) -> None:
+    path = tmp_path / "newer.db3"
+    record_db3(path, make_frames(2, False))
+    with closing(sqlite3.connect(path)) as file, file:
+        changed = file.execute("UPDATE topics SET name = replace(name, 'Depth_Units', 'Newest')")
+        assert changed.rowcount > 0
+    with pytest.raises(CameraError, match="option 'Newest', which this pyrealsense2 does not know"):
+        RecordingCamera(path)  # librealsense would never end
 
 
 def test_missing_librealsense_says_what_to_install(
