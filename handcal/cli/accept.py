@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from handcal.cli.boards import BOARD_OPTIONS, GRID_OPTION, board_of
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.rig import BOARD_OPTIONS, GRID_OPTION, board_of
 from handcal.cli.terminal import arg, command, number
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from handcal.cli.boards import GRID_OPTION
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.rig import GRID_OPTION
 from handcal.cli.terminal import arg, command, number
 from handcal.errors import CameraError, HandcalError
 from handcal.io.files import make_folder

@@ -11,63 +11,34 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
+from handcal.cli.boards import (
+    BOARD_OPTIONS,
+    GRID_OPTION,
+    board_of,
+    grid_of,
+    show_verdict,
+    show_views,
+    views_of,
+)
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
-from handcal.cli.output import console, show_progress, table, until_interrupted
+from handcal.cli.output import console, show_progress, until_interrupted
 from handcal.cli.terminal import arg, command, fail, number
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
-from handcal.rig.board import Board, BoardKind
 from handcal.rig.camera import LENS_CHOICES
 from handcal.rig.formats import CALIBRATION_FORMATS
 from handcal.rig.print_page import PAPERS
 from handcal.rig.views import MAX_VIEWS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable
 
-    from handcal.rig.grid import Grid
     from handcal.rig.verdict import CalibrationVerdict
-    from handcal.rig.views import BoardImage, WorstView
+    from handcal.rig.views import WorstView
 
 
-_BOARD = Board()
-_SIDE = number(float, 1.0, 1000.0)
-BOARD_OPTIONS = (
-    arg("--kind", choices=get_args(BoardKind), default=_BOARD.kind, help="kind of board"),
-    arg(
-        "--squares",
-        type=number(int, 3, 40),
-        nargs=2,
-        metavar=("COLUMNS", "ROWS"),
-        default=_BOARD.squares,
-        help="number of squares, not of inner corners",
-    ),
-    arg(
-        "--square-mm",
-        type=_SIDE,
-        metavar="MM",
-        default=1e3 * _BOARD.square_m,
-        help="measured side of a square",
-    ),
-    arg(
-        "--marker-mm",
-        type=_SIDE,
-        metavar="MM",
-        default=1e3 * _BOARD.marker_m,
-        help="measured side of a marker",
-    ),
-    arg("--dictionary", default=_BOARD.dictionary, help="ArUco dictionary of the markers"),
-    arg("--legacy", action="store_true", help="the board was made by OpenCV before 4.6"),
-)
-GRID_OPTION = arg(
-    "--square-px",
-    type=number(int, 20, 2000),
-    metavar="PX",
-    default=80,
-    help="side of the grid's squares",
-)
 _CALIBRATION_OPTIONS = (
     *BOARD_OPTIONS,
     arg(
@@ -324,71 +295,12 @@ def convert(arguments: argparse.Namespace) -> None:
     console.print(str(arguments.output), markup=False)
 
 
-def board_of(arguments: argparse.Namespace) -> Board:
-    """Return the board that the options describe; HandcalError if they contradict each other."""
-    try:
-        return Board(
-            kind=arguments.kind,
-            squares=tuple(arguments.squares),
-            square_m=arguments.square_mm / 1e3,
-            marker_m=arguments.marker_mm / 1e3,
-            dictionary=arguments.dictionary,
-            legacy=arguments.legacy,
-        )
-    except ValueError as error:
-        raise HandcalError(str(error)) from error
-
-
-def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
-    """Return the grid that the options describe; HandcalError if the display is too small."""
-    from handcal.rig.grid import grid_on
-
-    return grid_on(width_px, height_px, arguments.square_px)
-
-
-def views_of(
-    paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()
-) -> tuple[BoardImage, ...]:
-    """Look for a board in images, with progress; leave those out that are dropped."""
-    from handcal.rig.views import drop, image_files, read_views
-
-    with show_progress() as progress:
-        views = read_views(image_files(paths), board, progress)
-    return drop(views, dropped)
-
-
-def show_views(views: Iterable[BoardImage], residuals_px: Mapping[str, float]) -> None:
-    """Print the corners found in each image, and their residuals."""
-    shown = table("image", "corners", "residual, px", "blur, px")
-    for view in views:
-        found, off_px = view.found, residuals_px.get(view.name)
-        shown.add_row(
-            f"{view.name} (left out)" if view.dropped else view.name,
-            str(len(found.ids)) if found else "–",
-            "–" if off_px is None else f"{off_px:.2f}",
-            f"{found.blur_px:.1f}" if found else "–",
-        )
-    if shown.row_count:
-        console.print(shown)
-    for view in views:
-        if view.problem:
-            console.print(f"{view.name}: {view.problem}", markup=False)
-
-
 def _conclude(rms_px: float, worst: WorstView, verdict: CalibrationVerdict) -> None:
     console.print(
         f"RMS {rms_px:.3f} px. Worst: {worst.name}, {worst.rms_px:.2f} px: {worst.why}",
         markup=False,
     )
     show_verdict(verdict)
-
-
-def show_verdict(verdict: CalibrationVerdict) -> None:
-    """Print a verdict; HandcalError if it is bad, so that nothing is written."""
-    text = f"{verdict.name}: {verdict.reason}"
-    if verdict.name == "bad":
-        raise HandcalError(text)
-    console.print(text)
 
 
 def _write(

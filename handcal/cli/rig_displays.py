@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.cli.output import console
-from handcal.cli.rig import (
+from handcal.cli.boards import (
     BOARD_OPTIONS,
     GRID_OPTION,
     board_of,
@@ -17,6 +16,7 @@ from handcal.cli.rig import (
     show_views,
     views_of,
 )
+from handcal.cli.output import console
 from handcal.cli.rig_files import RIG_AND_OUTPUT, rig_or_example, write_rig_file
 from handcal.cli.terminal import arg, command, number, one_of
 from handcal.errors import HandcalError

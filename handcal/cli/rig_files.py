@@ -8,9 +8,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handcal.cli.boards import BOARD_OPTIONS, board_of, show_verdict
 from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.rig import BOARD_OPTIONS, board_of, show_verdict
 from handcal.cli.run import KEYS, LISTEN
 from handcal.cli.terminal import arg, command, number
 from handcal.errors import HandcalError

@@ -47,13 +47,21 @@ class BoardPainter:
         """Return an image (H, W) of the board at a pose in the camera's frame."""
         T_B_C = invert(T_C_B)
         directions = self._rays @ T_B_C[:3, :3].T.astype(np.float32)
+        at = []
         with np.errstate(divide="ignore", invalid="ignore"):
             reach = -T_B_C[2, 3] / directions[..., 2]
-            places_m = T_B_C[:2, 3] + reach[..., None] * directions[..., :2]
-        places_m[~(reach > 0)] = -1e3
-        # The texture's pixel centres are at integers; its margin is one square.
-        at = (places_m / self._board.square_m + 1) * _SQUARE_PX - 0.5
-        x, y = np.moveaxis(np.clip(at, -1e4, 1e4).astype(np.float32), 2, 0)
+            is_behind = ~(reach > 0)
+            for axis in (0, 1):
+                place = reach * directions[..., axis]  # in place from here: several times faster
+                place += T_B_C[axis, 3]
+                place[is_behind] = -1e3
+                # The texture's pixel centres are at integers; its margin is one square.
+                place /= self._board.square_m
+                place += 1
+                place *= _SQUARE_PX
+                place -= 0.5
+                at.append(np.clip(place, -1e4, 1e4, out=place).astype(np.float32))
+        x, y = at
         fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=WALL)
         size = self._camera.width, self._camera.height
         image = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.float32)

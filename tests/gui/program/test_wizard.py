@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton, QWidget
 
 from handcal.station.procedure import State
+from handcal_gui.pages.wizard import step_views, steps
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.preferences import PreferencesFile
 from tests.gui.program.technician import Technician, align, is_turned, shown_checks, solve_and_apply
@@ -49,7 +51,12 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     assert stored.station == studio.settings
 
 
-def test_steps_run_by_themselves_after_one_press(live: Technician, studio: Any) -> None:
+def test_steps_run_by_themselves_after_one_press(
+    live: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (steps, step_views):
+        for name in ("SHOWN_S", "STILL_S", "READ_S"):
+            monkeypatch.setattr(module, name, 0.2)  # test_automatic.py tests how long they wait
     QTest.keyClick(live.program.window, Qt.Key.Key_H)  # the station is held at first
     live.press_space_for(Action.NEXT)
     for eye in ("left", "right"):
