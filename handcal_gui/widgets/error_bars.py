@@ -15,7 +15,7 @@ from handcal_gui.theme import Colors, colors
 from handcal_gui.translation import tr
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS
 
-PICTURE_PX = QSize(56, 23)
+PICTURE_PX = QSize(40, 23)
 _BAR_PX = 4
 _SCALE_ARCMIN = 30.0
 """Error of a bar as wide as the picture, the same for all sessions; larger ones are cut."""

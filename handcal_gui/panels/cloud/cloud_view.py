@@ -126,8 +126,9 @@ class CloudView(QWidget):
         painter.drawPixmap(0, 0, self._draw_backdrop(self._box))
         self._paint_points(painter)
         self._paint_lines(painter)
-        top = SPACING_PX + self.fontMetrics().ascent()  # the scale bar is at the bottom
-        painter.drawText(QPointF(SPACING_PX, top), self._text)
+        if self._is_labelled:  # the caption explains the labels
+            top = SPACING_PX + self.fontMetrics().ascent()  # the scale bar is at the bottom
+            painter.drawText(QPointF(SPACING_PX, top), self._text)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Start dragging."""

@@ -340,6 +340,7 @@ class FineTunePanel(QWidget):
             _row(
                 *(show, self._show_solved, self._show_offline, None),
                 *(reset, self.reset_action, self._reset_offline),
+                spacing=SPACING_PX // 2,
             ),
             hint,
             1,
@@ -364,10 +365,10 @@ class _QuietScrollArea(QScrollArea):
         event.ignore()
 
 
-def _row(*items: QWidget | QAction | None) -> QHBoxLayout:
+def _row(*items: QWidget | QAction | None, spacing: int = SPACING_PX) -> QHBoxLayout:
     """Return a row of widgets and buttons for actions; None is a stretch."""
     row = QHBoxLayout()
-    row.setSpacing(SPACING_PX)
+    row.setSpacing(spacing)
     for item in items:
         if item is None:
             row.addStretch(1)

@@ -441,8 +441,8 @@ def test_every_field_has_a_name_and_an_explanation(panel: FineTunePanel) -> None
     }
 
 
-def test_a_low_panel_needs_no_scrolling(panel: FineTunePanel, show: Show) -> None:
-    panel.resize(384, 304)
+def test_a_small_panel_needs_no_scrolling(panel: FineTunePanel, show: Show) -> None:
+    panel.resize(360, 304)
     show()
     QApplication.processEvents()
     [area] = panel.findChildren(QScrollArea)
