@@ -373,7 +373,7 @@ class _Problem:
         return U, W, V, g_shared, g_own
 
     def foreseen(self, setup: Setup) -> tuple[Float64, Float64]:
-        """Return the function of this name's result, if all detected pixels are 0."""
+        """Return what `foreseen` does; all detected pixels are 0."""
         count, frames = self._count, self._frames
         normal, shares = np.zeros((frames, count + 6, count + 6)), []
         for camera, corners, rows in zip(
@@ -403,17 +403,6 @@ class _Problem:
             place = place + shared[:6]
         poses = tuple(pose + move for pose, move in zip(setup.poses, own, strict=True))
         return replace(setup, cameras=tuple(cameras), poses=poses, place=place)
-
-
-def board_in(setup: Setup, frame: int, camera: int) -> Float64:
-    """Return the board's pose (6,) in a camera's frame."""
-    board = setup.poses[frame]
-    if camera == 0 or setup.place is None:
-        return board
-    rotation, translation = cv2.composeRT(board[:3], board[3:], setup.place[:3], setup.place[3:])[
-        :2
-    ]
-    return np.concatenate([rotation.ravel(), translation.ravel()])
 
 
 def _step(

@@ -3,7 +3,7 @@ import pytest
 
 from handcal.rig.board import Board
 from handcal.rig.lens import Camera, LensModel, predict, to_plane
-from handcal.rig.lens_fit import best_lens, compare_lenses
+from handcal.rig.lens_fit import _FOCAL_WIDTHS, _first_camera, best_lens, compare_lenses
 from handcal.sim.boards import board_poses, board_view
 from handcal.types import Float64, Intrinsics
 
@@ -34,6 +34,17 @@ def error_px(camera: Camera, true: Camera) -> float:
     off: Float64 = (predict(rays, np.zeros(6), camera)[0] - seen_px).ravel()
     off = off - by[:, :3] @ np.linalg.lstsq(by[:, :3], off, rcond=None)[0]
     return float(np.sqrt(2.0 * np.mean(off**2)))
+
+
+@pytest.mark.parametrize("number", [1, 3, 6])
+def test_the_first_focal_length_is_the_nearest_of_those_tried(number: int) -> None:
+    focal_px = float(640 * _FOCAL_WIDTHS[number])
+    camera = Intrinsics(640, 480, focal_px, focal_px, 319.5, 239.5)
+    rng = np.random.default_rng(number)
+    poses = board_poses(BOARD, camera, 6, rng)
+    first = _first_camera([board_view(BOARD, T, camera, rng, 0.1) for T in poses], "full")
+    assert first is not None
+    assert first.fx == pytest.approx(focal_px)
 
 
 def test_a_lens_without_distortion_is_not_given_any() -> None:

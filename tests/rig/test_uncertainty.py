@@ -3,12 +3,13 @@ import pytest
 
 from handcal.geometry import image_points, rigid
 from handcal.rig.board import Board, corners_m
+from handcal.rig.bundle import Setup, as_transform, as_vector, foreseen
 from handcal.rig.camera import CameraCalibration, calibrate_camera
-from handcal.rig.lens import parameters, solved_parameters, to_plane
-from handcal.rig.uncertainty import next_view
+from handcal.rig.lens import parameters, pixels_of, solved_parameters, to_plane, with_parameters
+from handcal.rig.uncertainty import candidate_views, next_view
 from handcal.rig.views import BoardImage
 from handcal.sim.boards import board_poses, board_view
-from handcal.types import Intrinsics
+from handcal.types import Float64, Intrinsics
 
 BOARD = Board()
 CAMERA = Intrinsics(640, 480, 532.0, 531.0, 325.0, 238.0, (-0.25, 0.08, 0.0008, -0.0005, -0.01))
@@ -46,6 +47,44 @@ def test_the_uncertainty_is_as_the_errors_are() -> None:
         assert result.uncertainty is not None
         ratios.append(_projection_error_px(result) / result.uncertainty.middle_px)
     assert 0.4 < np.mean(ratios) < 1.6
+
+
+def test_what_pairs_would_tell_is_as_by_differences() -> None:
+    points_m = corners_m(BOARD)
+    place = np.array([0.02, -0.03, 0.01, -0.08, 0.005, 0.01])
+    _, poses = candidate_views(CAMERA, points_m)
+    poses = poses[[0, 44, -1]]
+    setup = Setup((CAMERA, CAMERA), tuple(poses), place)
+    found, seen_share = foreseen(points_m, setup, (None, "radial"))
+
+    def pixels(values: Float64, camera: int) -> Float64:
+        """Pixels by the place, the second camera's parameters and the board's pose."""
+        if camera == 0:
+            return pixels_of(points_m, values[12:], CAMERA)
+        in_second = as_vector(as_transform(values[:6]) @ as_transform(values[12:]))
+        solved = np.array([*values[6:12], *CAMERA.distortion[2:]])
+        return pixels_of(points_m, in_second, with_parameters(CAMERA, solved))
+
+    for number, pose in enumerate(poses):
+        at = np.concatenate([place, parameters(CAMERA)[:6], pose])
+        steps = 1e-6 * np.maximum(np.abs(at), 0.1)
+        rows, shares = [], []
+        for camera in (0, 1):
+            by = [
+                (pixels(at + step, camera) - pixels(at - step, camera)) / (2.0 * step.max())
+                for step in np.diag(steps)
+            ]
+            here = pixels(at, camera)
+            seen = ((here > 0) & (here < [CAMERA.width - 1, CAMERA.height - 1])).all(axis=1)
+            rows.append(np.stack(by, axis=2)[seen].reshape(-1, len(at)))
+            shares.append(seen.mean())
+        J = np.concatenate(rows)
+        basis, _ = np.linalg.qr(J[:, 12:])
+        shared = J[:, :12] - basis @ (basis.T @ J[:, :12])
+        scale = np.sqrt(np.diag(shared.T @ shared))
+        expected = shared.T @ shared / np.outer(scale, scale)
+        np.testing.assert_allclose(found[number] / np.outer(scale, scale), expected, atol=1e-4)
+        np.testing.assert_allclose(seen_share[number], shares)
 
 
 @pytest.mark.parametrize("seed", range(5))
