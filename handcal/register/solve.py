@@ -86,7 +86,7 @@ def solve_eye_shift(
     ...     hand_cut=alignment.hand_is_cut,
     ... )
     >>> print(shift)
-    φ = (-4.13 ± 0.26, +0.89 ± 0.22, +0.17 ± 0.44) mm; rms 1.42 mm, 97 % inliers, converged
+    φ = (-4.20 ± 0.27, +0.90 ± 0.20, +0.16 ± 0.62) mm; rms 1.42 mm, 97 % inliers, converged
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
