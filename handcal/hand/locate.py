@@ -48,6 +48,10 @@ _PROFILE_M = (-0.02, 0.16)
 _LIMB_WIDTH_M, _ARM_RADIUS_M = 0.03, 0.014  # a narrower limb is no arm; a finger is 24 mm wide
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
 _GAP_M, _JUMP_M = 0.015, 0.05
+# One no larger than a finger may be as far before or behind as a finger is long.
+_FINGER_M2, _FINGER_M = 0.002, 0.08
+# Gaps that are closed before circles are inscribed, to each side.
+_CLOSED_M = 0.0035
 PART_M2 = 5e-5
 """Least area of such a part."""
 # A detector's box weighs places by their distance from its middle, with this share of its sides as
@@ -218,14 +222,21 @@ def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
     surface = parts.labels == main
     pitch_m = _pitch(view) * float(view.depth[surface].mean()) * view.scale_m
     size_px = parts.stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
-    may_join = parts.stats[:, cv2.CC_STAT_AREA] >= PART_M2 / pitch_m**2
+    areas_m2 = parts.stats[:, cv2.CC_STAT_AREA] * pitch_m**2
+    may_join = areas_m2 >= PART_M2
     may_join &= size_px <= _HAND_REACH_M / pitch_m
     may_join[[0, main]] = False
     if may_join.any():
-        surface = _joined(parts, surface, may_join, max(1, round(_GAP_M / pitch_m)))
+        jump_m = np.where(areas_m2 <= _FINGER_M2, _FINGER_M, _JUMP_M)
+        surface = _joined(parts, surface, may_join, max(1, round(_GAP_M / pitch_m)), jump_m)
     part_view, place = crop_view(view, surface, margin=3)
     surface = np.ascontiguousarray(surface[place])
-    closed = cv2.morphologyEx(surface.view(np.uint8), cv2.MORPH_CLOSE, NEIGHBOURS, iterations=2)
+    closed = cv2.morphologyEx(
+        surface.view(np.uint8),
+        cv2.MORPH_CLOSE,
+        NEIGHBOURS,
+        iterations=max(1, round(_CLOSED_M / pitch_m)),
+    )
     pixels = pixels_of(surface)
     points_m = deproject(part_view, *pixels)
     # Infinite without an edge.
@@ -234,8 +245,8 @@ def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
     return _Limb(part_view, pixels, points_m, radius_m, parts.ends[place][pixels]), place
 
 
-def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int) -> Bool:
-    """Return a surface with those parts that lie beside it at nearly the same depth."""
+def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int, jump_m: Float64) -> Bool:
+    """Return a surface with those parts beside it that are no more than `jump_m`, (N,), off it."""
     view, is_limb = parts.view, np.zeros(len(parts.stats), bool)
     near = _widened(surface, gap_px)
     beside = np.bincount(parts.labels[near], minlength=len(parts.stats)) > 0
@@ -243,7 +254,7 @@ def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int) -> Bool:
         other = near & (parts.labels == part)
         opposite = surface & _widened(other, gap_px)
         jump = view.depth[other].mean() - view.depth[opposite].mean()
-        is_limb[part] = abs(jump) * view.scale_m <= _JUMP_M
+        is_limb[part] = abs(jump) * view.scale_m <= jump_m[part]
     return surface | is_limb[parts.labels]
 
 

@@ -20,6 +20,7 @@ from handcal.lab.evaluate.masked_frames import (
     cropped,
     read_masked_frames,
     read_masked_names,
+    scaled,
     subsampled,
 )
 from handcal.types import Frame, HandCloud
@@ -131,6 +132,21 @@ def test_a_few_pixels_off_a_real_frame_change_little(
     expected = in_color(shot.frame)
     found = HandFinder(SETTINGS, load_detector_once()).find(cropped(shot.frame, *crop))
     assert abs(area_change(found, expected)) < 0.05
+
+
+def test_a_coarser_real_frame_shows_the_same_hand(shared_data: Path) -> None:
+    """A finger behind a bent one stays, and gaps between fingers are closed alike."""
+    for shot in real(shared_data / "rgbd/sr300_320"):
+        expected = sight(in_color(shot.frame), shot.frame)
+        for coarser in (scaled(shot.frame, 0.8), subsampled(shot.frame, 2, 0, 1)):
+            found = sight(HandFinder(SETTINGS, load_detector_once()).find(coarser), coarser)
+            assert found == pytest.approx(expected, rel=0.04)
+
+
+def sight(hand: HandCloud, frame: Frame) -> float:
+    """Return the area of a hand's mask at a depth of 1 m."""
+    camera = frame.depth_intrinsics
+    return float(np.count_nonzero(hand.mask) / (camera.fx * camera.fy))
 
 
 @pytest.mark.parametrize("name", KNOWN)
