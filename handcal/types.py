@@ -297,7 +297,7 @@ class EyeShift:
 
 
 def phi_text(shift: EyeShift) -> str:
-    """Return φ ± σ in one line: ``φ = (-3.91 ± 0.69, +0.74 ± 0.66, +1.91 ± 1.90) mm``."""
+    """Return φ ± σ in one line: ``φ = (-3.96 ± 0.70, +0.83 ± 0.67, +2.29 ± 1.86) mm``."""
     return f"φ = ({', '.join(_coordinates_mm(shift))}) mm"
 
 
