@@ -75,7 +75,7 @@ def test_a_new_snapshot_is_announced_once_until_it_is_taken(qtbot: QtBot) -> Non
     def take_and_step_on(engine: EngineThread) -> int:
         engine.newest()
         seen = station.steps
-        qtbot.waitUntil(lambda: station.steps > seen + 20)
+        qtbot.waitUntil(lambda: station.steps > seen + 20, timeout=20_000)
         QCoreApplication.processEvents()
         return len(told)
 
