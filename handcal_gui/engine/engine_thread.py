@@ -71,12 +71,12 @@ class EngineThread(Worker):
         self._commands: queue.SimpleQueue[tuple[str, Command]] = queue.SimpleQueue()
         self._submitted = self._done = 0
         self._newest: tuple[Snapshot | None, int] = None, 0
-        self._is_told = False
+        self._is_announced = False
         self._closing = threading.Event()
 
     def newest(self) -> tuple[Snapshot | None, int]:
         """Return the newest snapshot, None before the first, and the number of commands in it."""
-        self._is_told = False  # first, so that a snapshot that arrives meanwhile is signalled
+        self._is_announced = False  # first, so that one that arrives meanwhile is announced
         return self._newest
 
     def submit(self, name: str, command: Command) -> int:
@@ -110,8 +110,8 @@ class EngineThread(Worker):
                 try:
                     while not self._closing.is_set():
                         self._newest = station.step(), self._done
-                        if not self._is_told:
-                            self._is_told = True
+                        if not self._is_announced:
+                            self._is_announced = True
                             self._emit_later(self.arrived.emit)
                         self._run_commands(station)
                 finally:

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, cast
 
 import pytest
+from PySide6.QtCore import QCoreApplication
 from pytestqt.qtbot import QtBot
 
 from handcal.bridge.bridge import Bridge
@@ -67,19 +68,21 @@ def test_the_newest_snapshot_waits_and_no_old_one(qtbot: QtBot) -> None:
         assert cast(int, engine.newest()[0]) >= 20
 
 
-def test_a_new_snapshot_is_signalled_once_until_it_is_taken(qtbot: QtBot) -> None:
+def test_a_new_snapshot_is_announced_once_until_it_is_taken(qtbot: QtBot) -> None:
     station = FakeStation()
     told: list[int] = []
+
+    def take_and_step_on(engine: EngineThread) -> int:
+        engine.newest()
+        seen = station.steps
+        qtbot.waitUntil(lambda: station.steps > seen + 20, timeout=20_000)
+        QCoreApplication.processEvents()
+        return len(told)
+
     with streaming(qtbot, station) as engine:
         engine.arrived.connect(lambda: told.append(station.steps))
-        qtbot.waitUntil(lambda: station.steps > 20)
-        before = len(told)
-        engine.newest()
-        qtbot.waitUntil(lambda: len(told) > before)
-        seen = station.steps
-        qtbot.waitUntil(lambda: station.steps > seen + 20)
-        assert len(told) == before + 1
-    assert before <= 1
+        before = take_and_step_on(engine)
+        assert take_and_step_on(engine) == before + 1
 
 
 def test_it_tells_which_commands_the_newest_snapshot_shows(qtbot: QtBot) -> None:
