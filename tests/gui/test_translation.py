@@ -36,8 +36,8 @@ SETTERS = {
 }  # fmt: skip
 """Functions that show a text."""
 WITH_IDENTIFIER = {
-    "PathField", "addAction", "addItem", "button", "choice", "main_button", "number", "paragraph",
-    "whole_number", "with_name",
+    "NumberTable", "PathField", "addAction", "addItem", "button", "choice", "main_button", "number",
+    "paragraph", "whole_number", "with_name",
 }  # fmt: skip
 """Those that also take an identifier, such as an object name."""
 NAMES = {"handcal", "OpenIGTLink", "LSL", "mm", "pairing.key"}
