@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -12,7 +12,7 @@ from handcal_gui.translation import tr
 
 _PLENTY = 6
 """Number of views from which on a cell has its full colour."""
-_SIDE_PX = 20
+_CELL_PX = 20, 16
 
 
 class CoverageMap(QWidget):
@@ -37,7 +37,8 @@ class CoverageMap(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._title = title
         self._coverage: Coverage | None = None
-        self.setFixedSize(8 * _SIDE_PX + 1, 6 * _SIDE_PX + 3 * SPACING_PX + 1)
+        width, height = _CELL_PX
+        self.setFixedSize(8 * width + 1, 6 * height + 3 * SPACING_PX + 1)
 
     def show_coverage(self, coverage: Coverage | None) -> None:
         """Show the coverage; None if there are no corners yet."""
@@ -60,10 +61,10 @@ class CoverageMap(QWidget):
         font = painter.font()
         font.setPointSizeF(0.8 * font.pointSizeF())
         painter.setFont(font)
+        width, height = _CELL_PX
         for row in range(6):
             for column in range(8):
-                corner = QPointF(column * _SIDE_PX, row * _SIDE_PX + 3 * SPACING_PX)
-                cell = QRectF(corner.x(), corner.y(), _SIDE_PX, _SIDE_PX)
+                cell = QRectF(column * width, row * height + 3 * SPACING_PX, width, height)
                 self._paint_cell(painter, cell, self._hits(row, column))
         painter.end()
 

@@ -11,7 +11,7 @@ from handcal.rig.uncertainty import GRID, ProjectionUncertainty
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr
 
-_WIDTH_PX, _HEIGHT_PX = 160, 120
+_WIDTH_PX, _HEIGHT_PX = 160, 96
 _LARGE_PX = 1.0
 """Uncertainty from which on a cell has its full colour."""
 

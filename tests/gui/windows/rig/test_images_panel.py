@@ -176,6 +176,6 @@ def test_the_uncertainty_of_a_solved_camera_is_shown(qtbot: QtBot, panel: Images
     assert all(one.isVisible() for one in maps)
     assert not any(one.isVisible() for one in panel.findChildren(CoverageMap))
     image = maps[0].grab().toImage()
-    top = maps[0].height() - 120 + 4
+    top = maps[0].height() - 96 + 4
     uncertain, known = (QColor(image.pixel(x, top)).lightness() for x in (6, 34))
     assert uncertain < known
