@@ -61,7 +61,8 @@ class BoardPainter:
                 place *= _SQUARE_PX
                 place -= 0.5
                 at.append(np.clip(place, -1e4, 1e4, out=place).astype(np.float32))
-        fine = cv2.remap(self._texture, *at, cv2.INTER_LINEAR, borderValue=WALL)
+        x, y = at
+        fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=WALL)
         size = self._camera.width, self._camera.height
         image = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.float32)
         return expose(image, self._settings, rng)

@@ -24,6 +24,7 @@ from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose
 from handcal.rig.views import ViewsError
 from handcal.rig_types import EyeDisplay
+from handcal.sim.boards import PictureSettings
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA as CAMERA
 from handcal.sim.viewpoint import photograph_display
 from handcal.types import Float64
@@ -184,7 +185,14 @@ def test_images_of_another_resolution_are_refused() -> None:
 
 def test_a_rendered_display_is_found_to_a_tenth_of_a_pixel() -> None:
     grid = Grid(*SIZE)
-    image = photograph_display(draw_grid(grid), DISPLAY, R_E_C, CAMERA, np.random.default_rng(1))
+    image = photograph_display(
+        draw_grid(grid),
+        DISPLAY,
+        R_E_C,
+        CAMERA,
+        np.random.default_rng(1),
+        settings=PictureSettings(samples=1),
+    )
     homography = fit_homography({"a": find_grid(image, grid)}, CAMERA, *SIZE)
     truth = fit_homography({"a": seen(DISPLAY, R_E_C)}, CAMERA, *SIZE)
     corners = np.array([[0.0, 0.0, 1.0], [SIZE[0] - 1.0, SIZE[1] - 1.0, 1.0]])
