@@ -60,7 +60,9 @@ def drawings() -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules["drawings"] = module
-    spec.loader.exec_module(module)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "dont_write_bytecode", True)  # docs/ is packaged as it is
+        spec.loader.exec_module(module)
     return module
 
 
