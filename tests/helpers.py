@@ -60,7 +60,7 @@ def _slowness() -> float:
     return max(1.0, wall_s / max(worked_s, 1e-6))
 
 
-def slow_simulator(patch: pytest.MonkeyPatch, rate_hz: float = 6.0) -> None:
+def slow_simulator(patch: pytest.MonkeyPatch, rate_hz: float = 10.0) -> None:
     """Let this process's simulated cameras give few frames a second.
 
     A calibration in real time costs what its frames cost, and is robust to a slow camera.

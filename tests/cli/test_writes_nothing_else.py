@@ -120,7 +120,7 @@ import contextlib, io, json, sys
 from handcal.cli.main import main
 from handcal.sim.camera import CAMERA_FAULTS, SyntheticSettings
 
-CAMERA_FAULTS[""] = SyntheticSettings(rate_hz=6.0)  # what costs most is the frames
+CAMERA_FAULTS[""] = SyntheticSettings(rate_hz=10.0)  # what costs most is the frames
 
 for command, words in json.loads(sys.stdin.read()).items():
     sys.argv, code = ["handcal", *words], 0

@@ -36,7 +36,7 @@ HELD_UP = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
 SLOWLY = """
 import runpy, sys
 from handcal.sim.camera import CAMERA_FAULTS, SyntheticSettings
-CAMERA_FAULTS[""] = SyntheticSettings(rate_hz=6.0)
+CAMERA_FAULTS[""] = SyntheticSettings(rate_hz=10.0)
 sys.argv = sys.argv[1:]
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
