@@ -127,6 +127,14 @@ def test_an_invitation_with_digits_is_used_once(start: Start, server: HeadsetSer
     assert faults(told) == []
 
 
+def test_a_name_that_is_none_is_said(start: Start) -> None:
+    app = start()
+    app.until(lambda told: told["keyboard"])
+    app.do(f"type {'x' * 300} 12345678")
+    told = app.until(lambda told: "cannot be reached" in told["text"].replace("/", " "))
+    assert (told["paired"], len(faults(told))) == ("False", 1)
+
+
 @pytest.mark.parametrize("parent", [None, (1.5, -0.3, 2.0, 0.9, 0.0, 0.3, 0.1, 2.5)])
 def test_points_are_drawn_where_the_eye_needs_them(
     start: Start, server: HeadsetServer, parent: tuple[float, ...] | None
