@@ -15,10 +15,10 @@ import numpy as np
 
 from handcal.frozen import freeze
 from handcal.rig.board import BoardView
-from handcal.rig.bundle import as_transform
 from handcal.rig.fit import rms
 from handcal.rig.lens import Camera, LensModel, as_pinhole, solved_parameters
 from handcal.rig.lens_fit import LensFit, best_lens, compare_lenses, fit_lens
+from handcal.rig.reprojection import as_transform
 from handcal.rig.uncertainty import ProjectionUncertainty, next_view
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import (

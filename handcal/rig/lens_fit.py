@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.rig.board import BoardView
-from handcal.rig.bundle import Adjusted, Setup, Sighting, adjust, as_vector
+from handcal.rig.bundle import Adjusted, adjust
 from handcal.rig.lens import (
     Camera,
     LensModel,
@@ -20,6 +20,7 @@ from handcal.rig.lens import (
     solved_parameters,
     undistorted_camera,
 )
+from handcal.rig.reprojection import Setup, Sighting, as_vector
 from handcal.rig.uncertainty import ProjectionUncertainty, projection_uncertainty
 from handcal.types import Float64
 

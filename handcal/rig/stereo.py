@@ -13,7 +13,7 @@ import numpy as np
 
 from handcal.frozen import freeze
 from handcal.rig.board import BoardView
-from handcal.rig.bundle import Adjusted, Setup, Sighting, adjust, as_transform, as_vector
+from handcal.rig.bundle import Adjusted, adjust
 from handcal.rig.camera import (
     CameraCalibration,
     CameraSettings,
@@ -23,6 +23,7 @@ from handcal.rig.camera import (
 )
 from handcal.rig.fit import rms
 from handcal.rig.lens import Camera, LensModel
+from handcal.rig.reprojection import Setup, Sighting, as_transform, as_vector
 from handcal.rig.stereo_pairs import (
     SWAPPED,
     Alone,

@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from handcal.geometry import rigid
 from handcal.rig.board import BoardView
-from handcal.rig.bundle import Setup, Sighting, adjust, as_transform, as_vector
+from handcal.rig.bundle import adjust
 from handcal.rig.fit import rms
 from handcal.rig.lens import Camera, first_pose
+from handcal.rig.reprojection import Setup, Sighting, as_transform, as_vector
 from handcal.rig.views import BoardImage, ViewsError, one_size
 from handcal.types import Float64
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from handcal.frozen import freeze
 from handcal.geometry import rigid
-from handcal.rig.bundle import Setup, foreseen
+from handcal.rig.bundle import foreseen
 from handcal.rig.lens import Camera, LensModel, pixels_of, predict, to_plane
+from handcal.rig.reprojection import Setup
 from handcal.types import Float64
 
 GRID = (12, 9)

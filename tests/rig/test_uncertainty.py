@@ -3,9 +3,10 @@ import pytest
 
 from handcal.geometry import image_points, rigid
 from handcal.rig.board import Board, corners_m
-from handcal.rig.bundle import Setup, as_transform, as_vector, foreseen
+from handcal.rig.bundle import foreseen
 from handcal.rig.camera import CameraCalibration, calibrate_camera
 from handcal.rig.lens import parameters, pixels_of, solved_parameters, to_plane, with_parameters
+from handcal.rig.reprojection import Setup, as_transform, as_vector
 from handcal.rig.uncertainty import candidate_views, next_view
 from handcal.rig.views import BoardImage
 from handcal.sim.boards import board_poses, board_view
