@@ -80,7 +80,9 @@ def _check_display(eye: str, display: EyeDisplay) -> None:
     K, H0 = display.K, display.H0
     _check_camera(f"{eye}.K", K)
     require(
-        bool((np.abs(H0) < 10).all()) and H0[2, 2] == 1 and np.linalg.det(H0) > 0,
+        bool((np.abs(H0) < 10).all())
+        and H0[2, 2] == 1
+        and min(H0[0, 0], H0[1, 1], np.linalg.det(H0)) > 0.01,
         f"{eye}.H0 must be a homography near the identity, with H0[2, 2] = 1",
     )
     require(
@@ -188,11 +190,11 @@ def _check_camera(name: str, K: Float64) -> None:
     require(
         bool((np.abs(K) < 1e6).all())
         and np.array_equal(np.tril(K, -1), np.zeros((3, 3)))
-        and K[0, 0] > 0
-        and K[1, 1] > 0
+        and K[0, 0] >= 1
+        and K[1, 1] >= 1
         and K[2, 2] == 1,
-        f"{name} must be finite and upper triangular with positive focal lengths (pixels) and 1 "
-        "at the lower right",
+        f"{name} must be finite and upper triangular with positive focal lengths, at least 1 "
+        "pixel, and 1 at the lower right",
     )
 
 
