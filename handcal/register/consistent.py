@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -96,6 +96,17 @@ class HandMatch:
     """(K, 3); the cursor's outline, which the wearer sees."""
 
 
+class _Turn(NamedTuple):
+    """The rotation by which a hand returned, as seen by one eye."""
+
+    turned_rad: Float64
+    """(3,)."""
+    share: float
+    """Share of its square that noise and a change of shape do not explain."""
+    scatter_m2: Float64
+    """(3, 3); mean of the products of the points' coordinates about the centroid."""
+
+
 def match_hands(
     cursor_m: Float64,
     hand_m: Float64,
@@ -165,9 +176,8 @@ def fit_match(
     hand_m = match.hand_m[chosen]
     paired = transform(T_E, hand_m)
     R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))
-    turned_rad = Rotation.from_matrix(R).as_rotvec()
-    turned_rad *= _turned_share(match, T_E, turned_rad, _scatter(paired))
-    R_turned = Rotation.from_rotvec(turned_rad).as_matrix()
+    turn = _measure_turn(match, T_E, R, paired)
+    R_turned = Rotation.from_rotvec(turn.share * turn.turned_rad).as_matrix()
     outline_m = transform(T_cursor, match.outline_m)
     moved_m = _BALANCE_SHARE * balanced_turn(outline_m, R_turned, mean_point(unturned))
     unturned += moved_m
@@ -195,11 +205,12 @@ def fit_match(
             break
         history.append(error_m2)
         inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
-        R, unturned, paired = R_next, partner, fitted
+        unturned, paired = partner, fitted
+        turn = _measure_turn(match, T_E, R_next, paired)
         shift_m, aspect_m, moved_m = fit_m, np.zeros(3), np.zeros(3)
     return EyeShift(
         shift_m=shift_m,
-        covariance_m2=_covariance(match, T_E, R, moved_m, unturned, paired, distance_m)
+        covariance_m2=_covariance(match, T_E, turn, moved_m, unturned, paired, distance_m)
         + np.outer(aspect_m, aspect_m),
         rms_m=float(np.sqrt(history[-1])),
         residuals_m=residuals_m,
@@ -236,7 +247,7 @@ def _fit_pairs(
 def _covariance(
     match: HandMatch,
     T_E: Float64,
-    R: Float64,
+    turn: _Turn,
     moved_m: Float64,
     cursor_m: Float64,
     hand_m: Float64,
@@ -245,16 +256,14 @@ def _covariance(
     """Return the covariance of φ from the uncertainty of the hand's displacement at its centroid.
 
     Its parts: the registration's own; if the hand returned rotated by R, the unknown
-    centre of that rotation, which may be any point of the cloud and moves the centroid by (I - R)
+    centre of that turn, which may be any point of the cloud and moves the centroid by (I - R)
     times its distance, and the movement (3,) by which the wearer is expected to have balanced it,
     which is as far from either extreme; the change of the hand's shape; and a lower bound.
     """
     R_E = T_E[:3, :3]
-    scatter_m2 = _scatter(hand_m)
-    turned_rad = Rotation.from_matrix(R).as_rotvec()
-    turned_rad *= np.sqrt(_turned_share(match, T_E, turned_rad, scatter_m2))
-    lever = np.eye(3) - Rotation.from_rotvec(turned_rad).as_matrix()
-    turned = lever @ scatter_m2 @ lever.T
+    R = Rotation.from_rotvec(np.sqrt(turn.share) * turn.turned_rad).as_matrix()
+    lever = np.eye(3) - R
+    turned = lever @ turn.scatter_m2 @ lever.T
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
     measured = match.covariance[3:, 3:] + _SHAPE_SHARE**2 * match.shape.scatter_m2
     displacement = R_E @ measured @ R_E.T + turned + least_m2 * np.eye(3)
@@ -265,25 +274,21 @@ def _covariance(
     return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
 
 
-def _turned_share(
-    match: HandMatch, T_E: Float64, turned_rad: Float64, scatter_m2: Float64
-) -> float:
-    """Return the share of a squared rotation (3,) that noise and a change of shape do not explain.
+def _measure_turn(match: HandMatch, T_E: Float64, R: Float64, hand_m: Float64) -> _Turn:
+    """Return the turn R of a hand (N, 3), in E, and how much of it is one.
 
     As much of the change of shape may be a displacement of the hand as a rotation that moves its
-    points, of scatter (3, 3), as far.
+    points as far.
     """
     R_E = T_E[:3, :3]
+    centred = _centred(hand_m)
+    scatter_m2 = np.asarray(centred.T @ centred / len(hand_m))
+    turned_rad = Rotation.from_matrix(R).as_rotvec()
     inertia_m2 = np.trace(scatter_m2) * np.eye(3) - scatter_m2
     shape_m2 = (_SHAPE_SHARE * match.shape.rms_m) ** 2 / 3.0
     explained_rad2 = R_E @ match.covariance[:3, :3] @ R_E.T + shape_m2 * np.linalg.inv(inertia_m2)
-    return 1.0 - 3.0 / max(float(turned_rad @ np.linalg.solve(explained_rad2, turned_rad)), 3.0)
-
-
-def _scatter(points_m: Float64) -> Float64:
-    """Return the mean of the products of the coordinates about the centroid, (3, 3)."""
-    centred = _centred(points_m)
-    return np.asarray(centred.T @ centred / len(points_m))
+    squared = float(turned_rad @ np.linalg.solve(explained_rad2, turned_rad))
+    return _Turn(turned_rad, 1.0 - 3.0 / max(squared, 3.0), scatter_m2)
 
 
 def _pairs(
