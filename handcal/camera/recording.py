@@ -126,7 +126,7 @@ class RecordingCamera(PlayedCamera):
 def _require_known_options(rs: Any, path: Path) -> None:
     """Raise CameraError if a .db3 file has an option that librealsense does not know.
 
-    librealsense 2.58 never ends to read it.
+    librealsense 2.58 never finishes reading it.
     """
     if path.suffix.lower() != ".db3":
         return
@@ -137,7 +137,7 @@ def _require_known_options(rs: Any, path: Path) -> None:
     if unknown := sorted(recorded - known):
         raise CameraError(
             f"it has the option {unknown[0][:40]!r}, which this pyrealsense2 does not know; "
-            "install that with which it was recorded"
+            "install the version with which it was recorded"
         )
 
 

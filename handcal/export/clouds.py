@@ -153,7 +153,7 @@ def _require_plausible(path: Path, points_m: Float64) -> Float64:
 def _parse_ply(path: Path, data: bytes, table: Float64) -> tuple[Float64, Bool | None]:
     """Return points and `is_cut` of a PLY file of text.
 
-    Open3D 0.20 returns whatever is in its memory from a word on that is no number of its type.
+    From the first word that is not a number of its type, Open3D 0.20 returns what its memory holds.
     """
     found = _PROPERTIES.search(data)
     names = re.findall(rb"^property +\w+ +(\w+)", found[1], re.MULTILINE) if found else []
@@ -171,7 +171,7 @@ def _require_all_points(path: Path, data: bytes) -> Float64 | None:
     Raises
     ------
     FileError
-        If the file ends early or a word of its points is no number; Open3D would invent points.
+        If the file ends early or a word of its points is not a number; Open3D would invent points.
     """
     announced, end = _POINTS.search(data), _HEADER_END.search(data)
     if announced is None or end is None or _OVERLONG.search(data, 0, end.end()):
