@@ -31,6 +31,7 @@ from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.dialogs.export import Export, ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.dialogs.support import SupportDialog
+from handcal_gui.docks import Panels
 from handcal_gui.edit_menu import add_edit_menu
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.help_menu import add_help_menu
@@ -51,7 +52,7 @@ from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.placement import keep_on_screen
-from handcal_gui.window import MainWindow, Page, Panels
+from handcal_gui.window import MainWindow, Page
 from handcal_gui.windows.manual import Manual
 
 if TYPE_CHECKING:  # imported when they open: they take longer than all the rest

@@ -23,13 +23,14 @@ from handcal.station.station import Station
 from handcal.types import EyePlan
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.conditions import Conditions
+from handcal_gui.docks import Panel
 from handcal_gui.engine.engine_thread import Command, EngineThread
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import ACTION_NAMES, Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.translation import tr
-from handcal_gui.window import MainWindow, Panel
+from handcal_gui.window import MainWindow
 
 _POLL_MS = 25
 """A snapshot is shown as soon as it arrives; this is for one that was too early and stays."""
