@@ -14,7 +14,6 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
 from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.many import export_sessions
-from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
@@ -48,7 +47,7 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.preferences import Preferences, PreferencesFile
+from handcal_gui.preferences import CurrentPreferences, Preferences, PreferencesFile
 from handcal_gui.theme import use_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.placement import keep_on_screen
@@ -87,16 +86,9 @@ class Program(QObject):
 
     def __init__(self, file: PreferencesFile, remembers: bool = True) -> None:
         super().__init__()
-        self._file = file
-        self._remembers = remembers
-        self._preferences, complaint = file.load()
+        self._current = CurrentPreferences(file, remembers)
         self._use_theme()
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._use_theme)
-        try:
-            self._pairings = file.pairings()
-        except FileError as error:
-            self._pairings = Pairings(())  # for this run: the damaged file stays as it is
-            complaint = f"{complaint} {error}".strip()
         panels = Panels(
             camera=CameraPanel(),
             cloud=CloudPanel(),
@@ -108,7 +100,7 @@ class Program(QObject):
             session=SessionPanel(),
             link=LinkPanel(),
         )
-        self.start = StartPage(self._preferences, self._pairings.open_key())
+        self.start = StartPage(self.preferences, self._current.pairings.open_key())
         self.wizard_panel = WizardPanel()
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
@@ -121,26 +113,26 @@ class Program(QObject):
         self._make_menus()
         self._restore()
         self.show_start()
-        self.window.banner.show_message(complaint)
+        self.window.banner.show_message(self._current.complaint)
 
     @property
     def preferences(self) -> Preferences:
         """The current preferences."""
-        return self._preferences
+        return self._current.now
 
     def start_calibration(self, settings: StationSettings, wearer: str) -> None:
         """Open a station for a wearer."""
-        self._remember(replace(self._preferences, station=settings))
-        self._run(lambda: Station(settings, wearer, pairings=self._pairings))
+        self._current.change(station=settings)
+        self._run(lambda: Station(settings, wearer, pairings=self._current.pairings))
 
     def resume_session(self, path: Path) -> None:
         """Resume a session, at the station that was used last."""
-        settings = self._preferences.station
-        self._run(lambda: Station(settings, resume=path, pairings=self._pairings))
+        settings = self.preferences.station
+        self._run(lambda: Station(settings, resume=path, pairings=self._current.pairings))
 
     def begin_from(self, path: Path) -> None:
         """Begin a session from a stored one of the same wearer, whose φ is verified first."""
-        station = self._preferences.station
+        station = self.preferences.station
         plan = replace(station.plan, name="recommended", is_automatic=True)
         settings = replace(station, plan=plan)
         try:
@@ -148,7 +140,7 @@ class Program(QObject):
         except FileError as error:
             self.window.banner.show_message(str(error))
             return
-        self._run(lambda: Station(settings, wearer, pairings=self._pairings, former=path))
+        self._run(lambda: Station(settings, wearer, pairings=self._current.pairings, former=path))
 
     def open_session(self, path: Path) -> None:
         """Open a stored session for review."""
@@ -168,7 +160,7 @@ class Program(QObject):
         self.live.stop()
         self.review.close()
         self.start.set_opening(False)
-        self.start.show_preferences(self._preferences)
+        self.start.show_preferences(self.preferences)
         self.window.show_page("start")
 
     def export(self, folder: Path | None = None) -> ExportDialog | None:
@@ -183,7 +175,7 @@ class Program(QObject):
         if record is None or not record.alignments:
             self.window.banner.show_message(tr("There is no alignment to export yet."))
             return None
-        folder = folder or Path(self._preferences.export_folder or record.path.parent)
+        folder = folder or Path(self.preferences.export_folder or record.path.parent)
         return self._open_export(record, folder, self.window, export_session, "")
 
     def show_library(self, folder: Path | None = None) -> LibraryWindow:
@@ -212,7 +204,7 @@ class Program(QObject):
         ) -> tuple[Path, ...]:
             return export_sessions(paths, target, settings, progress)
 
-        folder = Path(self._preferences.export_folder or paths[0].parent)
+        folder = Path(self.preferences.export_folder or paths[0].parent)
         return self._open_export(
             first, folder, parent, export, tr("{} sessions").format(len(paths))
         )
@@ -220,7 +212,7 @@ class Program(QObject):
     def _open_export(
         self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
     ) -> ExportDialog:
-        dialog = ExportDialog(record, self._preferences.export, folder, parent, export, name)
+        dialog = ExportDialog(record, self.preferences.export, folder, parent, export, name)
         dialog.remembered.connect(self._remember_export)
         self._open(dialog, dialog.stop)
         return dialog
@@ -247,7 +239,7 @@ class Program(QObject):
         link = self.live.link
         try:
             rig = snapshot.record.rig if snapshot else read_rig(settings.rig_path)
-            server = link or HeadsetServer(self._pairings, (settings.host, settings.port))
+            server = link or HeadsetServer(self._current.pairings, (settings.host, settings.port))
         except HandcalError as error:
             self.window.banner.show_message(str(error))
             return None
@@ -262,7 +254,7 @@ class Program(QObject):
         from handcal_gui.windows.rig.wizard import RigWizard
 
         try:
-            folder = ProjectFolder(self._file.path.parent / "rig")
+            folder = ProjectFolder(self._current.folder / "rig")
         except FileError as error:
             self.window.banner.show_message(str(error))
             return None
@@ -281,7 +273,7 @@ class Program(QObject):
             opened[0].raise_()
             opened[0].activateWindow()
             return opened[0]
-        entries = self._preferences.evaluation
+        entries = self.preferences.evaluation
         if not entries.users.sessions:
             users = replace(entries.users, sessions=self.start.new.settings.sessions)
             entries = replace(entries, users=users)
@@ -296,14 +288,11 @@ class Program(QObject):
     def close(self) -> None:
         """Save the window's layout and end all running work; safe to call twice."""
         layouts = self.window.layouts()
-        self._remember(
-            replace(
-                self._preferences,
-                geometry=self.window.saveGeometry().toBase64().toStdString(),
-                live_layout=layouts.get("live", ""),
-                review_layout=layouts.get("review", ""),
-                fine_tune_step_m=self.window.panels.fine_tune.step_m,
-            )
+        self._current.change(
+            geometry=self.window.saveGeometry().toBase64().toStdString(),
+            live_layout=layouts.get("live", ""),
+            review_layout=layouts.get("review", ""),
+            fine_tune_step_m=self.window.panels.fine_tune.step_m,
         )
         self.ending.emit()
         self.inspection.close()
@@ -322,26 +311,22 @@ class Program(QObject):
         self.start.connect_wanted.connect(self.connect_headset)
         self.start.evaluation_wanted.connect(self.evaluate)
         self.live.ended.connect(self._on_ended)
-        self.live.opened.connect(lambda path: self._remember(self._preferences.with_session(path)))
+        self.live.opened.connect(self._current.add_session)
         self.live.export_requested.connect(lambda: self.export())
         self.live.next_wearer_requested.connect(self.show_start)
-        self.review.opened.connect(
-            lambda path: self._remember(self._preferences.with_session(path))
-        )
+        self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.export())
         review_page.resume_requested.connect(self._resume_reviewed)
         review_page.again_requested.connect(self._begin_from_shown)
         self.live.slipped.connect(self._begin_from_shown)
         review_page.close_requested.connect(self.show_start)
-        self.wizard_panel.plan_changed.connect(
-            lambda plan: self._remember(replace(self._preferences, plan=plan))
-        )
+        self.wizard_panel.plan_changed.connect(lambda plan: self._current.change(plan=plan))
         self.wizard_panel.hold_changed.connect(
-            lambda is_held: self._remember(replace(self._preferences, runs_itself=not is_held))
+            lambda is_held: self._current.change(runs_itself=not is_held)
         )
         self.window.arrangement_changed.connect(
-            lambda chosen: self._remember(replace(self._preferences, arrangement=chosen))
+            lambda chosen: self._current.change(arrangement=chosen)
         )
         panels = self.window.panels
         panels.session.export_requested.connect(lambda: self.export())
@@ -349,6 +334,7 @@ class Program(QObject):
         self.inspection.failed.connect(self.window.banner.show_message)
         panels.link.new_key_requested.connect(self._renew_key)
         panels.link.connect_requested.connect(self.connect_headset)
+        self._current.not_saved.connect(self.window.banner.show_message)
         self.window.closing.connect(self.close)
 
     def _make_menus(self) -> None:
@@ -368,7 +354,7 @@ class Program(QObject):
         add_help_menu(self.window, self.manual, self.make_support_bundle)
 
     def _restore(self) -> None:
-        preferences = self._preferences
+        preferences = self.preferences
         self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
         if preferences.geometry:
             self.window.restoreGeometry(QByteArray.fromBase64(preferences.geometry.encode()))
@@ -383,22 +369,22 @@ class Program(QObject):
         self.window.use_arrangement(preferences.arrangement)
 
     def _use_theme(self) -> None:
-        use_theme(self._preferences.theme)
+        use_theme(self.preferences.theme)
 
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
-        verdict = self._preferences.station.calibration.solve.verdict
+        verdict = self.preferences.station.calibration.solve.verdict
         self.wizard_panel.picture.result.set_target(verdict.target_arcmin)
-        is_held = not self._preferences.runs_itself
-        chosen = self._preferences
+        is_held = not self.preferences.runs_itself
+        chosen = self.preferences
         self.live.start(open_station, chosen.plan, bridges=chosen.bridges, is_held=is_held)
         self.start.set_opening(True)
         self.window.show_page("start")
 
     def _browse(self) -> None:
         folder = QFileDialog.getExistingDirectory(
-            self.window, tr("Open a session's folder"), self._preferences.station.sessions
+            self.window, tr("Open a session's folder"), self.preferences.station.sessions
         )
         if folder:
             self.open_session(Path(folder))
@@ -426,8 +412,8 @@ class Program(QObject):
             self.start.set_opening(False)
 
     def _renew_key(self) -> None:
-        self._pairings = self._file.renew_pairing_key()
-        self.start.set_pairing_key(self._pairings.open_key())
+        self._current.renew_pairing_key()
+        self.start.set_pairing_key(self._current.pairings.open_key())
         self.window.banner.show_message(
             tr(
                 "New pairing key created. Enter it in the headset; all others are "
@@ -439,37 +425,27 @@ class Program(QObject):
     def make_support_bundle(self) -> SupportDialog:
         """Open the dialog that writes a file to send with a bug report."""
         sessions = Path(self.start.new.settings.sessions)
-        folder = self._file.path.parent
+        folder = self._current.folder
         settings = SupportSettings(folder, (sessions,))
         dialog = SupportDialog(settings, Path.home(), self.window)
         self._open(dialog, dialog.stop)
         return dialog
 
     def _edit_preferences(self) -> None:
-        dialog = PreferencesDialog(self._preferences, self.window)
+        dialog = PreferencesDialog(self.preferences, self.window)
         keep_on_screen(dialog)
         if dialog.exec():
-            self._remember(dialog.preferences())
+            self._current.use(dialog.preferences())
             self._use_theme()
-            self.start.show_preferences(self._preferences)
+            self.start.show_preferences(self.preferences)
 
     def _use_rig(self, path: Path) -> None:
-        station = replace(self._preferences.station, rig=str(path))
-        self._remember(replace(self._preferences, station=station))
+        station = replace(self.preferences.station, rig=str(path))
+        self._current.change(station=station)
         self.start.set_rig(path)
 
     def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
-        self._remember(replace(self._preferences, export=settings, export_folder=str(folder)))
+        self._current.change(export=settings, export_folder=str(folder))
 
     def _remember_evaluation(self, entries: EvaluationEntries) -> None:
-        self._remember(replace(self._preferences, evaluation=entries))
-
-    def _remember(self, preferences: Preferences) -> None:
-        self._preferences = preferences
-        try:
-            if self._remembers:
-                self._file.save(preferences)
-        except FileError as error:
-            self.window.banner.show_message(
-                tr("The preferences could not be saved: {}").format(error)
-            )
+        self._current.change(evaluation=entries)
