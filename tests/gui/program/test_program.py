@@ -61,16 +61,16 @@ def test_the_dialogs_of_the_menus_end_with_the_program(
     file.path.write_text(json.dumps({"station": station}))
     technician = open_program()
     program = technician.program
-    first = program.connect_headset()
+    first = program.windows.connect_headset()
     assert first is not None
     first.accept()
-    assert program.connect_headset() is not None  # the port is free again
-    assert program.show_library().isVisible()
-    assert program.make_support_bundle().isVisible()
+    assert program.windows.connect_headset() is not None  # the port is free again
+    assert program.windows.show_library().isVisible()
+    assert program.windows.make_support_bundle().isVisible()
 
 
 def test_connect_shows_the_headset_of_a_calibration_and_leaves_it_alone(live: Technician) -> None:
-    dialog = live.program.connect_headset()
+    dialog = live.program.windows.connect_headset()
     assert dialog is not None
     live.wait(lambda: text(dialog, "headsetFound").startswith("Headset of the tests"))
     assert text(dialog, "digits") == ""
