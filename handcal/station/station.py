@@ -42,9 +42,10 @@ from handcal.station.opening import (
     with_session_prior,
 )
 from handcal.station.plan import NextStep, Plan, StepName
-from handcal.station.procedure import Calibration, Observation, ProcedureError, State
+from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot, read_procedure
+from handcal.station.states import Observation, ProcedureError, State
 from handcal.station.verifying import skipped_eyes
 from handcal.types import Eye, Float64, Frame, HeadsetIdentity
 

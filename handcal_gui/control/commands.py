@@ -7,8 +7,9 @@ from contextlib import suppress
 from functools import partial
 
 from handcal.errors import FileError
-from handcal.station.procedure import Calibration, State
+from handcal.station.procedure import Calibration
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.docks import Panels
 from handcal_gui.engine.engine_thread import Command

@@ -25,9 +25,9 @@ from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.delay import DelaySettings
 from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings
-from handcal.station.procedure import CalibrationSettings, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import CalibrationSettings, ProcedureError, State
 from handcal.station.station import Station
 from handcal.station.verifying import SKIPPED
 from handcal.types import EYES, Alignment, Eye, Float64, Frame

@@ -25,7 +25,7 @@ from PySide6.QtWidgets import (
 
 from handcal.errors import LinkError
 from handcal.session.session import Session, SessionRecord
-from handcal.station.procedure import State
+from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.pages.wizard.view import Action

@@ -25,8 +25,8 @@ from pytestqt.qtbot import QtBot
 from handcal.display import DrawnMove, effect_at
 from handcal.register.results import Results
 from handcal.rig_types import Rig
-from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import MAX_HAND_SET_SHIFT_M, State
 from handcal.types import EYES, Eye
 from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
