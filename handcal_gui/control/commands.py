@@ -111,19 +111,25 @@ def _connect_trials(panels: Panels, submit: Submit) -> None:
     # A φ shown only for comparison is not the one that the trial is about.
     trials.trial_requested.connect(panels.fine_tune.settle)
     trials.trial_requested.connect(
-        lambda eye, depth_m: submit(_RECORD, lambda s: s.save_trial(eye, depth_m))
+        lambda eye, depth_m: submit(_RECORD, lambda s: s.trials.save(eye, depth_m))
     )
     trials.show_target_requested.connect(
-        lambda eye, depth_m: submit(tr("show the target"), lambda s: s.show_target(eye, depth_m))
+        lambda eye, depth_m: submit(
+            tr("show the target"), lambda s: s.trials.show_target(eye, depth_m)
+        )
     )
-    trials.hide_target_requested.connect(lambda: submit(tr("hide the target"), Station.hide_target))
-    trials.compare_requested.connect(lambda: submit(compare, Station.compare))
-    trials.end_comparison_requested.connect(lambda: submit(compare, lambda s: s.comparing.end()))
+    trials.hide_target_requested.connect(
+        lambda: submit(tr("hide the target"), lambda s: s.trials.hide_target())
+    )
+    trials.compare_requested.connect(lambda: submit(compare, lambda s: s.trials.compare()))
+    trials.end_comparison_requested.connect(
+        lambda: submit(compare, lambda s: s.trials.comparing.end())
+    )
     trials.show_compared_requested.connect(
-        lambda place: submit(compare, lambda s: s.comparing.show(place))
+        lambda place: submit(compare, lambda s: s.trials.comparing.show(place))
     )
     trials.comparison_answered.connect(
-        lambda answer: submit(compare, lambda s: s.comparing.answer(answer))
+        lambda answer: submit(compare, lambda s: s.trials.comparing.answer(answer))
     )
 
 
