@@ -1,4 +1,4 @@
-"""``handcal rig obey``: the check that a headset draws what it is sent."""
+"""``handcal rig display-check``: the check that a headset draws what it is sent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.link.server import HeadsetServer
-    from handcal.rig.obey import Probe
+    from handcal.rig.display_check import Probe
     from handcal.rig_types import Rig
     from handcal.station.display_check import Answer, Observe, Show
     from handcal.types import Eye
@@ -62,7 +62,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
     *LISTEN,
     KEYS,
 )
-def obey(arguments: argparse.Namespace) -> None:
+def display_check(arguments: argparse.Namespace) -> None:
     """Check that a connected headset draws what it is sent, and store the check in a rig file."""
     from handcal.rig.report import display_finding
     from handcal.rig.rig_file import read_rig, write_rig

@@ -106,7 +106,7 @@ _RIG: Mapping[str, Entry] = {
         "Check the depth camera against a board at several distances, and store it in a rig file.",
         "rig_files",
     ),
-    "obey": Entry(
+    "display-check": Entry(
         "Check that a connected headset draws what it is sent, and store the check in a rig file.",
         "display_check",
     ),
@@ -221,7 +221,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 def load(name: str, module: str) -> Command:
     """Import a command from a module of `handcal.cli`."""
-    found: Command = getattr(import_module(f"handcal.cli.{module}"), name)
+    found: Command = getattr(import_module(f"handcal.cli.{module}"), name.replace("-", "_"))
     return found
 
 

@@ -65,7 +65,7 @@ def missing_parts(rig: Rig) -> tuple[str, ...]:
     if rig.display_check is None:
         lines.append(
             "nobody has checked that the headset draws what it is sent: run "
-            "'handcal rig obey --rig FILE --output NEW'"
+            "'handcal rig display-check --rig FILE --output NEW'"
         )
     lines += [
         f"the origin of {part} is not known: calibrate it again to know its uncertainty"

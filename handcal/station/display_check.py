@@ -14,7 +14,7 @@ from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraError, HandcalError
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
-from handcal.rig.obey import (
+from handcal.rig.display_check import (
     PROBES,
     Probe,
     Shown,

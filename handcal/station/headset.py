@@ -133,7 +133,7 @@ def _other_than_rig(device: HeadsetIdentity, rig: Rig) -> str:
     if check is not None and (check.runtime, check.app) != (device.runtime, device.app):
         return (
             "its app or runtime has changed since the display check; check again with "
-            "handcal rig obey"
+            "handcal rig display-check"
         )
     return ""
 

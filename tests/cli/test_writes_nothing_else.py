@@ -75,7 +75,7 @@ COMMANDS = {
     "rig grid": "--png OUTPUT/grid.png",
     "rig check": "RIG --json OUTPUT/checked.json",
     "rig compare": "RIG RIG",
-    "rig obey": "--headset virtual --rig RIG --output OUTPUT/rig.yaml",
+    "rig display-check": "--headset virtual --rig RIG --output OUTPUT/rig.yaml",
     "rig migrate": "RIG --output OUTPUT/rig.yaml",
     "rig simulate": "OUTPUT/images --views 3",
     "evaluate cube net": "--pdf OUTPUT/net.pdf --cube OUTPUT/cube.json",

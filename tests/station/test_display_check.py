@@ -13,8 +13,8 @@ from handcal.errors import CancelledError, HandcalError
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
+from handcal.rig.display_check import Probe
 from handcal.rig.example import example_rig
-from handcal.rig.obey import Probe
 from handcal.rig.report import display_finding, report_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig_types import DisplayCheck

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from handcal.geometry import project
-from handcal.rig.example import example_rig
-from handcal.rig.obey import (
+from handcal.rig.display_check import (
     PROBES,
     SHIFT_PX,
     Probe,
@@ -20,6 +19,7 @@ from handcal.rig.obey import (
     judge_display,
     shares_seen,
 )
+from handcal.rig.example import example_rig
 from handcal.types import EYES, Eye, Float64, UInt8
 
 
