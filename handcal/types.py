@@ -336,7 +336,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """One eye's check by the wearer, who moves the drawing until it covers the hand."""
+    """The verification of one eye by the wearer, who moves the drawing until it covers the hand."""
 
     before_m: tuple[float, float, float]
     """φ with which the hand's outline was first drawn."""
@@ -347,12 +347,12 @@ class Verification:
     nudge_size: float = 0.0
     """Relative growth of the drawing by the wearer."""
     hand_E_m: tuple[float, float, float] | None = None
-    """Centre of the hand then, in the eye's E; None if unknown: the check is then not fused."""
+    """Centre of the hand then, in the eye's E; None if unknown: it is then not fused."""
     earlier: tuple[Verification, ...] = ()
-    """Checks of the same eye before this one, oldest first; each is fused as well."""
+    """Verifications of the same eye before this one, oldest first; each is fused as well."""
 
     def after(self, former: Verification | None) -> Verification:
-        """Return this check with a former one, if there is one, among the earlier checks."""
+        """Return this verification with a former one, if any, among the earlier ones."""
         if former is None:
             return self
         return replace(self, earlier=(*former.earlier, replace(former, earlier=())))

@@ -176,7 +176,7 @@ def fuse_alignments(
     HandError
         If all points of a cursor lie at cut edges.
     """
-    found_checks = {
+    observations = {
         eye: tuple(
             verified_observation(rig, eye, one.after_m, one.hand_E_m, settings)
             for one in (*newest.earlier, newest)
@@ -184,12 +184,12 @@ def fuse_alignments(
         )
         for eye, newest in verified.items()
     }
-    checks = {eye: found for eye, found in found_checks.items() if found}
-    if not solved and not checks:
+    verifications = {eye: found for eye, found in observations.items() if found}
+    if not solved and not verifications:
         raise ValueError("at least one alignment is needed")
     observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
     prior = with_eye_distance(eye_prior(settings.prior), rig, eye_distance)
-    known = (*observed, *(one for found in checks.values() for one in found))
+    known = (*observed, *(one for found in verifications.values() for one in found))
     weights = _scale_weights(prior, known, settings)
     found = [posterior(prior, [o.at(scale) for o in known]) for scale in settings.wearer_scales]
     estimate_m = sum(weight * mean_m for weight, (mean_m, _) in zip(weights, found, strict=True))
@@ -208,7 +208,8 @@ def fuse_alignments(
     of_eye = {
         eye: found_shifts
         for eye in EYES
-        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts]) or eye in checks
+        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts])
+        or eye in verifications
     }
     return Fused(
         shifts={
@@ -220,11 +221,11 @@ def fuse_alignments(
         prior=prior,
         observed=observed,
         wearer_scale=wearer_scale,
-        verified=checks,
+        verified=verifications,
         unverified={
             eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M, settings)
             for eye in of_eye
-            if eye not in checks
+            if eye not in verifications
         },
         by_depth_m2=by_depth_m2,
     )

@@ -52,7 +52,7 @@ class PlacementSettings:
     """Alignments of the recommended plan before the eyes are verified."""
     most: int = 6
     """Alignments after which no other is planned."""
-    checks: int = 3
+    verifications: int = 3
     """Largest number of verifications of one eye: the others are for an eye that the first does not
     lead to *accept*. People see two outlines coincide better than they hold a hand."""
 
@@ -87,7 +87,7 @@ def next_alignment(
 
     Of ``paper``: both eyes, the cursor where the hand is. Of ``recommended``: left, right and both
     in turn, each cursor where it is most informative. None is needed while an eye must be verified
-    (`next_check`), nor once every eye is accepted or keeps its offline calibration.
+    (`next_verification`), nor once every eye is accepted or keeps its offline calibration.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def next_alignment(
     )
 
 
-def next_check(
+def next_verification(
     results: Results | None,
     verified: Mapping[Eye, Verification],
     *,
@@ -152,7 +152,7 @@ def next_check(
     """Return the eye to verify next in the recommended plan, or None if there is none.
 
     Each eye once, then each eye again that is not accepted. Call it when `next_alignment` plans
-    nothing, and again after each check.
+    nothing, and again after each verification.
     """
     if results is None:
         return None
@@ -172,7 +172,7 @@ def _to_verify(
         eye
         for eye in usable_eyes
         if eye in results.verdicts
-        and counts.get(eye, 0) < settings.checks
+        and counts.get(eye, 0) < settings.verifications
         and (not counts.get(eye) or results.verdicts[eye].name in ("repeat", "keep"))
     ]
 

@@ -80,7 +80,7 @@ class Results:
     fused: Fused
     """The observations and the prior behind `eyes`."""
     measured_arcmin: Mapping[Eye, tuple[float, float]] = field(default_factory=dict)
-    """Error of each verified eye before the check and after it, by the check and all else."""
+    """Error of each verified eye before its verification, and after it with all that is known."""
 
     @property
     def rendered_shift_m(self) -> Mapping[Eye, Float64]:
@@ -154,7 +154,7 @@ def solve_session(
     Raises
     ------
     ValueError
-        If there are neither alignments nor checks, or a cloud cannot be solved.
+        If there are neither alignments nor verifications, or a cloud cannot be solved.
     CancelledError
         If it was cancelled.
     """

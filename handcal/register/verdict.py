@@ -201,7 +201,7 @@ def judge(
     }
     for eye, (before, _) in measured.items():
         found = verdicts[eye]
-        told = f"the check found an error of {before:.1f}′ and corrected it; {found.reason}"
+        told = f"the verification found an error of {before:.1f}′ and corrected it; {found.reason}"
         if found.name in ("accept", "repeat", "keep"):
             verdicts[eye] = replace(found, reason=told)
     return verdicts

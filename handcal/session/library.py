@@ -41,7 +41,7 @@ class EyeOutcome:
     """Error that is expected without the calibration."""
     expected_arcmin: float | None
     measured_arcmin: float | None
-    """Error after the wearer's check; None if the eye was not checked."""
+    """Error after the wearer's verification; None if the eye was not verified."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from handcal.errors import HandError
-from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_check
+from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.verdict import planned_eyes
 from handcal.station.procedure import Calibration
 from handcal.station.states import Observation, ProcedureError, State
@@ -98,7 +98,7 @@ class Plan:
     ----------
     calibration : Calibration
     settings : PlanSettings
-    checks_first : bool
+    verifies_first : bool
         True if the headset draws with a stored φ, which is verified before anything else.
     skipped : collection of eye
         Eyes that are not verified: those skipped before the session was resumed.
@@ -112,12 +112,12 @@ class Plan:
         self,
         calibration: Calibration,
         settings: PlanSettings,
-        checks_first: bool = False,
+        verifies_first: bool = False,
         skipped: Collection[Eye] = (),
     ) -> None:
         self.settings = settings
         self._calibration = calibration
-        self._checks_first = checks_first
+        self._verifies_first = verifies_first
         self._decided: tuple[object, Planned | None] | None = None
         self._is_over = False
         self.skipped = set(skipped)
@@ -131,7 +131,7 @@ class Plan:
             # One was deleted or restored, or the eye distance has changed.
             return NextStep(StepName.SOLVE, calibration.eyes, _TEXTS[StepName.SOLVE])
         unverified = self._unverified()
-        if self._checks_first and not calibration.alignments and unverified:
+        if self._verifies_first and not calibration.alignments and unverified:
             return self._with_hand(StepName.VERIFY, unverified[:1], is_steady)
         if (why := self._reason_to_end(unverified)) is not None:
             return NextStep(StepName.DONE, (), why)
@@ -143,7 +143,7 @@ class Plan:
         planned = self._planned()
         if planned is not None:
             return NextStep(StepName.CURSOR, planned.eyes, planned.reason, planned)
-        if (eye := self._next_check()) is not None:
+        if (eye := self._next_verification()) is not None:
             return self._with_hand(StepName.VERIFY, (eye,), is_steady)
         return NextStep(StepName.DONE, (), self._takes())
 
@@ -238,17 +238,17 @@ class Plan:
             return results.verdicts[faulty[0]].reason
         is_judged = all(found.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
         is_verified = not (unverified and self.settings.verify)
-        # A stored calibration that its check does not refuse is kept.
-        is_kept = not self._calibration.alignments or self._next_check() is None
+        # A stored calibration that its verification does not refuse is kept.
+        is_kept = not self._calibration.alignments or self._next_verification() is None
         if is_judged and is_verified and is_kept:
             return "every eye has its verdict"
         return None
 
-    def _next_check(self) -> Eye | None:
+    def _next_verification(self) -> Eye | None:
         """Return the eye to verify next, if no alignment comes first."""
         if not self.settings.verify:
             return None
-        return next_check(
+        return next_verification(
             self._calibration.results,
             self._calibration.verifications,
             usable_eyes=tuple(e for e in self.settings.usable_eyes if e not in self.skipped),

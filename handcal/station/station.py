@@ -137,7 +137,7 @@ class Station(Closable):
             self.plan = Plan(
                 self.calibration,
                 plan,
-                checks_first=bool(facts.former or former),
+                verifies_first=bool(facts.former or former),
                 skipped=skipped_eyes(self._record.events),
             )
             self._views = EyeViews(

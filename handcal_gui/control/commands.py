@@ -55,8 +55,8 @@ def command_of(action: Action, wizard: Wizard, snapshot: Snapshot) -> Command | 
     if is_planned:
         commands |= {
             Action.ANOTHER: lambda calibration: calibration.make_cursor(eyes),
-            Action.CHECK_LEFT: lambda calibration: calibration.verify("left"),
-            Action.CHECK_RIGHT: lambda calibration: calibration.verify("right"),
+            Action.VERIFY_LEFT: lambda calibration: calibration.verify("left"),
+            Action.VERIFY_RIGHT: lambda calibration: calibration.verify("right"),
         }
     stationwide: dict[Action, Command] = {Action.FINISH: Station.finish}
     if is_planned:

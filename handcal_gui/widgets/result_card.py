@@ -58,8 +58,8 @@ def eye_results(results: Results) -> list[EyeResult]:
         benefit, verdict = results.benefits[eye], results.verdicts[eye]
         before = Bar(tr("Before, expected"), benefit.without_arcmin)
         if eye in results.measured_arcmin:
-            checked, left = results.measured_arcmin[eye]
-            bars = before, Bar(tr("Check found"), checked), Bar(tr("After the check"), left)
+            verified, left = results.measured_arcmin[eye]
+            bars = before, Bar(tr("Found by verifying"), verified), Bar(tr("After verifying"), left)
         else:
             after = Bar(tr("After, expected"), benefit.after_arcmin)
             bars = before, after, Bar(tr("After, measured"), None)

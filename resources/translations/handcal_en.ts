@@ -1145,14 +1145,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Check l&amp;eft eye</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Check &amp;right eye</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>{} The hand stays up.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1233,19 +1225,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Not accepted yet: add an alignment, or check an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The wearer has verified the result. Finish, or check an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Finish</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Not every eye has been verified. Finish, or check an eye again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1254,6 +1234,26 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>&amp;Add alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verify l&amp;eft eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verify &amp;right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted yet: add an alignment, or verify an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer has verified the result. Finish, or verify an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not every eye has been verified. Finish, or verify an eye again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1601,11 +1601,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>check the left eye</source>
+        <source>verify the left eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>check the right eye</source>
+        <source>verify the right eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3178,11 +3178,11 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Check found</source>
+        <source>Found by verifying</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>After the check</source>
+        <source>After verifying</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3620,7 +3620,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error that is left after the wearer&apos;s check, left / right, in arcminutes;
+        <source>Error that is left after the wearer&apos;s verification, left / right, in arcminutes;
 – was not measured</source>
         <translation type="unfinished"></translation>
     </message>

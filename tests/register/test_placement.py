@@ -7,7 +7,7 @@ import pytest
 from handcal.display import eye_projection, view_of_eye
 from handcal.geometry import invert, project, rigid, transform
 from handcal.lab.study.trials import study_hand
-from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_check
+from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.register.verdict import planned_eyes
 from handcal.rig.example import example_rig
@@ -113,7 +113,7 @@ def test_the_plan_ends_when_nothing_more_is_needed_or_the_most_were_made() -> No
     check = many.fused.observed[0]
     once, often = (
         replace(refused, fused=replace(many.fused, verified=dict.fromkeys(EYES, (check,) * count)))
-        for count in (1, PlacementSettings().checks)
+        for count in (1, PlacementSettings().verifications)
     )
     assert _next(eyes, once, PlacementSettings(most=10)) is None
     assert _next(eyes, often, PlacementSettings(most=10)) is not None
@@ -125,17 +125,17 @@ def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:
     solved = _solved([overlay_by_eye(rng, study_hand(3), RIG, TRUE_M, 800)])
     check = Verification((0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0))
     unsure, sure = _all_named(solved, "repeat"), _all_named(solved, "accept")
-    assert next_check(None, {}) is None
-    assert next_check(sure, {}) == "left"
-    assert next_check(sure, {"left": check}) == "right"
-    assert next_check(sure, {"left": check}, usable_eyes=("left",)) is None
+    assert next_verification(None, {}) is None
+    assert next_verification(sure, {}) == "left"
+    assert next_verification(sure, {"left": check}) == "right"
+    assert next_verification(sure, {"left": check}, usable_eyes=("left",)) is None
     both: dict[Eye, Verification] = {"left": check, "right": check}
-    assert next_check(sure, both) is None
-    assert next_check(unsure, both) == "left"
+    assert next_verification(sure, both) is None
+    assert next_verification(unsure, both) == "left"
     again: dict[Eye, Verification] = both | {"left": check.after(check)}
-    assert next_check(unsure, again) == "right"
+    assert next_verification(unsure, again) == "right"
     thrice = check.after(check.after(check))
-    assert next_check(unsure, dict.fromkeys(EYES, thrice)) is None
+    assert next_verification(unsure, dict.fromkeys(EYES, thrice)) is None
 
 
 def _all_named(results: Results, name: VerdictName) -> Results:

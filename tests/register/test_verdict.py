@@ -177,7 +177,8 @@ def test_a_verdict_tells_the_error_that_the_check_found() -> None:
     advice: dict[Eye, Advice] = {"left": advise(RIG, fused, "left", SETTINGS)}
     measured: dict[Eye, tuple[float, float]] = {"left": (before_arcmin, now_arcmin)}
     told = judge(RIG, fused, advice, SETTINGS, measured=measured)["left"].reason
-    assert told.startswith(f"the check found an error of {before_arcmin:.1f}′ and corrected it; ")
+    found = f"the verification found an error of {before_arcmin:.1f}′ and corrected it; "
+    assert told.startswith(found)
 
 
 def test_what_is_hardly_better_than_nothing_keeps_the_offline_calibration() -> None:

@@ -25,16 +25,16 @@ from tests.station.stage import HEADSET_AHEAD_NS, RIG, SETTINGS, T_D_HAND, Stage
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)
 # The hand of these tests does not move, so no other place may be in the camera's range.
-AT_THE_HAND = PlacementSettings(farthest_m=0.1, fewest=2, most=2, checks=1)
-ONCE = PlacementSettings(fewest=1, most=1, checks=1)
+AT_THE_HAND = PlacementSettings(farthest_m=0.1, fewest=2, most=2, verifications=1)
+ONCE = PlacementSettings(fewest=1, most=1, verifications=1)
 
 
 class Planned:
     """A stage that follows a plan."""
 
-    def __init__(self, stage: Stage, settings: PlanSettings, checks_first: bool = False) -> None:
+    def __init__(self, stage: Stage, settings: PlanSettings, verifies_first: bool = False) -> None:
         self.stage = stage
-        self.plan = Plan(stage.calibration, settings, checks_first)
+        self.plan = Plan(stage.calibration, settings, verifies_first)
 
     def advance(self, frames: int = 1) -> NextStep:
         for _ in range(frames):
@@ -70,7 +70,7 @@ class Planned:
 
 @pytest.fixture
 def make(server: HeadsetServer, client: HeadsetClient, session: Session) -> Callable[..., Planned]:
-    def build(settings: PlanSettings = RECOMMENDED, checks_first: bool = False) -> Planned:
+    def build(settings: PlanSettings = RECOMMENDED, verifies_first: bool = False) -> Planned:
         stage = Stage(server, client, session)
         stage.calibration = Calibration(
             RIG,
@@ -80,7 +80,7 @@ def make(server: HeadsetServer, client: HeadsetClient, session: Session) -> Call
             plan=settings.name,
             usable_eyes=settings.usable_eyes,
         )
-        return Planned(stage, settings, checks_first)
+        return Planned(stage, settings, verifies_first)
 
     return build
 
@@ -154,7 +154,7 @@ def test_one_usable_eye(make: Callable[..., Planned]) -> None:
 def test_a_stored_calibration_is_verified_before_anything_else(
     make: Callable[..., Planned],
 ) -> None:
-    planned = make(checks_first=True)
+    planned = make(verifies_first=True)
     for eye in EYES:
         assert planned.until(StepName.VERIFY).eyes == (eye,)
         planned.fits(eye)

@@ -15,7 +15,7 @@ from handcal.lab.study.wearers import StudyWearer
 from handcal.register.fuse import FuseSettings
 from handcal.register.guard import GuardSettings
 from handcal.register.nudge import nudged_shift_m
-from handcal.register.placement import PlacementSettings, next_alignment, next_check
+from handcal.register.placement import PlacementSettings, next_alignment, next_verification
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.register.results import Results, SolveSettings, conclude
 from handcal.register.solve import solve_alignment
@@ -117,7 +117,7 @@ def lead_through(
     verified: dict[Eye, Verification] = {}
     results: Results | None = None
     at_rest_m = raised.T_H_hand
-    check = partial(next_check, usable_eyes=usable_eyes, settings=placement)
+    check = partial(next_verification, usable_eyes=usable_eyes, settings=placement)
     while True:
         planned = next_alignment(
             raised.points_m,

@@ -20,8 +20,8 @@ from handcal_gui.pages.wizard.step_views import (
     align_view,
     connect_view,
     eye_names,
-    nudge_view,
     save_view,
+    verification_view,
 )
 from handcal_gui.pages.wizard.steps import DISTANCE, Wizard
 from handcal_gui.pages.wizard.view import EYE_WORDS, Action, ButtonSpec, Step, WizardView
@@ -48,8 +48,8 @@ _STATES = {
 _FOLLOWS = Step.SHOW_HAND
 """The guide's own step while the plan continues."""
 _CHECKS: dict[Eye, ButtonSpec] = {
-    "left": ButtonSpec(Action.CHECK_LEFT, tr("Check l&eft eye")),
-    "right": ButtonSpec(Action.CHECK_RIGHT, tr("Check &right eye")),
+    "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify l&eft eye")),
+    "right": ButtonSpec(Action.VERIFY_RIGHT, tr("Verify &right eye")),
 }
 
 
@@ -84,8 +84,8 @@ class PlannedWizard(Wizard):
         if step is None and procedure.next_step is not None:
             step = _STEPS.get(procedure.next_step.name)
         # A verification is solved and sent at its own step.
-        is_of_check = step is Step.SOLVE and procedure.verifications
-        self._latest = Step.VERIFY if is_of_check else step or self._latest
+        is_of_verification = step is Step.SOLVE and procedure.verifications
+        self._latest = Step.VERIFY if is_of_verification else step or self._latest
         return self._latest
 
     def move(self, action: Action, snapshot: Snapshot) -> None:  # noqa: ARG002 (as in Wizard)
@@ -111,7 +111,7 @@ class PlannedWizard(Wizard):
             view = align_view(snapshot)
             return replace(view, sentence=tr("{} The hand stays up.").format(view.sentence))
         if procedure.verifying is not None:
-            return nudge_view(snapshot, procedure.verifying)
+            return verification_view(snapshot, procedure.verifying)
         planned = procedure.next_step
         if planned is None or planned.name in (StepName.WAIT, StepName.ALIGN, StepName.NUDGE):
             return self._wait(step, snapshot)
@@ -202,12 +202,12 @@ class PlannedWizard(Wizard):
         if any(check.verdict in UNUSABLE for check in checks):
             text = tr("Do not use this result. Follow the advice below, then add alignments.")
         elif any(check.verdict == "repeat" for check in checks) or not checks:
-            text = tr("Not accepted yet: add an alignment, or check an eye again.")
+            text = tr("Not accepted yet: add an alignment, or verify an eye again.")
         elif set(procedure.verifications) >= set(self.usable_eyes):
-            text = tr("The wearer has verified the result. Finish, or check an eye again.")
+            text = tr("The wearer has verified the result. Finish, or verify an eye again.")
             main = ButtonSpec(Action.NEXT, tr("Finish"))
         else:
-            text = tr("Not every eye has been verified. Finish, or check an eye again.")
+            text = tr("Not every eye has been verified. Finish, or verify an eye again.")
         return WizardView(
             Step.VERIFY,
             text if checks else f"{sentence(planned.text)}.",

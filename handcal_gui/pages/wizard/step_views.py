@@ -151,7 +151,7 @@ def solve_view(snapshot: Snapshot) -> WizardView:
     )
 
 
-def nudge_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
+def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:
     """Return the view while an eye's outline is moved until it covers the hand."""
     eye, moved = verifying.eye, verifying.moved
     other: Eye = "right" if eye == "left" else "left"

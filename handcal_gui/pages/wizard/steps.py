@@ -24,9 +24,9 @@ from handcal_gui.pages.wizard.step_views import (
     align_view,
     connect_view,
     eye_names,
-    nudge_view,
     save_view,
     solve_view,
+    verification_view,
 )
 from handcal_gui.pages.wizard.view import (
     EYE_WORDS,
@@ -193,7 +193,7 @@ class Wizard:
             sending = ButtonSpec(Action.APPLY, tr("Sending…"), False)
             return WizardView(Step.VERIFY, wait, checks, sending)
         if snapshot.procedure.verifying is not None:
-            return nudge_view(snapshot, snapshot.procedure.verifying)
+            return verification_view(snapshot, snapshot.procedure.verifying)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             return WizardView(
                 Step.VERIFY,

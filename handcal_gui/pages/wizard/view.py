@@ -59,8 +59,8 @@ class Action(StrEnum):
     UNDO_NUDGE = "undo the last nudge"
     SKIP = "skip the verification"
     TAKE_STEP = "take the next step"
-    CHECK_LEFT = "check the left eye"
-    CHECK_RIGHT = "check the right eye"
+    VERIFY_LEFT = "verify the left eye"
+    VERIFY_RIGHT = "verify the right eye"
     SLIPPED = "begin again after the headset slipped"
     FINISH = "finish"
     NEXT_WEARER = "next wearer"
@@ -79,8 +79,8 @@ ACTION_NAMES: dict[str, str] = {
     Action.UNDO_NUDGE: tr("undo the last nudge"),
     Action.SKIP: tr("skip the verification"),
     Action.TAKE_STEP: tr("take the next step"),
-    Action.CHECK_LEFT: tr("check the left eye"),
-    Action.CHECK_RIGHT: tr("check the right eye"),
+    Action.VERIFY_LEFT: tr("verify the left eye"),
+    Action.VERIFY_RIGHT: tr("verify the right eye"),
     Action.FINISH: tr("finish"),
 }
 """The engine's commands in the user's language, within "Could not …"."""

@@ -23,7 +23,7 @@ def with_plan(settings: StationSettings) -> StationSettings:
 
     The tests' hand does not follow the cursor, so no other place may be in the camera's range.
     """
-    placement = PlacementSettings(farthest_m=0.1, fewest=1, most=1, checks=1)
+    placement = PlacementSettings(farthest_m=0.1, fewest=1, most=1, verifications=1)
     plan = PlanSettings("recommended", ("left",), is_automatic=True, placement=placement)
     return replace(settings, plan=plan)
 
@@ -117,5 +117,5 @@ def test_each_step_of_a_held_plan_is_taken_by_a_press(technician: Technician, st
             and technician.snapshot.observation.is_steady
         )
     )
-    button(technician.program.window, QPushButton, "Check l&eft eye").click()
+    button(technician.program.window, QPushButton, "Verify l&eft eye").click()
     technician.wait_for_state(State.VERIFY)

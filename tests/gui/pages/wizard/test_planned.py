@@ -111,8 +111,8 @@ def test_the_end_says_what_was_reached(
     assert (view.main.action, view.main.label) == (Action.NEXT, label)
     assert [one.action for one in view.others] == [
         Action.ANOTHER,
-        Action.CHECK_LEFT,
-        Action.CHECK_RIGHT,
+        Action.VERIFY_LEFT,
+        Action.VERIFY_RIGHT,
     ]
 
 
@@ -120,7 +120,7 @@ def test_one_usable_eye_is_the_only_one_offered(snapshot: Maker) -> None:
     wizard = PlannedWizard(("right",))
     done = planned_snapshot(snapshot, StepName.DONE)
     wizard.move(Action.NEXT, done)
-    assert Action.CHECK_LEFT not in [one.action for one in wizard.view(done).others]
+    assert Action.VERIFY_LEFT not in [one.action for one in wizard.view(done).others]
     assert wizard.eyes(done) == ("right",)
 
 
