@@ -59,7 +59,7 @@ def test_every_command_is_in_the_table() -> None:
     for module in pkgutil.iter_modules(handcal.cli.__path__):
         for name, value in vars(import_module(f"handcal.cli.{module.name}")).items():
             if isinstance(value, Command):
-                there.add((name, module.name))
+                there.add((name.replace("_", "-"), module.name))
                 assert value.run.__name__ == name
     assert there == {(words[-1], entry.home) for words, entry in LEAVES}
 
