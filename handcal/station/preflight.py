@@ -13,7 +13,7 @@ from handcal.camera.hololens2 import identity_of
 from handcal.camera.recording import check_recording
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.ros import ros_recording
-from handcal.camera.sdk_devices import choose_device, connected_devices, librealsense
+from handcal.camera.sdk_devices import choose_device, devices_by_child, librealsense
 from handcal.errors import HandcalError, LinkError
 from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
@@ -35,7 +35,7 @@ PARTS: dict[Part, str] = {
 def check_station(settings: StationSettings, pairing_key: str) -> dict[Part, Finding]:
     """Check each part of a station without opening it; never raises.
 
-    Takes about 0.1 s with a RealSense, otherwise a few milliseconds.
+    Takes a few milliseconds; a RealSense is looked for by another process, which takes longer.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _broken(found: str, advice: str) -> Finding:
 def _camera(settings: StationSettings) -> Finding:
     match settings.source:
         case "realsense":
-            device = choose_device(connected_devices(), settings.realsense.serial)
+            device = choose_device(devices_by_child(), settings.realsense.serial)
             return with_rig(examine_camera(device), _chosen_rig(settings), device.identity)
         case "hololens2":
             return _hololens2(settings)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handcal.camera import sdk_devices
 from handcal.camera.folder import record_folder
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.sdk_devices import Device
@@ -77,7 +78,7 @@ def test_a_realsense_is_found_or_missed(
     settings: StationSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     devices: list[Device] = []
-    monkeypatch.setattr(preflight, "connected_devices", lambda: devices)
+    monkeypatch.setattr(preflight, "devices_by_child", lambda: devices)
     live = replace(settings, source="realsense", headset="network")
     assert find("camera", live).health is Health.BROKEN
     assert "plug one into a USB 3 port" in find("camera", live).found
@@ -90,6 +91,31 @@ def test_a_realsense_is_found_or_missed(
     )
     devices[0] = replace(D415, usb="2.1")
     assert find("camera", live).health is Health.LIMITED
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("module", "found"),
+    [
+        ("import os; os.abort()", "librealsense crashed"),
+        ("raise ImportError", "no package exists for macOS"),
+    ],
+)
+def test_an_sdk_that_crashes_or_is_missing_is_named(
+    settings: StationSettings,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    module: str,
+    found: str,
+) -> None:
+    (tmp_path / "pyrealsense2.py").write_text(module)
+    path = [str(tmp_path), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, path)))
+    monkeypatch.setattr(sdk_devices, "_LONGEST_LISTING_S", 600.0)
+    finding = find("camera", replace(settings, source="realsense", headset="network"))
+    assert finding.health is Health.BROKEN
+    assert found in finding.found
+    assert "simulator" in finding.advice
 
 
 @pytest.mark.parametrize(
@@ -120,15 +146,13 @@ def test_a_hololens_needs_its_address(settings: StationSettings) -> None:
     assert find("camera", plugged_in).found == "RealSense on the HoloLens 2 at hl, not tried yet"
 
 
-@pytest.mark.parametrize("source", ["realsense", "recording"])
-def test_a_missing_sdk_is_named(
-    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str
+def test_a_recording_without_the_sdk_is_named(
+    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyrealsense2", None)
     path = tmp_path / "hand.db3"
     path.touch()
-    settings = replace(settings, source=source, recording=str(path))  # type: ignore[arg-type]
-    finding = find("camera", settings)
+    finding = find("camera", replace(settings, source="recording", recording=str(path)))
     assert finding.health is Health.BROKEN
     assert "no package exists for macOS" in finding.found
     assert "simulator" in finding.advice
@@ -173,7 +197,7 @@ def test_another_camera_than_the_rig_s_is_reported(
 ) -> None:
     rig = replace(example_rig(), depth_camera=D415.identity)
     write_rig(tmp_path / "rig.yaml", rig)
-    monkeypatch.setattr(preflight, "connected_devices", lambda: [D415])
+    monkeypatch.setattr(preflight, "devices_by_child", lambda: [D415])
     live = replace(settings, source="realsense", headset="network", rig=str(tmp_path / "rig.yaml"))
     assert find("camera", live).health is Health.GOOD
     write_rig(tmp_path / "rig.yaml", replace(rig, depth_camera=CameraIdentity("", "456")))
@@ -209,6 +233,7 @@ def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: P
 def test_a_network_headset_cannot_be_waited_for(
     settings: StationSettings, taken_port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(preflight, "devices_by_child", list)
     assert "simulator" in find("headset", replace(settings, headset="network")).found
     live = replace(settings, source="realsense", headset="network")
     assert "cannot listen" in find("headset", replace(live, port=taken_port)).found
