@@ -7,7 +7,7 @@ from pathlib import Path
 
 from handcal.cli.boards import BOARD_OPTIONS, GRID_OPTION, board_of
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, number, seed
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.types import EYES
@@ -103,7 +103,7 @@ def accept(arguments: argparse.Namespace) -> None:
         default=20,
         help="images of the board for each camera",
     ),
-    arg("--seed", type=number(int, 0, 2**32 - 1), metavar="N", default=1, help="random seed"),
+    seed(),
 )
 def simulate(arguments: argparse.Namespace) -> None:
     """Render the images of an offline calibration and of an acceptance, to practise with."""

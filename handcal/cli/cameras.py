@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, number, seed
 from handcal.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder
@@ -86,13 +86,7 @@ _ROI = arg(
         default=100_000,
         help="stop after this many frames",
     ),
-    arg(
-        "--seed",
-        type=number(int, 0, 2**32 - 1),
-        metavar="N",
-        default=1,
-        help="random seed of the simulated hand and room",
-    ),
+    seed("the simulated hand and room"),
     *REALSENSE_OPTIONS,
     json=True,
 )

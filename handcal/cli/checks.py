@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, fail, number
+from handcal.cli.terminal import arg, command, fail, patience
 from handcal.errors import HandcalError
 
 if TYPE_CHECKING:
@@ -69,13 +69,7 @@ def bench(arguments: argparse.Namespace) -> None:
         help="with --headset and --rig: also measure with the depth camera (realsense) how far the "
         "stamps of poses are off; the wearer holds a hand still and turns the head",
     ),
-    arg(
-        "--patience-s",
-        type=number(float, 1.0, 86_400.0),
-        metavar="S",
-        default=20.0,
-        help="longest time until the headset connects",
-    ),
+    patience("until the headset connects", 20.0),
     *LISTEN,
     KEYS,
 )

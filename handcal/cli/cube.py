@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from handcal.cli.boards import GRID_OPTION
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, number, seed
 from handcal.errors import CameraError, HandcalError
 from handcal.io.files import make_folder
 from handcal.lab.evaluate.cube_folder import CapturePlan
@@ -33,6 +33,13 @@ _SHOWN = (
 _USUAL, _PLAN = Cube(), CapturePlan()
 _SIDE = number(float, 1.0, 1000.0)
 _COUNT = number(int, 1, 100)
+_POSES = arg(
+    "--poses",
+    type=_COUNT,
+    metavar="N",
+    default=_PLAN.poses,
+    help="poses of the cube at each position",
+)
 _RIG_AND_EYE = (
     arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)"),
     arg("--eye", choices=EYES, default="left", help="eye whose display is tested"),
@@ -123,13 +130,7 @@ def net(arguments: argparse.Namespace) -> None:
         metavar="NAME",
         help="positions of the camera",
     ),
-    arg(
-        "--poses",
-        type=_COUNT,
-        metavar="N",
-        default=_PLAN.poses,
-        help="poses of the cube at each position",
-    ),
+    _POSES,
     arg(
         "--drawn",
         nargs="+",
@@ -178,20 +179,8 @@ def capture(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("folder", type=Path, help="new folder for the captures"),
-    arg(
-        "--seed",
-        type=number(int, 0, 2**32 - 1),
-        metavar="N",
-        default=1,
-        help="random seed",
-    ),
-    arg(
-        "--poses",
-        type=_COUNT,
-        metavar="N",
-        default=_PLAN.poses,
-        help="poses of the cube at each position",
-    ),
+    seed(),
+    _POSES,
     arg(
         "--alignments",
         type=number(int, 1, 20),

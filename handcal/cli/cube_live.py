@@ -11,7 +11,7 @@ from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.display_check import network_server
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, number, patience
 from handcal.errors import HandcalError
 from handcal.types import EYES
 
@@ -42,13 +42,7 @@ _CUBE = (
         default="realsense",
         help="realsense; simulator; or the path of a recording with colour",
     ),
-    arg(
-        "--patience-s",
-        type=number(float, 1.0, 86_400.0),
-        metavar="S",
-        default=120.0,
-        help="longest time until the headset connects, and until the cube is in its place",
-    ),
+    patience("until the headset connects, and until the cube is in its place"),
     *LISTEN,
     KEYS,
 )

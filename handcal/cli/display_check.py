@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from handcal.cli.output import console
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, patience
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 
@@ -52,13 +52,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
         default="obeys",
         help="what the simulated headset does with the projection; see docs/offline.md",
     ),
-    arg(
-        "--patience-s",
-        type=number(float, 1.0, 86_400.0),
-        metavar="S",
-        default=120.0,
-        help="longest time until a headset connects",
-    ),
+    patience("until a headset connects"),
     *LISTEN,
     KEYS,
 )

@@ -28,17 +28,18 @@ if TYPE_CHECKING:
     from handcal.types import Intrinsics
 
 _METRES = number(float, 0.1, 100.0)
+_DISPLAY = arg(
+    "--display",
+    type=number(int, 60, 16384),
+    nargs=2,
+    metavar=("WIDTH", "HEIGHT"),
+    default=(1268, 720),
+    help="size of the display in pixels",
+)
 
 
 @command(
-    arg(
-        "--display",
-        type=number(int, 60, 16384),
-        nargs=2,
-        metavar=("WIDTH", "HEIGHT"),
-        default=(1268, 720),
-        help="size of the display in pixels",
-    ),
+    _DISPLAY,
     arg("--png", type=Path, metavar="FILE", required=True, help="image to write"),
     GRID_OPTION,
 )
@@ -57,14 +58,7 @@ def grid(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    arg(
-        "--display",
-        type=number(int, 60, 16384),
-        nargs=2,
-        metavar=("WIDTH", "HEIGHT"),
-        default=(1268, 720),
-        help="size of the display in pixels",
-    ),
+    _DISPLAY,
     arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the patterns"),
 )
 def gray(arguments: argparse.Namespace) -> None:

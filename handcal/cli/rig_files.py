@@ -12,7 +12,7 @@ from handcal.cli.boards import BOARD_OPTIONS, board_of, show_verdict
 from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, patience
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 
@@ -51,13 +51,7 @@ RIG_AND_OUTPUT = (
     ),
     *LISTEN,
     KEYS,
-    arg(
-        "--patience-s",
-        type=number(float, 1.0, 86_400.0),
-        metavar="S",
-        default=120.0,
-        help="longest time until the headset connects",
-    ),
+    patience("until the headset connects"),
     arg(
         "--depth-intrinsics",
         type=Path,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
-from handcal.cli.terminal import arg, command, fail, number
+from handcal.cli.terminal import arg, command, fail, number, patience, seed
 from handcal.errors import LinkError
 from handcal.io.files import make_folder
 
@@ -82,14 +82,8 @@ _SHARE = number(float, 0.0, 1.0)
     ),
     *LISTEN,
     KEYS,
-    arg(
-        "--patience-s",
-        type=number(float, 1.0, 86_400.0),
-        metavar="S",
-        default=120.0,
-        help="longest time for the wearer and the headset to do one step",
-    ),
-    arg("--seed", type=number(int, 0, 2**32 - 1), default=1, help="seed of the simulated wearer"),
+    patience("for the wearer and the headset to do one step"),
+    seed("the simulated wearer"),
     arg(
         "--loss",
         type=_SHARE,

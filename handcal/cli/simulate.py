@@ -9,14 +9,13 @@ from typing import Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.run import ALIGNMENT_OPTIONS
-from handcal.cli.terminal import arg, command, fail, number
+from handcal.cli.terminal import arg, command, fail, number, seed
 from handcal.io.files import make_folder
 from handcal.station.faults import Fault
 
 FAULTS = [fault for fault in get_args(Fault) if fault]
 _CONTRADICTED = 3
 _MAX_CODE = 1000
-_SEED = number(int, 0, 2**32 - 1)
 _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
 _RIG = arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)")
@@ -37,13 +36,7 @@ _LINK = (
         default=Path("results/demo"),
         help="folder in which the session is created",
     ),
-    arg(
-        "--seed",
-        type=_SEED,
-        metavar="N",
-        default=1,
-        help="random seed of the wearer, hand, room and noise",
-    ),
+    seed("the wearer, hand, room and noise"),
     *ALIGNMENT_OPTIONS,
     arg(
         "--plan",
@@ -181,7 +174,7 @@ def _say_contradictions(result: dict[str, Any]) -> None:
         metavar="FILE",
         help="true rig of the headset (default: the same as --rig)",
     ),
-    arg("--seed", type=_SEED, metavar="N", default=1, help="random seed of the wearer"),
+    seed("the wearer"),
     *_LINK,
     arg("--duplicate", type=_SHARE, metavar="P", default=0.0, help="share of datagrams duplicated"),
     arg(

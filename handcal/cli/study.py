@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import Option, arg, command, fail, number
+from handcal.cli.terminal import Option, arg, command, fail, number, seed
 from handcal.errors import CancelledError
 
 if TYPE_CHECKING:
@@ -32,13 +32,7 @@ _STUDY_OPTIONS: dict[str, Option] = {
         metavar="ADDRESS",
         help="Dask cluster to run on, such as tcp://HOST:PORT (default: this computer)",
     ),
-    "--seed": arg(
-        "--seed",
-        type=number(int, 0, 2**32 - 1),
-        metavar="N",
-        default=1,
-        help="random seed of the whole study",
-    ),
+    "--seed": seed("the whole study"),
     "--quick": arg("--quick", action="store_true", help="few trials: do not report the figures"),
 }
 

@@ -156,3 +156,17 @@ def number(kind: type[int] | type[float], low: float, high: float) -> Callable[[
         return value
 
     return convert
+
+
+def seed(of: str = "") -> Option:
+    """Return the option ``--seed``; `of` names what is random, if not everything."""
+    help_text = f"random seed of {of}" if of else "random seed"
+    limits = number(int, 0, 2**32 - 1)
+    return arg("--seed", type=limits, metavar="N", default=1, help=help_text)
+
+
+def patience(until: str, default_s: float = 120.0) -> Option:
+    """Return the option ``--patience-s``; `until` continues "longest time"."""
+    limits = number(float, 1.0, 86_400.0)
+    help_text = f"longest time {until}"
+    return arg("--patience-s", type=limits, metavar="S", default=default_s, help=help_text)
