@@ -302,7 +302,7 @@ def phi_text(shift: EyeShift) -> str:
 
 
 def shift_rows(shifts: Sequence[EyeShift]) -> list[list[str]]:
-    """Return what there is to say of eye shifts as rows of a table, a column for each shift."""
+    """Return a summary of eye shifts as rows of a table, with a column for each shift."""
     coordinates = zip(*map(_coordinates_mm, shifts), strict=True)
     names = ("φ1 (right), mm", "φ2 (down), mm", "φ3 (forward), mm")
     return [

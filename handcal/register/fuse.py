@@ -9,13 +9,13 @@ unknowns, so a prior limits how far the two eyes differ. Everything is Gaussian,
 linear system, in which the alignments add up, weighted by their covariances.
 
 Wearers differ in how precisely they align, by more than can be neglected: an estimate that assumes
-a usual wearer is far too sure of a careless one. So the precision is unknown too, one of
+a usual wearer is far too certain about a careless one. So the precision is unknown too, one of
 `FuseSettings.wearer_scales`, and the estimate is the mean over them, weighted by how well each
 explains the alignments. One alignment says little about it, several say much by their scatter.
 
-An error of the depth camera's depth, as its check against a board leaves it (`DepthCheck`), is
-common to all observations of a wearer: it is added to the covariance of the estimate, and more
-alignments do not reduce it. Without a check it is taken as zero.
+An error of the measured depth, known from the depth check (`DepthCheck`), is common to all
+observations of a wearer: it is added to the covariance of the estimate, and more alignments do not
+reduce it. Without a depth check it is taken as zero.
 
 A verification, in which the wearer moves the drawing of the resting hand until it covers the hand
 (`handcal.register.nudge`), is one more observation of one eye's φ, more precise than an alignment.
@@ -64,8 +64,8 @@ class FuseSettings:
     lateral_sigma_arcmin: float = 4.0
     """Standard deviation of a usual wearer's overlay in each of two directions."""
     depth_sigma: float = 0.004
-    """Relative standard deviation of the depth, by matching the size. These are the errors with
-    which the paper's method errs as in the paper's user test."""
+    """Relative standard deviation of the depth, by matching the size. With these errors,
+    the paper's method has the error of the paper's user test."""
     verified_sigma_arcmin: float = 2.0
     """Standard deviation of a verification by a usual wearer in each of two directions."""
     verified_depth_sigma: float = 0.005
@@ -96,7 +96,7 @@ class Fused:
     verified: Mapping[Eye, tuple[Observation, ...]] = field(default_factory=dict)
     """The φ found by each eye's verifications."""
     unverified: Mapping[Eye, Observation] = field(default_factory=dict)
-    """The verification to expect of each solved eye that was not verified; its φ is zero."""
+    """The expected verification of each solved eye that was not verified; its φ is zero."""
     by_depth_m2: Float64 = field(default_factory=lambda: np.zeros((6, 6)))
     """(6, 6); part of the covariance by errors of the depth camera."""
 

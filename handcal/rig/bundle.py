@@ -116,7 +116,7 @@ def adjust(
 def foreseen(
     points_m: Float64, setup: Setup, lenses: Sequence[LensModel | None]
 ) -> tuple[Float64, Float64]:
-    """Return what the frames of a setup would tell, before they are taken.
+    """Return the information that frames of a setup would give, before they are taken.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ def differences(T: Float64, others: Float64) -> Float64:
 
 
 def why_apart(both: Mapping[str, Pair], alone: Alone, joint_px: Float64) -> tuple[str, bool]:
-    """Return why pairs contradict each other, empty if they do not, and whether it is a few.
+    """Return why pairs contradict each other, empty if they do not; True if only a few do.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from handcal.types import Float64, Intrinsics, UInt8
 MAX_VIEWS = 500
 _CELLS = (8, 6)
 _STANDS_OUT = 1.5
-# If as many images in a row have one problem, it is presumed of the next: to find out takes longer.
+# After so many images in a row with one problem, it is presumed for the next: finding out is slow.
 _EXPLAINED = 3
 _PRESUMED = "presumably as in the first images: "
 _LEAST_MOVED_SHARE = 0.03

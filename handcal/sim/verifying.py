@@ -108,7 +108,7 @@ def _tree(hand: HandModel) -> KDTree:
     return KDTree(hand.vertices_m)
 
 
-class Check:
+class SimulatedVerification:
     """One verification by the wearer, in time.
 
     Parameters

@@ -25,7 +25,7 @@ from handcal.sim.placement import (
     overlay_hand,
     view_through,
 )
-from handcal.sim.verifying import Check, SeenDifference, see_difference
+from handcal.sim.verifying import SeenDifference, SimulatedVerification, see_difference
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.types import EYES, LOOK_AROUND, Eye, Float64
 
@@ -191,7 +191,7 @@ class Wearer:
         self._error = self._draw_error(0.0)
         self._confirmed_s = 0.0
         self._P_confirmed: Mapping[Eye, Float64] = {}
-        self._check: Check | None = None
+        self._verification: SimulatedVerification | None = None
 
     def step(self, view: DisplayView) -> WearerAction:
         """Advance to `view.t_s`, reacting to the displays.
@@ -211,9 +211,9 @@ class Wearer:
         goal = self._T_W_raised if overlay is None else overlay
         self._T_W_hand = self._move.pose(t_s, goal)
         T_W_hand = self._T_W_hand @ self._hand_sway.pose(t_s) @ self._tremor.pose(t_s)
-        if self._check is None or t_s < self._move.end_s:
+        if self._verification is None or t_s < self._move.end_s:
             return WearerAction(T_W_H, T_W_hand, confirm)
-        nudge, fits = self._look(self._check, view, T_W_H, T_W_hand)
+        nudge, fits = self._look(self._verification, view, T_W_H, T_W_hand)
         return WearerAction(T_W_H, T_W_hand, confirm, nudge, fits)
 
     def _look_around(self, view: DisplayView) -> Float64:
@@ -232,7 +232,7 @@ class Wearer:
             self._verify(view, view.verify)
         elif self._phase == "verifying":
             # The hand stays up: another eye may follow, or another cursor.
-            self._phase, self._check = "raised", None
+            self._phase, self._verification = "raised", None
         elif self._phase == "raised":
             wait_s = self._settings.patience_s if task == self._task else 0.0
             if task is not None and view.t_s >= move.end_s + wait_s:
@@ -247,7 +247,7 @@ class Wearer:
 
     def _verify(self, view: DisplayView, request: VerifyRequest) -> None:
         """Hold the hand where it is, and look at the outline."""
-        if self._check is None or self._check.request != request:
+        if self._verification is None or self._verification.request != request:
             settings = self._settings
             right, down, size = self._rng.normal(size=3) * [
                 settings.nudge_sigma_arcmin,
@@ -255,16 +255,22 @@ class Wearer:
                 settings.nudge_size_sigma,
             ]
             error = SeenDifference(right, down, size)
-            self._check = Check(request, error, settings.look_s, settings.press_s)
+            self._verification = SimulatedVerification(
+                request, error, settings.look_s, settings.press_s
+            )
         if self._phase in ("reaching", "awaiting"):
             self._stay(view.t_s)
         self._phase = "verifying"
 
     def _look(
-        self, check: Check, view: DisplayView, T_W_H: Float64, T_W_hand: Float64
+        self,
+        verification: SimulatedVerification,
+        view: DisplayView,
+        T_W_H: Float64,
+        T_W_hand: Float64,
     ) -> tuple[NudgeSum | None, bool]:
         """Return the presses made so far if one is made now, and whether the drawing fits."""
-        eye, outline_W_m = check.request.eye, view.outline_W_m
+        eye, outline_W_m = verification.request.eye, view.outline_W_m
         if outline_W_m is None:
             return None, False
         drawn = view.P[eye] @ view.T_V_H[eye]
@@ -273,7 +279,7 @@ class Wearer:
             display, shift_m = self._rig.eyes[eye], self.true_shift_m[eye]
             return see_difference(display, shift_m, drawn, T_W_H, self._hand, T_W_hand, outline_W_m)
 
-        return check.step(view.t_s, drawn, see)
+        return verification.step(view.t_s, drawn, see)
 
     def _stay(self, t_s: float) -> None:
         """Keep the hand where it is."""

@@ -1,4 +1,4 @@
-"""The plan of a session: which step is next, and doing it when the hand is still.
+"""The plan of a session: decides the next step, and takes it when the hand is still.
 
 The paper's plan is one alignment with both eyes open. In the recommended plan the hand is raised
 once: the cursors are that hand, placed where an alignment is most informative

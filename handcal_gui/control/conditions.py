@@ -1,4 +1,4 @@
-"""The one message about what is wrong at present: it neither flashes nor appears while starting."""
+"""The message about the worst problem at present; it does not flash or appear during the start."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Conditions:
         return replace(snapshot, observation=replace(seen, problem=""))
 
     def _watch_rate(self, camera: CameraStatus, now_s: float) -> None:
-        """Note that frames are few or many are lost, or no longer, once this has lasted."""
+        """Note that frames are few or many are lost, or that it is over, once this has lasted."""
         rate_hz, lost_hz = camera.rate_hz, self._lost_hz(camera, now_s)
         is_few = rate_hz < (_FAST_HZ if self.is_slow else _SLOW_HZ)
         loses = rate_hz < _ENOUGH_HZ and lost_hz > _MOST_LOST * rate_hz

@@ -13,7 +13,7 @@ from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.register.nudge import nudged_shift_m
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
-from handcal.sim.verifying import Check, SeenDifference, see_difference
+from handcal.sim.verifying import SeenDifference, SimulatedVerification, see_difference
 from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
@@ -98,7 +98,9 @@ def test_nothing_is_seen_of_a_drawing_beside_the_display(hand: HandModel) -> Non
     assert see_difference(*args) is None
 
 
-def run(check: Check, error: SeenDifference, seconds: float = 30.0) -> tuple[NudgeSum, float]:
+def run(
+    verification: SimulatedVerification, error: SeenDifference, seconds: float = 30.0
+) -> tuple[NudgeSum, float]:
     """Let a drawing follow the presses after 50 ms; return where it fits, and when."""
     moved, drawn_moved, changes = NudgeSum(), NudgeSum(), 0
     due: list[tuple[float, NudgeSum]] = []
@@ -110,7 +112,9 @@ def run(check: Check, error: SeenDifference, seconds: float = 30.0) -> tuple[Nud
             error.down_arcmin - drawn_moved.down_arcmin,
             error.size - drawn_moved.size,
         )
-        nudge, fits = check.step(float(t_s), np.full(1, float(changes)), partial(_same, left))
+        nudge, fits = verification.step(
+            float(t_s), np.full(1, float(changes)), partial(_same, left)
+        )
         if nudge is not None and nudge != moved:
             moved = nudge
             due.append((t_s + 0.05, nudge))
@@ -124,7 +128,9 @@ def _same(seen: SeenDifference) -> SeenDifference:
 
 
 def test_the_wearer_moves_the_drawing_until_it_fits_within_a_step() -> None:
-    moved, t_s = run(Check(REQUEST, EXACT, 0.6, 0.12), SeenDifference(7.3, -4.1, 0.006))
+    moved, t_s = run(
+        SimulatedVerification(REQUEST, EXACT, 0.6, 0.12), SeenDifference(7.3, -4.1, 0.006)
+    )
     assert (moved.right_arcmin, moved.down_arcmin) == (7.0, -4.0)
     assert moved.size == pytest.approx(0.006)
     assert t_s < 5.0
@@ -132,14 +138,14 @@ def test_the_wearer_moves_the_drawing_until_it_fits_within_a_step() -> None:
 
 def test_the_wearer_s_own_error_stays() -> None:
     error = SeenDifference(2.0, 0.0, 0.0)
-    moved, _ = run(Check(REQUEST, error, 0.6, 0.12), SeenDifference(3.0, 0.0, 0.0))
+    moved, _ = run(SimulatedVerification(REQUEST, error, 0.6, 0.12), SeenDifference(3.0, 0.0, 0.0))
     assert moved.right_arcmin == 5.0
 
 
 def test_a_drawing_that_does_not_follow_ends_all_the_same() -> None:
     """As with a headset that does not draw what it is sent."""
-    check = Check(REQUEST, EXACT, 0.6, 0.12)
+    verification = SimulatedVerification(REQUEST, EXACT, 0.6, 0.12)
     for t_s in np.arange(0.0, 90.0, 1 / 30):
-        if check.step(float(t_s), np.zeros(1), lambda: SeenDifference(9.0, 0.0, 0.0))[1]:
+        if verification.step(float(t_s), np.zeros(1), lambda: SeenDifference(9.0, 0.0, 0.0))[1]:
             return
     raise AssertionError("the wearer was never content")

@@ -117,7 +117,7 @@ def lead_through(
     verified: dict[Eye, Verification] = {}
     results: Results | None = None
     at_rest_m = raised.T_H_hand
-    check = partial(next_verification, usable_eyes=usable_eyes, settings=placement)
+    to_verify = partial(next_verification, usable_eyes=usable_eyes, settings=placement)
     while True:
         planned = next_alignment(
             raised.points_m,
@@ -138,7 +138,7 @@ def lead_through(
             )
             solved.append((alignment, solve_alignment(alignment, wearer.rig)))
             seconds += usual.reaction_s + usual.movement_s + usual.dwell_s
-        elif verify and (eye := check(results, verified)) is not None:
+        elif verify and (eye := to_verify(results, verified)) is not None:
             found = _verify(rng, wearer, sitting, model, eye, shift_m[eye], at_rest_m)
             verified[eye] = found.after(verified.get(eye))
             seconds += model.verify_s

@@ -216,7 +216,7 @@ class SessionPanel(QWidget):
 
 
 def _read_eye_distance(text: str) -> EyeDistance:
-    """Return an eye distance typed in millimetres; ValueError if it is not one of a person."""
+    """Return an eye distance typed in millimetres; ValueError if no person has it."""
     try:
         value_mm = float(text.replace(",", "."))
     except ValueError:

@@ -48,7 +48,7 @@ class AcceptDialog(QDialog):
     Parameters
     ----------
     project : RigProject
-        Images and page are stored in the folder ``accept`` of the project's.
+        Images and page are stored in ``accept`` in the project's folder.
     """
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
