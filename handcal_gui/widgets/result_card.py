@@ -59,7 +59,11 @@ def eye_results(results: Results) -> list[EyeResult]:
         before = Bar(tr("Before, expected"), benefit.without_arcmin)
         if eye in results.measured_arcmin:
             verified, left = results.measured_arcmin[eye]
-            bars = before, Bar(tr("Found by verifying"), verified), Bar(tr("After verifying"), left)
+            bars = (
+                before,
+                Bar(tr("Verification found"), verified),
+                Bar(tr("After verification"), left),
+            )
         else:
             after = Bar(tr("After, expected"), benefit.after_arcmin)
             bars = before, after, Bar(tr("After, measured"), None)

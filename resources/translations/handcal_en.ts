@@ -3178,11 +3178,11 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Found by verifying</source>
+        <source>Verification found</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>After verifying</source>
+        <source>After verification</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
