@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from handcal.camera.clock import FrameClock
 from handcal.errors import HandError, PoseError
 from handcal.geometry import invert, rigid, transform
+from handcal.hand.marks import outline_marks
 from handcal.hand.shipped import make_finder
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer
@@ -230,8 +231,10 @@ class AlignmentSteps:
         self._cursor_id += 1
         self.eyes = tuple(eyes)
         self.state = State.ALIGN
-        outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
-        self._sent_cursor = self._link.send_cursor(outline_W_m, self._cursor_id)
+        outline_m = hand.cloud.contour_m.astype(np.float64)
+        marks_m = outline_marks(outline_m, hand.cloud.contour_is_cut)
+        drawn_W_m = transform(hand.T_W_D, np.vstack([outline_m, marks_m]))
+        self._sent_cursor = self._link.send_cursor(drawn_W_m, self._cursor_id)
         self._link.send_prompt(align_prompt(self.eyes), self.eyes)
         assert self._frame is not None
         self._store.camera(self.camera, self._frame)
