@@ -957,7 +957,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>These calibrations were interrupted. You can resume them.</source>
+        <source>Continue a calibration that was interrupted.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1126,6 +1126,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Guide {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Waiting for the camera&apos;s first image…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
