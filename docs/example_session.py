@@ -15,7 +15,7 @@ from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 from handcal.types import EYES, Alignment, Eye, Float64
 
 TARGET = Path(__file__).parents[1] / "resources/example_session"

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import handcal
 from handcal.cli.terminal import errors_in_one_line
-from handcal.station.procedure import Observation, State
 from handcal.station.settings import StationSettings
+from handcal.station.states import Observation, State
 from handcal.station.station import Station
 
 LIMIT_S, LEAST_STEPS = 60.0, 300

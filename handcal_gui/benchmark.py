@@ -31,9 +31,9 @@ from handcal.lab.bench.speed import noisy_frames
 from handcal.link.pairing import new_pairing_key
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
-from handcal.station.procedure import State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.station.station import Station
 from handcal.types import CameraIdentity, Frame
 from handcal_gui.app import keep_window_quick

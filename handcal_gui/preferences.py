@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias, get_type_hints
 
-from PySide6.QtCore import QStandardPaths
+from PySide6.QtCore import QObject, QStandardPaths, Signal
 
 from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
@@ -157,6 +157,62 @@ class PreferencesFile:
         pairings = Pairings((), self._key_path)
         pairings.open_key()
         return pairings
+
+
+class CurrentPreferences(QObject):
+    """The current preferences and pairing keys; every change is written to their file.
+
+    Parameters
+    ----------
+    file : PreferencesFile
+    remembers : bool
+        False to change the preferences for this run only.
+
+    Attributes
+    ----------
+    now : Preferences
+    pairings : Pairings
+    complaint : str
+        A message for the user about the file as it was read, empty if nothing went wrong.
+    folder : Path
+        The file's folder.
+    not_saved : Signal(str)
+        A change could not be written; a message for the user.
+    """
+
+    not_saved = Signal(str)
+
+    def __init__(self, file: PreferencesFile, remembers: bool) -> None:
+        super().__init__()
+        self._file, self._remembers = file, remembers
+        self.folder = file.path.parent
+        self.now, self.complaint = file.load()
+        try:
+            self.pairings = file.pairings()
+        except FileError as error:
+            self.pairings = Pairings(())  # for this run: the damaged file stays as it is
+            self.complaint = f"{self.complaint} {error}".strip()
+
+    def change(self, **changed: Any) -> None:
+        """Change some of the preferences, by their names."""
+        self.use(replace(self.now, **changed))
+
+    def use(self, preferences: Preferences) -> None:
+        """Replace all preferences."""
+        self.now = preferences
+        try:
+            if self._remembers:
+                self._file.save(preferences)
+        except FileError as error:
+            self.not_saved.emit(tr("The preferences could not be saved: {}").format(error))
+
+    def add_session(self, path: Path) -> None:
+        """Add a session as the newest."""
+        self.use(self.now.with_session(path))
+
+    def renew_pairing_key(self) -> None:
+        """Forget all headsets and make a new key; raises as `PreferencesFile.renew_pairing_key`."""
+        self.pairings = self._file.renew_pairing_key()
 
 
 def _default_path() -> Path:

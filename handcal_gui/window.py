@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
 from functools import partial
-from itertools import pairwise
-from typing import Literal, Protocol
+from typing import Literal
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
     QColor,
-    QIcon,
     QKeyEvent,
     QKeySequence,
     QPainter,
@@ -28,24 +25,22 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QStackedWidget,
     QStatusBar,
-    QTabBar,
-    QTabWidget,
     QWidget,
 )
 
-from handcal.station.snapshot import Snapshot
+from handcal_gui.docks import (
+    TITLES,
+    Docks,
+    Panels,
+    arrange_docks,
+    draw_title_buttons,
+    leave_titles_to_tabs,
+    make_docks,
+    share_room,
+)
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.pages.wizard.wizard import WizardPanel
-from handcal_gui.panels.camera.panel import CameraPanel
-from handcal_gui.panels.cloud.panel import CloudPanel
-from handcal_gui.panels.fine_tune.panel import FineTunePanel
-from handcal_gui.panels.link.panel import LinkPanel
-from handcal_gui.panels.results.panel import ResultsPanel
-from handcal_gui.panels.rotation.panel import RotationPanel
-from handcal_gui.panels.session.panel import SessionPanel
-from handcal_gui.panels.trials.panel import TrialsPanel
-from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.layouts import scrollable, vbox
@@ -53,72 +48,19 @@ from handcal_gui.widgets.layouts import scrollable, vbox
 Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
 _LAYOUT_VERSION = 2
-_CHILDREN_ONLY = Qt.FindChildOption.FindDirectChildrenOnly
-_NARROWEST_PX, _WIDEST_PX = 360, 720
-"""Limits of the initial width of a column of docks."""
 _SMALL_PX = 1200, 690
 """Width and height below which all docks of a window are tabs."""
-_LEFT_COLUMN, _RIGHT_COLUMN = ("camera", "cloud", "rotation"), ("results", "fine_tune")
-_LEFT, _RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
-
-
-_TITLES = {
-    "camera": tr("Camera"),
-    "cloud": tr("Hand cloud"),
-    "wearer_view": tr("Wearer's view"),
-    "rotation": tr("Rotation"),
-    "results": tr("Results"),
-    "fine_tune": tr("Fine-tune"),
-    "trials": tr("Trials"),
-    "session": tr("Session"),
-    "link": tr("Link"),
-}
 _MENUS = {
     "File": tr("&File"),
     "Edit": tr("Edi&t"),  # Alt+E adds the left eye, or exports
     "View": tr("&View"),
     "Help": tr("&Help"),
 }
-_TITLE_BUTTONS = {"qt_dockwidget_closebutton": "close", "qt_dockwidget_floatbutton": "float"}
-"""Icons of a dock's buttons, by the names that Qt gives the buttons."""
-_ICON_TABS = """
-    QTabBar::tab { padding: 5px 9px; width: 20px; border: 0; font-size: 1px; color: transparent; }
-    QTabBar::tab:hover { background: palette(midlight); }
-    QTabBar::tab:selected { background: palette(base); }
-    QTabBar::tab:selected { border-bottom: 2px solid palette(highlight); }
-"""
-"""Tabs without texts, which stay for screen readers and tooltips."""
 _DOCKS_OF_PAGE: dict[Page, frozenset[str]] = {
     "start": frozenset(),
-    "live": frozenset(_TITLES),
+    "live": frozenset(TITLES),
     "review": frozenset({"cloud", "results", "trials", "session"}),
 }
-
-
-class Panel(Protocol):
-    """The interface of every panel."""
-
-    def show_snapshot(self, snapshot: Snapshot) -> None:
-        """Show the panel's part of a snapshot."""
-
-
-@dataclass(frozen=True, slots=True)
-class Panels:
-    """All panels of the window."""
-
-    camera: CameraPanel
-    cloud: CloudPanel
-    wearer_view: WearerViewPanel
-    rotation: RotationPanel
-    results: ResultsPanel
-    fine_tune: FineTunePanel
-    trials: TrialsPanel
-    session: SessionPanel
-    link: LinkPanel
-
-    def all(self) -> Iterator[Panel]:
-        """Return an iterator over all panels."""
-        return (getattr(self, field.name) for field in fields(self))
 
 
 class MainWindow(QMainWindow):
@@ -165,33 +107,28 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(middle)
         self._bar = wizard.bar
         self.setStatusBar(_Strip(self._bar))
-        # GroupedDragging: a dock without title can be undocked by its tab.
-        options = QMainWindow.DockOption
-        self.setDockOptions(
-            options.AnimatedDocks
-            | options.AllowNestedDocks
-            | options.AllowTabbedDocks
-            | options.GroupedDragging
-        )
-        self.setCorner(Qt.Corner.BottomLeftCorner, _LEFT)
-        self.setCorner(Qt.Corner.BottomRightCorner, _RIGHT)
+        self._docks = make_docks(self, panels)
         self._titles_timer = QTimer(self, interval=0, singleShot=True)
         self._titles_timer.timeout.connect(self._leave_titles_to_tabs)
-        self._docks = self._make_docks()
+        for dock in self._docks.values():
+            dock.installEventFilter(self)
+            dock.visibilityChanged.connect(self._titles_timer.start)
+            dock.dockLocationChanged.connect(self._titles_timer.start)
         self._layouts: dict[Page, QByteArray] = {}
         self._page: Page = "start"
         self._arrangement: Arrangement = "panels"
         self._guide = wizard
-        self._default_layouts = {
-            is_small: self._arranged(is_small=is_small) for is_small in (True, False)
-        }
+        self._default_layouts: dict[bool, QByteArray] = {}
+        for is_small in (True, False):
+            arrange_docks(self, self._docks, is_small=is_small)
+            self._default_layouts[is_small] = self.saveState(_LAYOUT_VERSION)
         self._make_menus()
         self._keep_focus_off_clicked_buttons()
         self.show_page("start")
-        follow_theme(self, self._draw_title_buttons)
+        follow_theme(self, partial(draw_title_buttons, self._docks))
 
     @property
-    def docks(self) -> Mapping[str, QDockWidget]:
+    def docks(self) -> Docks:
         """The docks by the names of their panels."""
         return self._docks
 
@@ -229,7 +166,8 @@ class MainWindow(QMainWindow):
                 dock.show()
             dock.toggleViewAction().setEnabled(belongs)
         if page not in self._layouts:
-            self._share_room()
+            review_px = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
+            share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
         self._leave_titles_to_tabs()
 
@@ -325,102 +263,14 @@ class MainWindow(QMainWindow):
         if self._docks_of_page:
             self._layouts[self._page] = self.saveState(_LAYOUT_VERSION)
 
-    def _make_docks(self) -> dict[str, QDockWidget]:
-        docks = {}
-        for name, title in _TITLES.items():
-            dock = QDockWidget(title, self)
-            dock.setObjectName(f"{name}Dock")
-            dock.setWidget(getattr(self.panels, name))
-            dock.installEventFilter(self)
-            dock.visibilityChanged.connect(self._titles_timer.start)
-            dock.dockLocationChanged.connect(self._titles_timer.start)
-            docks[name] = dock
-        return docks
-
-    def _arranged(self, *, is_small: bool) -> QByteArray:
-        """Arrange the docks around the page, in a small window as tabs beside it."""
-        docks, across = self._docks, Qt.Orientation.Vertical
-        for dock in docks.values():
-            dock.hide()  # or the window grows while they stand below one another
-        for name in _LEFT_COLUMN:
-            self.addDockWidget(_LEFT, docks[name])
-        for name in _RIGHT_COLUMN:
-            self.addDockWidget(_LEFT if is_small else _RIGHT, docks[name])
-        behind: dict[str, tuple[str, ...]] = {
-            "results": ("wearer_view", "trials", "session", "link")
-        }
-        if is_small:
-            behind = {"camera": tuple(name for name in docks if name != "camera")}
-        else:
-            for above, below in (*pairwise(_LEFT_COLUMN), *pairwise(_RIGHT_COLUMN)):
-                self.splitDockWidget(docks[above], docks[below], across)
-        for front, others in behind.items():
-            for name in others:
-                self.tabifyDockWidget(docks[front], docks[name])
-        self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
-        return self.saveState(_LAYOUT_VERSION)
-
-    def _share_room(self) -> None:
-        """Divide the window among the docks of a page whose layout the user has not changed."""
-        docks = self._docks
-        across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
-        width, height = self.width(), self.height()
-        left, right = (
-            min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (26, 30)
-        )
-        if self._page == "review":  # the page itself needs little space
-            page = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
-            left = (width - page) * 45 // 100
-            right = width - page - left
-        self.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
-        column = [docks[name] for name in _LEFT_COLUMN]
-        self.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
-        results = height * 45 // 100
-        self.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
-
-    def _draw_title_buttons(self) -> None:
-        """Draw the buttons of docks like other icons: Qt's own are dark in the dark theme, too."""
-        for dock in self._docks.values():
-            for name, drawing in _TITLE_BUTTONS.items():
-                button = dock.findChild(QAbstractButton, name)
-                if button is not None:
-                    button.setIcon(icon(drawing))
-
     def _leave_titles_to_tabs(self) -> None:
-        """Hide the titles of docks whose tabs show the same text."""
-        bars = self.findChildren(QTabBar, options=_CHILDREN_ONLY)
-        without_text = {name for bar in bars for name in self._fit_tabs(bar)}
-        for name, dock in self._docks.items():
-            shared = any(not other.isHidden() for other in self.tabifiedDockWidgets(dock))
-            is_said = shared and name not in without_text
-            title = dock.titleBarWidget()
-            if is_said and title is None:
-                dock.setTitleBarWidget(QWidget(dock))
-            elif not is_said and title is not None:
-                dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
-                title.deleteLater()
-        self._draw_title_buttons()  # Qt recreates them with the titles
-
-    def _fit_tabs(self, bar: QTabBar) -> Iterator[str]:
-        """Show icons in place of texts that do not fit; return the names of those docks."""
-        bar.setElideMode(Qt.TextElideMode.ElideNone)
-        named = {dock.windowTitle(): name for name, dock in self._docks.items()}
-        names = [named[bar.tabText(i)] for i in range(bar.count()) if bar.tabText(i) in named]
-        texts_px = sum(
-            bar.fontMetrics().horizontalAdvance(self._docks[name].windowTitle()) for name in names
-        )
-        room_px = max((self._docks[name].width() for name in names), default=0)
-        has_icons = texts_px + 3 * SPACING_PX * len(names) > room_px
-        bar.setStyleSheet(_ICON_TABS if has_icons else "")
-        for i, name in enumerate(names):
-            bar.setTabIcon(i, icon(name.replace("_", "-")) if has_icons else QIcon())
-        return iter(names if has_icons else ())
+        leave_titles_to_tabs(self, self._docks)
 
     def _make_menus(self) -> None:
         self.menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}
         view = self.menus["View"]
         go_to = view.addMenu(tr("&Go to"))
-        for number, (name, title) in enumerate(_TITLES.items(), 1):
+        for number, (name, title) in enumerate(TITLES.items(), 1):
             go_to.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
         self._station = view.addAction(
             tr("&Station: the guide alone"), QKeySequence("F11"), self._swap

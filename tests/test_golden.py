@@ -38,8 +38,8 @@ from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.procedure import CalibrationSettings
 from handcal.station.solve_again import solve_again
+from handcal.station.states import CalibrationSettings
 from handcal.types import EYES, METHODS, Alignment, Eye, Float64
 from tests.helpers import DATA
 

@@ -30,9 +30,10 @@ from handcal.station.faults import Fault
 from handcal.station.follow import Patience, deliver, follow_plan
 from handcal.station.former import SLIP_M
 from handcal.station.plan import PlanSettings, paper_alignments, usable_eyes
-from handcal.station.procedure import Calibration, Observation
+from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import Observation
 from handcal.station.station import Station
 from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName
 

@@ -33,7 +33,7 @@ from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
 from handcal.sim.cube_bench import simulated_wearer
 from handcal.station.drawing import Drawing
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 from handcal.types import EYES, Float64, Frame, UInt8
 
 _WAITING = 30  # frames whose head pose has not arrived

@@ -35,7 +35,7 @@ from handcal.station.headset import (
     headset_state,
     run_pose_delay,
 )
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 from handcal.types import CameraIdentity, Intrinsics
 
 _PACKAGES = (

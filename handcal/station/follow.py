@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from handcal.errors import HandcalError
 from handcal.progress import Progress
 from handcal.station.plan import StepName
-from handcal.station.procedure import Observation, State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import Observation, State
 from handcal.station.station import Station
 from handcal.types import Eye
 

@@ -33,13 +33,8 @@ from handcal.link.server import HeadsetServer
 from handcal.register.results import Results, results_json, solve_session
 from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
-from handcal.station.states import MAX_HAND_SET_SHIFT_M as MAX_HAND_SET_SHIFT_M
-from handcal.station.states import CalibrationSettings as CalibrationSettings
-from handcal.station.states import Observation as Observation
-from handcal.station.states import ProcedureError as ProcedureError
-from handcal.station.states import State as State
+from handcal.station.states import MAX_HAND_SET_SHIFT_M, CalibrationSettings, ProcedureError, State
 from handcal.station.verifications import VerificationSteps
-from handcal.station.verifying import Verifying as Verifying
 from handcal.types import EYES, Eye, EyeDistance, Float64, PlanName
 
 _UNSETTLED = (State.ALIGN, State.VERIFY, State.APPLYING)

@@ -13,7 +13,7 @@ from handcal.io.resources import resource_path
 from handcal.sim.hand import Side
 from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 
 Source = Literal["simulator", "recording", "realsense", "hololens2", "oak", "orbbec"]
 HeadsetKind = Literal["virtual", "network"]

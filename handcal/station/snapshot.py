@@ -13,7 +13,8 @@ from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
 from handcal.station.hands import PlacedHand
 from handcal.station.plan import NextStep
-from handcal.station.procedure import Calibration, Observation, State
+from handcal.station.procedure import Calibration
+from handcal.station.states import Observation, State
 from handcal.station.verifying import VerifyingView
 from handcal.station.wearer_view import EyeView
 from handcal.types import Alignment, Eye, Float64, Frame, PlanName, Verification

@@ -11,7 +11,7 @@ from handcal.io.settings import read_settings
 from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 from handcal.types import METHODS, EyeDistance, Method
 
 

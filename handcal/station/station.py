@@ -13,23 +13,18 @@ from pathlib import Path
 
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
-from handcal.display import target_corners_m
 from handcal.errors import FileError, LinkError
 from handcal.geometry import transform
 from handcal.io.closable import Closable
-from handcal.link.invitation import Invitation
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
-from handcal.link.shapes import Target
 from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
 from handcal.session.state import Kind
-from handcal.session.trial import make_trial
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
-from handcal.station.comparing import Comparing
 from handcal.station.eye_views import EyeViews
 from handcal.station.former import Former, read_former
 from handcal.station.hands import PlacedHand
@@ -42,11 +37,13 @@ from handcal.station.opening import (
     with_session_prior,
 )
 from handcal.station.plan import NextStep, Plan, StepName
-from handcal.station.procedure import Calibration, Observation, ProcedureError, State
+from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot, read_procedure
+from handcal.station.states import Observation, ProcedureError, State
+from handcal.station.trials import Trials
 from handcal.station.verifying import skipped_eyes
-from handcal.types import Eye, Float64, Frame, HeadsetIdentity
+from handcal.types import Frame, HeadsetIdentity
 
 _STORE_PERIOD_S = 1.0
 
@@ -72,7 +69,7 @@ class Station(Closable):
     calibration : Calibration
     session : Session
     plan : Plan
-    comparing : Comparing
+    trials : Trials
     holds_plan : bool
         True to hold an automatic plan before its next step.
 
@@ -147,24 +144,17 @@ class Station(Closable):
                 self.calibration, self.rig, settings, self._simulation, self.worn_rig
             )
             self._stack = stack.pop_all()
-        self.comparing = Comparing(self.session, self.show_offline)
+        self.trials = Trials(self.calibration, self.rig, self._link, self.session)
         self._number = 0
         self._frame: Frame | None = None
         self._not_applied = self._not_stored = ""
         self._next_store_s = 0.0
         self._revision = self.session.revision
-        self._is_offline = False
-        self._target_E_m: dict[Eye, Float64] = {}  # only for the eye to which it is shown
 
     @property
     def pairing_key(self) -> str:
         """The key with which the next new headset connects."""
         return self._pairings.open_key()
-
-    @property
-    def pairings(self) -> Pairings:
-        """The headsets that may connect."""
-        return self._pairings
 
     @property
     def link(self) -> HeadsetServer:
@@ -175,20 +165,6 @@ class Station(Closable):
     def headset(self) -> HeadsetIdentity | None:
         """The connected headset, as it introduced itself; None before it has."""
         return self._link.device
-
-    def invite(self) -> Invitation:
-        """Let one new headset pair within ten minutes, by QR code or digits.
-
-        Raises
-        ------
-        LinkError
-            If this machine has no network.
-        """
-        return self._link.invite()
-
-    def withdraw_invitation(self) -> None:
-        """End the invitation, if there is one."""
-        self._link.withdraw()
 
     @property
     def address(self) -> tuple[str, int]:
@@ -219,11 +195,7 @@ class Station(Closable):
             pass  # the procedure keeps the data; `_store_waiting` reports the problem
         if self.calibration.state is not State.SOLVED:
             self._not_applied = ""
-        if self.calibration.state is not State.APPLIED:
-            self.hide_target()
-            self.comparing.end()
-            self.show_offline(False)
-        self.comparing.check(self.calibration.applied_shift_m)
+        self.trials.follow_procedure()
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
@@ -247,9 +219,9 @@ class Station(Closable):
             ),
             record=self._record,
             # A view of what the headset draws would reveal which drawing is shown.
-            views={} if self.comparing.shown else dict(self._views.shown),
-            comparing=self.comparing.shown,
-            has_compared_both=self.comparing.has_seen_both,
+            views={} if self.trials.comparing.shown else dict(self._views.shown),
+            comparing=self.trials.comparing.shown,
+            has_compared_both=self.trials.comparing.has_seen_both,
         )
         for watcher in self._watchers:
             watcher(snapshot)
@@ -285,32 +257,10 @@ class Station(Closable):
 
     def finish(self) -> None:
         """Record the link statistics and finish the session; FileError if it cannot be written."""
-        self.hide_target()
+        self.trials.hide_target()
         self.calibration.store_waiting()
         self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()
-
-    def save_trial(self, eye: Eye, depth_m: float) -> int:
-        """Save a trial: the solved φ against the one set by hand, for a target at a distance.
-
-        Raises
-        ------
-        ProcedureError
-            If the eye is not solved.
-        FileError
-            If the session cannot be written.
-        """
-        results = self.calibration.results
-        if results is None or eye not in results.eyes:
-            raise ProcedureError(f"solve the {eye} eye first")
-        trial = make_trial(
-            self.rig.eyes[eye],
-            eye,
-            depth_m,
-            results.rendered_shift_m[eye],
-            self.calibration.applied_shift_m[eye],
-        )
-        return self.session.save_trial(trial)
 
     def delete(self, kind: Kind, number: int) -> None:
         """Delete an alignment or a trial; it can be restored.
@@ -337,58 +287,6 @@ class Station(Closable):
         else:
             with suppress(FileError):
                 self.calibration.restore_alignment(number)
-
-    def show_target(self, eye: Eye, depth_m: float) -> None:
-        """Show the target of a trial to one eye in the headset, while the solved φ is applied.
-
-        Raises
-        ------
-        ProcedureError
-            Unless the solved φ is applied.
-        LinkError
-            If the link is closed.
-        """
-        if self.calibration.state is not State.APPLIED:
-            raise ProcedureError("solve and apply first")
-        corners_E_m = target_corners_m(depth_m)
-        self._link.send_target(Target(eye, corners_E_m - self.rig.eyes[eye].t_C0_V_m))
-        self._target_E_m = {eye: corners_E_m}
-
-    def compare(self) -> None:
-        """Begin a blinded comparison of the offline calibration and the applied φ.
-
-        Raises
-        ------
-        ProcedureError
-            Unless the solved φ is applied, or if it is the offline one.
-        LinkError
-            If the link is closed.
-        """
-        if self.calibration.state is not State.APPLIED:
-            raise ProcedureError("solve and apply first")
-        self.comparing.begin(self.calibration.applied_shift_m)
-
-    def hide_target(self) -> None:
-        """Hide the target if it is shown."""
-        if self._target_E_m:
-            self._link.send_target(None)
-            self._target_E_m = {}
-
-    def show_offline(self, is_shown: bool) -> None:
-        """Have the headset draw with the offline calibration, or with the applied one again.
-
-        Raises
-        ------
-        ProcedureError
-            Unless the solved φ is applied.
-        LinkError
-            If the link is closed.
-        """
-        if is_shown and self.calibration.state is not State.APPLIED:
-            raise ProcedureError("solve and apply first")
-        if is_shown != self._is_offline:
-            self._link.send_show(is_shown)
-            self._is_offline = is_shown
 
     def require_headset(self) -> None:
         """Raise LinkError if the virtual headset has ended."""
@@ -424,8 +322,8 @@ class Station(Closable):
             # The wearer judges the calibration by this outline on their own hand.
             outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
             self._link.send_live_hand(outline_W_m, False, is_outline=True)
-        if self.watch_views and not self.comparing.shown:
-            self._views.render_next(hand, self._target_E_m, self._is_offline)
+        if self.watch_views and not self.trials.comparing.shown:
+            self._views.render_next(hand, self.trials.target_E_m, self.trials.is_offline)
 
     def _link_problem(self, link: LinkStatistics) -> str:
         try:

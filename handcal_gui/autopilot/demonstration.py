@@ -77,7 +77,7 @@ class Demonstration(QObject):
 
     def _export(self) -> None:
         self._program.live.ended.disconnect(self._fail)  # from now on the engine may end
-        dialog = self._program.export(self._output)
+        dialog = self._program.windows.export(self._output)
         if dialog is None:
             self._fail("there was nothing to export")
             return

@@ -119,11 +119,11 @@ class Tour(QObject):
         """Save the dialogs and windows that the menus open."""
         program = self._program
         opened: dict[str, Callable[[], QWidget | None]] = {
-            "sessions": program.show_library,
-            "connect": program.connect_headset,
-            "rig": program.calibrate_rig,
-            "evaluate": program.evaluate,
-            "support": program.make_support_bundle,
+            "sessions": program.windows.show_library,
+            "connect": program.windows.connect_headset,
+            "rig": program.windows.calibrate_rig,
+            "evaluate": program.windows.evaluate,
+            "support": program.windows.make_support_bundle,
         }
         for name, open_dialog in opened.items():
             dialog = open_dialog()

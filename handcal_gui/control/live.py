@@ -17,19 +17,20 @@ from handcal.errors import FileError
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings
 from handcal.session.session import Session
-from handcal.station.procedure import Calibration, State
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal.types import EyePlan
+from handcal_gui.control.commands import calibrating, command_of, connect_panels
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.conditions import Conditions
+from handcal_gui.docks import Panel
 from handcal_gui.engine.engine_thread import Command, EngineThread
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import ACTION_NAMES, Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.translation import tr
-from handcal_gui.window import MainWindow, Panel
+from handcal_gui.window import MainWindow
 
 _POLL_MS = 25
 """A snapshot is shown as soon as it arrives; this is for one that was too early and stays."""
@@ -44,8 +45,6 @@ _PANELS_OF_STEPS = {
 """The panel to show when a step begins."""
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot of those that the guide shows."""
-_RECORD = tr("record the trial")
-_KINDS = {"alignment": tr("alignment"), "trial": tr("trial")}
 _NO_BRIDGES = BridgeSettings()
 
 
@@ -171,54 +170,29 @@ class CalibrationController(QObject):
             self._perform(action, self._snapshot)
 
     def _perform(self, action: Action, snapshot: Snapshot) -> None:
-        eyes = self._wizard_panel.wizard.eyes(snapshot)
-        commands: dict[Action, Callable[[Calibration], object]] = {
-            Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
-            Action.CONFIRM: _confirm,
-            Action.SOLVE: Calibration.solve,
-            Action.APPLY: Calibration.apply,
-            Action.REDO: Calibration.redo,
-            Action.VERIFIED: Calibration.verified,
-            Action.UNDO_NUDGE: Calibration.undo_nudge,
-        }
-        unverified = self._wizard_panel.wizard.unverified(snapshot)
-        if unverified:
-            commands[Action.VERIFY] = lambda calibration: calibration.verify(unverified[0])
-        is_planned = isinstance(self._wizard_panel.wizard, PlannedWizard)
-        if snapshot.procedure.state is State.VERIFY:
-            commands[Action.SKIP] = _skip
-        if is_planned:
-            commands |= {
-                Action.ANOTHER: lambda calibration: calibration.make_cursor(eyes),
-                Action.CHECK_LEFT: lambda calibration: calibration.verify("left"),
-                Action.CHECK_RIGHT: lambda calibration: calibration.verify("right"),
-            }
-        stationwide: dict[Action, Command] = {Action.FINISH: Station.finish}
-        if is_planned:
-            stationwide |= {Action.TAKE_STEP: Station.take_step, Action.SKIP: _skip_planned}
-        if action is Action.SKIP and not is_planned:
-            self._wizard_panel.wizard.move(action, snapshot)
-        if action in stationwide:
-            self._doing = self._submit(action.value, stationwide[action])
-        elif action in commands:
-            self._doing = self._calibrate(action.value, commands[action])
-        else:
-            if action is not Action.SKIP:
-                self._wizard_panel.wizard.move(action, snapshot)
+        wizard = self._wizard_panel.wizard
+        command = command_of(action, wizard, snapshot)
+        skips = action is Action.SKIP and not isinstance(wizard, PlannedWizard)
+        if command is None or skips:
+            wizard.move(action, snapshot)
+        if command is None:
             self._wizard_panel.show_snapshot(snapshot)
+        else:
+            self._doing = self._submit(action.value, command)
 
     def _nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
         """Move the drawing of the eye that is verified."""
         verifying = self._snapshot.procedure.verifying if self._snapshot is not None else None
         if verifying is not None:
             eye = verifying.eye
-            self._calibrate(
-                tr("move the outline"), lambda c: c.nudge(eye, right_arcmin, down_arcmin, size)
+            self._submit(
+                tr("move the outline"),
+                calibrating(lambda c: c.nudge(eye, right_arcmin, down_arcmin, size)),
             )
 
     def _go_back(self, to: Literal["offline", "former"]) -> None:
         """Have the headset draw with another φ."""
-        self._calibrate(tr("go back"), lambda calibration: calibration.go_back(to))
+        self._submit(tr("go back"), calibrating(lambda calibration: calibration.go_back(to)))
 
     def _connect(self) -> None:
         panels = self._window.panels
@@ -230,77 +204,11 @@ class CalibrationController(QObject):
         )
         for name, dock in self._window.docks.items():
             dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
-        self._connect_fine_tuning()
-        self._connect_session()
-        panels.link.restart_headset_requested.connect(
-            lambda: self._submit(tr("restart the headset"), Station.restart_headset)
-        )
-
-    def _connect_fine_tuning(self) -> None:
-        fine_tune, trials = self._window.panels.fine_tune, self._window.panels.trials
-        fine_tune.shift_changed.connect(
-            lambda shifts_m: self._calibrate(tr("set φ"), lambda c: c.set_shift(shifts_m))
-        )
-        fine_tune.shift_settled.connect(
-            lambda: self._calibrate(tr("record φ"), Calibration.record_shift)
-        )
-        # A φ shown only for comparison is not the one that the trial is about.
-        trials.trial_requested.connect(fine_tune.settle)
-        trials.trial_requested.connect(
-            lambda eye, depth_m: self._submit(_RECORD, lambda s: s.save_trial(eye, depth_m))
-        )
-        trials.show_target_requested.connect(
-            lambda eye, depth_m: self._submit(
-                tr("show the target"), lambda s: s.show_target(eye, depth_m)
-            )
-        )
-        trials.hide_target_requested.connect(
-            lambda: self._submit(tr("hide the target"), Station.hide_target)
-        )
-        compare = tr("compare")
-        trials.compare_requested.connect(lambda: self._submit(compare, Station.compare))
-        trials.end_comparison_requested.connect(
-            lambda: self._submit(compare, lambda s: s.comparing.end())
-        )
-        trials.show_compared_requested.connect(
-            lambda place: self._submit(compare, lambda s: s.comparing.show(place))
-        )
-        trials.comparison_answered.connect(
-            lambda answer: self._submit(compare, lambda s: s.comparing.answer(answer))
-        )
-        trials.doubted.connect(partial(self._on_command_failed, _RECORD))
-
-    def _connect_session(self) -> None:
-        session, trials = self._window.panels.session, self._window.panels.trials
-        for panel in (session, trials):
-            panel.delete_requested.connect(
-                lambda kind, number: self._submit(
-                    tr("delete the {}").format(_KINDS[kind]), lambda s: s.delete(kind, number)
-                )
-            )
-            panel.restore_requested.connect(
-                lambda kind, number: self._submit(
-                    tr("restore the {}").format(_KINDS[kind]), lambda s: s.restore(kind, number)
-                )
-            )
-        session.notes_changed.connect(self._save_notes)
-        session.eye_distance_changed.connect(
-            lambda typed: self._calibrate(
-                tr("set the eye distance"), lambda c: c.set_eye_distance(typed)
-            )
-        )
+        panels.session.notes_changed.connect(self._save_notes)
+        connect_panels(panels, self._submit, self._on_command_failed)
 
     def _submit(self, name: str, command: Command) -> int:
         return self._engine.submit(name, command) if self._engine is not None else 0
-
-    def _calibrate(self, name: str, command: Callable[[Calibration], object]) -> int:
-        """Submit a command to the procedure; it keeps data that it cannot write yet."""
-
-        def command_station(station: Station) -> None:
-            with suppress(FileError):
-                command(station.calibration)
-
-        return self._submit(name, command_station)
 
     def _poll(self) -> None:
         if self._engine is None or not self._timer.isActive():
@@ -418,26 +326,7 @@ class CalibrationController(QObject):
         self.ended.emit(why)
 
 
-def _confirm(calibration: Calibration) -> None:
-    """Confirm for the wearer, who may have done so already."""
-    if calibration.state is State.ALIGN:
-        calibration.confirm()
-
-
 def _held(station: Station) -> Station:
     """Hold the plan of a station that was just opened, until the guide lets it go."""
     station.holds_plan = True
     return station
-
-
-def _skip_planned(station: Station) -> None:
-    """Skip the verification, which the wearer may have ended already; the plan continues."""
-    with suppress(FileError):
-        if station.calibration.state is State.VERIFY:
-            station.plan.skip()
-
-
-def _skip(calibration: Calibration) -> None:
-    """Skip the verification, which the wearer may have ended already."""
-    if calibration.state is State.VERIFY:
-        calibration.skip_verification()

@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.hand.settings import Roi
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 from handcal.types import Method
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr

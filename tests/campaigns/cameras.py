@@ -16,8 +16,8 @@ import numpy as np
 from handcal.camera.camera import Camera
 from handcal.errors import CameraError, CameraTimeoutError, HandcalError
 from handcal.io.closable import Closable
-from handcal.station.procedure import State
 from handcal.station.settings import StationSettings
+from handcal.station.states import State
 from handcal.station.station import Station
 from handcal.types import EYES, Frame
 from tests.campaigns.campaign import Tally, campaign

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from handcal.errors import HandcalError
-from handcal.station.procedure import State
 from handcal.station.settings import StationSettings
+from handcal.station.states import State
 from handcal.station.station import Station
 from handcal.types import EYES
 from tests.campaigns.campaign import Tally, campaign

@@ -11,7 +11,7 @@ from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 from handcal.types import Alignment
 
 RIG = example_rig()

@@ -36,9 +36,9 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.station.hands import PlacedHand
-from handcal.station.procedure import CalibrationSettings, Observation, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.states import CalibrationSettings, Observation, State
 from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import (
     EYES,

@@ -14,8 +14,8 @@ from handcal.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.register.guard import GuardSettings
-from handcal.station.procedure import CalibrationSettings
 from handcal.station.settings import StationSettings
+from handcal.station.states import CalibrationSettings
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
 from handcal_gui.preferences import PREFERENCES_VERSION, Preferences, PreferencesFile
 

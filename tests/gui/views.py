@@ -9,8 +9,8 @@ from typing import Any
 from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
 from handcal.station.plan import NextStep, StepName
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import EYES, Eye, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.planned import PlannedWizard

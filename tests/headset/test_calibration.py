@@ -13,9 +13,9 @@ import pytest
 from handcal.cli.demo import DemoSettings, run_demo
 from handcal.io.resources import resource_path
 from handcal.progress import Progress
-from handcal.station.procedure import CalibrationSettings, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import CalibrationSettings, State
 from handcal.station.station import Station
 from handcal.types import EYES
 from tests.headset.mono_client import command

@@ -16,7 +16,7 @@ from handcal.cli.demo import DemoSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings, settings_json
 from handcal.register.fuse import FuseSettings
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses

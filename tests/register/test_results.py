@@ -22,7 +22,7 @@ from handcal.register.verdict import VerdictSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.procedure import CalibrationSettings
+from handcal.station.states import CalibrationSettings
 from handcal.types import EYES, METHODS, Alignment, EyeDistance, Method
 
 RIG = example_rig()

@@ -23,7 +23,8 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.station.delay import DelaySettings
-from handcal.station.procedure import Calibration, CalibrationSettings, Observation, State
+from handcal.station.procedure import Calibration
+from handcal.station.states import CalibrationSettings, Observation, State
 from handcal.types import EYES, Eye, Float64, Frame, HeadsetIdentity, Intrinsics, UInt16
 from tests.helpers import eventually
 

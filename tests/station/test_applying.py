@@ -12,8 +12,9 @@ from handcal.errors import LinkError
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.session.session import Session
-from handcal.station.procedure import Calibration, ProcedureError, State
+from handcal.station.procedure import Calibration
 from handcal.station.solve_again import solve
+from handcal.station.states import ProcedureError, State
 from handcal.types import EYES, Eye, Float64, Verdict
 from tests.helpers import eventually
 from tests.station.stage import (

@@ -6,7 +6,7 @@ import numpy as np
 
 from handcal.display import view_of_eye
 from handcal.geometry import rigid
-from handcal.station.procedure import State
+from handcal.station.states import State
 from handcal.types import EYES
 from tests.helpers import eventually
 from tests.station.stage import RIG, T_D_HAND, T_D_NEAR, T_W_H, Stage

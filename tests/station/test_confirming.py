@@ -16,7 +16,7 @@ from handcal.link.server import HeadsetServer
 from handcal.register.guard import RotationGuard
 from handcal.session.session import Session
 from handcal.station.aligning import ADVISE_EVERY_NS, align_prompt
-from handcal.station.procedure import CalibrationSettings, ProcedureError, State
+from handcal.station.states import CalibrationSettings, ProcedureError, State
 from handcal.types import EYES, Float64
 from tests.helpers import eventually
 from tests.station.stage import (

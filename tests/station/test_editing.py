@@ -14,8 +14,8 @@ from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
-from handcal.station.procedure import ProcedureError, State
 from handcal.station.solve_again import solve
+from handcal.station.states import ProcedureError, State
 from handcal.types import Eye, EyeDistance, Float64, Projection
 from tests.helpers import eventually
 from tests.station.stage import IDENTITY, RIG, T_D_HAND, Stage, shows, shows_offline_projections

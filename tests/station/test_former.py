@@ -11,7 +11,8 @@ import pytest
 from handcal.errors import FileError
 from handcal.session.session import Session
 from handcal.station.former import SLIP_M, read_former
-from handcal.station.procedure import Calibration, ProcedureError, State
+from handcal.station.procedure import Calibration
+from handcal.station.states import ProcedureError, State
 from handcal.types import EYES, Eye, Float64, Verdict
 from tests.helpers import eventually
 from tests.station.stage import RIG, SETTINGS, Stage, events

@@ -16,7 +16,8 @@ from handcal.link.server import HeadsetServer
 from handcal.register.placement import PlacementSettings
 from handcal.session.session import Session
 from handcal.station.plan import NextStep, Plan, PlanSettings, StepName
-from handcal.station.procedure import Calibration, State
+from handcal.station.procedure import Calibration
+from handcal.station.states import State
 from handcal.station.verifying import skipped_eyes
 from handcal.types import EYES, Eye
 from tests.helpers import eventually

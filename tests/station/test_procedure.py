@@ -17,7 +17,8 @@ from handcal.link.server import HeadsetServer
 from handcal.register.results import results_json
 from handcal.session.session import Session
 from handcal.station.evidence import FROZEN_FRAMES
-from handcal.station.procedure import Calibration, CalibrationSettings, ProcedureError, State
+from handcal.station.procedure import Calibration
+from handcal.station.states import CalibrationSettings, ProcedureError, State
 from handcal.types import EYES, Eye, Float64, Frame
 from tests.helpers import eventually
 from tests.station.stage import (

@@ -25,9 +25,9 @@ from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.delay import DelaySettings
 from handcal.station.faults import Fault
 from handcal.station.plan import PlanSettings
-from handcal.station.procedure import CalibrationSettings, ProcedureError, State
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import CalibrationSettings, ProcedureError, State
 from handcal.station.station import Station
 from handcal.station.verifying import SKIPPED
 from handcal.types import EYES, Alignment, Eye, Float64, Frame
@@ -103,13 +103,13 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         )
         assert (steady.problem, steady.link_problem, steady.camera.problem) == ("", "", "")
         with pytest.raises(ProcedureError, match="solve the left eye"):
-            station.save_trial("left", 0.5)
+            station.trials.save("left", 0.5)
         with pytest.raises(ProcedureError, match="solve and apply"):
-            station.show_target("left", 0.5)
+            station.trials.show_target("left", 0.5)
         with pytest.raises(ProcedureError, match="solve and apply"):
-            station.show_offline(True)
+            station.trials.show_offline(True)
         with pytest.raises(ProcedureError, match="solve and apply"):
-            station.compare()
+            station.trials.compare()
         calibration.make_cursor(EYES)
         refused = step_until(station, "a refusal", lambda s: s.procedure.refused > 0, PATIENCE_S)
         assert "turned" in refused.procedure.refusal
@@ -128,7 +128,7 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         before_m, after_m = map(errors_m, (aligned.procedure.applied_shift_m, applied_m))
         assert all(after_m[eye] < 0.8 * before_m[eye] for eye in EYES)
 
-        station.show_target("left", 0.5)
+        station.trials.show_target("left", 0.5)
         targeted = step_until(
             station,
             "a view of the target",
@@ -140,19 +140,19 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         assert missed_px.min() > 0.0
         assert len(targeted.views["right"].target_px) == 0
 
-        station.compare()
+        station.trials.compare()
         compared = station.step()
         assert (compared.comparing, compared.has_compared_both) == ("first", False)
         assert compared.views == {}  # they would tell which drawing is shown
-        station.comparing.show("second")
+        station.trials.comparing.show("second")
         assert station.step().has_compared_both
-        station.comparing.answer("second")
-        station.show_offline(True)
-        station.show_offline(False)  # nothing else may change
+        station.trials.comparing.answer("second")
+        station.trials.show_offline(True)
+        station.trials.show_offline(False)  # nothing else may change
         solved_m = applied_m["left"]
         adjusted_m = solved_m + np.array([0.001, 0.0, 0.0])
         calibration.set_shift({"left": adjusted_m})
-        station.save_trial("left", 0.5)
+        station.trials.save("left", 0.5)
         station.delete("trial", 1)
         assert list(Session.open(station.session.path).deleted_trials) == [1]
         station.restore("trial", 1)

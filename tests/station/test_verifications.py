@@ -14,7 +14,7 @@ from handcal.link.nudges import MAX_NUDGE_ARCMIN, NudgeSum
 from handcal.link.server import HeadsetServer
 from handcal.register.nudge import nudged_shift_m
 from handcal.session.session import Session
-from handcal.station.procedure import ProcedureError, State
+from handcal.station.states import ProcedureError, State
 from handcal.types import EYES, Eye, EyeDistance, Float64
 from tests.helpers import eventually
 from tests.station.stage import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from handcal.station.plan import NextStep, StepName
-from handcal.station.procedure import State
 from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.states import State
 from handcal.types import EYES, Eye, EyePlan
 from handcal_gui.pages.wizard.checks import (
     hand_check,

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName
 from handcal_gui.pages.wizard.checks import (

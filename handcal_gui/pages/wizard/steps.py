@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from handcal.register.verdict import Advice
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import EYES, Alignment, Eye, EyePlan
 from handcal_gui.pages.wizard.checks import (
     hand_check,

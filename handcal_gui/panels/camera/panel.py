@@ -22,8 +22,8 @@ from handcal.errors import FileError
 from handcal.hand.overlay import contour_px
 from handcal.hand.settings import SegmentSettings
 from handcal.io.files import write_atomic
-from handcal.station.procedure import Observation
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import Observation
 from handcal.types import Frame
 from handcal_gui.panels.camera.depth_scale import DepthColors, DepthLegend
 from handcal_gui.panels.camera.hand_overlay import HandOverlay

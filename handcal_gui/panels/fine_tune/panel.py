@@ -21,8 +21,8 @@ from PySide6.QtWidgets import (
 
 from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
 from handcal.rig_types import Rig
-from handcal.station.procedure import MAX_HAND_SET_SHIFT_M, State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import MAX_HAND_SET_SHIFT_M, State
 from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.fine_tune.editor import EyeShiftEditor

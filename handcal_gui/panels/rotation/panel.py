@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal.register.guard import turn_advice
 from handcal.station.hands import PlacedHand
-from handcal.station.procedure import Observation, State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import Observation, State
 from handcal.types import Float64
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.turning_hand import TurningHand

@@ -17,8 +17,8 @@ from handcal.display import TARGET_DEPTHS_M
 from handcal.session.comparison import read_comparisons
 from handcal.session.session import SessionRecord
 from handcal.session.trial import summarise_trials
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.trials.comparison_row import ComparisonRow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QItemSelectionModel, Qt, Signal
@@ -17,15 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.progress import Progress
-from handcal.session.library import (
-    LibraryEntry,
-    delete_session,
-    deleted_sessions,
-    read_library,
-    restore_session,
-)
-from handcal.session.repair import check_session, repair_session
+from handcal.session.library import LibraryEntry, deleted_sessions, read_library
 from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.keys import add_action
@@ -42,9 +35,14 @@ from handcal_gui.windows.library.sessions_model import (
     SessionsFilter,
     SessionsModel,
 )
+from handcal_gui.windows.library.tasks import (
+    check_sessions,
+    delete_sessions,
+    repair_beside,
+    restore_deleted,
+)
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
-_MOST_NAMED = 3
 _MOST_SHOWN_PX = 150
 _LONG_NAMES_PX = {tr("Rig"): 100, tr("Headset"): 100}
 _TREND_PX = 20 * SPACING_PX
@@ -216,55 +214,16 @@ class LibraryWindow(QDialog):
         self.export_requested.emit(paths)
 
     def _check_chosen(self) -> None:
-        paths = [entry.path for entry in self.chosen]
-
-        def work(progress: Progress) -> str:
-            lines = []
-            for done, path in enumerate(paths):
-                progress.at(done / len(paths), tr("Checking {}").format(path.name))
-                found = check_session(path)
-                if found.state == "sound":
-                    continue
-                named = "; ".join(map(str, found.damaged[:_MOST_NAMED]))
-                more = len(found.damaged) - _MOST_NAMED
-                others = tr(" (and {} more)").format(more) if more > 0 else ""
-                lines.append(f"{path.name}: {named}{others}")
-            sound = len(paths) - len(lines)
-            count = pluralize(sound, tr("session"), tr("sessions"))
-            return "\n".join((tr("{} sound, every file read.").format(count), *lines))
-
-        self._start(work)
+        self._start(partial(check_sessions, [entry.path for entry in self.chosen]))
 
     def _repair_chosen(self) -> None:
-        path = self.chosen[0].path
-        output = _free(path.with_name(f"{path.name}-repaired"))
-
-        def work(progress: Progress) -> str:
-            progress.at(0.0, tr("Repairing {}").format(path.name))
-            made = repair_session(path, output)
-            kept = pluralize(len(made.alignments), tr("alignment"), tr("alignments"))
-            return tr("{}: a copy with {} and {}.").format(
-                output.name, kept, pluralize(len(made.trials), tr("trial"), tr("trials"))
-            )
-
-        self._start(work)
+        self._start(partial(repair_beside, self.chosen[0].path))
 
     def _delete_chosen(self) -> None:
-        paths = [entry.path for entry in self.chosen]
-
-        def work(progress: Progress) -> str:
-            for done, path in enumerate(paths):
-                progress.at(done / len(paths), tr("Deleting {}").format(path.name))
-                delete_session(path)
-            return tr("{} deleted; Restore brings the last one back.").format(
-                pluralize(len(paths), tr("session"), tr("sessions"))
-            )
-
-        self._start(work)
+        self._start(partial(delete_sessions, [entry.path for entry in self.chosen]))
 
     def _restore_last(self) -> None:
-        last = self._deleted[-1]
-        self._start(lambda _: tr("{} restored.").format(restore_session(last).name))
+        self._start(partial(restore_deleted, self._deleted[-1]))
 
     def _start(self, work: Work) -> None:
         if self._job is not None:
@@ -404,12 +363,3 @@ def _table(model: SessionsFilter) -> QTableView:
 
 def _row(index: object) -> int:
     return index.row()  # type: ignore[attr-defined,no-any-return]
-
-
-def _free(path: Path) -> Path:
-    """Return a path that does not exist, with a number if needed."""
-    number = 2
-    found = path
-    while found.exists():
-        found, number = path.with_name(f"{path.name}-{number}"), number + 1
-    return found

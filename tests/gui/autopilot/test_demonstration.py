@@ -10,8 +10,8 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import Session
-from handcal.station.procedure import CalibrationSettings
 from handcal.station.settings import StationSettings
+from handcal.station.states import CalibrationSettings
 from handcal_gui.autopilot import autopilot, demonstration, tour
 from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile

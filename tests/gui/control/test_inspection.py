@@ -74,10 +74,10 @@ def test_a_window_that_cannot_open_says_why(
     monkeypatch.setattr(window_3d, "find_spec", lambda _name: found)
     monkeypatch.setattr(window_3d, "_has_display", lambda: False)
     open_session(program, qtbot, record)
-    program.inspect()
+    program.windows.inspect()
     qtbot.waitUntil(lambda: missing in program.window.banner.text, timeout=PATIENCE_MS)
 
 
 def test_without_an_alignment_nothing_opens(program: Program) -> None:
-    program.inspect()
+    program.windows.inspect()
     assert "no alignment to inspect" in program.window.banner.text

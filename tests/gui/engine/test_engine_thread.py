@@ -16,7 +16,7 @@ from handcal.bridge.bridge import Bridge
 from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
 from handcal.io.closable import Closable
-from handcal.station.procedure import ProcedureError
+from handcal.station.states import ProcedureError
 from handcal.station.station import Station
 from handcal_gui.engine.engine_thread import EngineThread
 

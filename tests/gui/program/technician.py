@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import Session, SessionRecord
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.program import Program
 

@@ -10,8 +10,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
 
 from handcal.session.session import Session
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui import launch
 from handcal_gui.pages.wizard.view import Action, Step

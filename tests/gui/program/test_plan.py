@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QLabel, QPushButton
 
 from handcal.register.placement import PlacementSettings
 from handcal.station.plan import PlanSettings
-from handcal.station.procedure import State
 from handcal.station.settings import StationSettings
+from handcal.station.states import State
 from handcal_gui.pages.wizard.view import Action
 from tests.gui.helpers import button
 from tests.gui.program.technician import Technician, is_turned, shown_checks

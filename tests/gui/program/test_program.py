@@ -25,7 +25,7 @@ from PySide6.QtWidgets import (
 
 from handcal.errors import LinkError
 from handcal.session.session import Session, SessionRecord
-from handcal.station.procedure import State
+from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.pages.wizard.view import Action
@@ -61,16 +61,16 @@ def test_the_dialogs_of_the_menus_end_with_the_program(
     file.path.write_text(json.dumps({"station": station}))
     technician = open_program()
     program = technician.program
-    first = program.connect_headset()
+    first = program.windows.connect_headset()
     assert first is not None
     first.accept()
-    assert program.connect_headset() is not None  # the port is free again
-    assert program.show_library().isVisible()
-    assert program.make_support_bundle().isVisible()
+    assert program.windows.connect_headset() is not None  # the port is free again
+    assert program.windows.show_library().isVisible()
+    assert program.windows.make_support_bundle().isVisible()
 
 
 def test_connect_shows_the_headset_of_a_calibration_and_leaves_it_alone(live: Technician) -> None:
-    dialog = live.program.connect_headset()
+    dialog = live.program.windows.connect_headset()
     assert dialog is not None
     live.wait(lambda: text(dialog, "headsetFound").startswith("Headset of the tests"))
     assert text(dialog, "digits") == ""

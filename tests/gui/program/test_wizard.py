@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton, QWidget
 
-from handcal.station.procedure import State
+from handcal.station.states import State
 from handcal_gui.pages.wizard import step_views, steps
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.preferences import PreferencesFile

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QScrollArea, QTabBar, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
-from handcal.station.procedure import State
+from handcal.station.states import State
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.result_card import ResultCard

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from handcal.station.plan import StepName
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import EYES, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.view import Action, Step

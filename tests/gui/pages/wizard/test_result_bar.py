@@ -9,8 +9,8 @@ from PySide6.QtPrintSupport import QPrinter
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal_gui.pages.wizard.picture import GuidePicture
 from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step

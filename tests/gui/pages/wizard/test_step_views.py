@@ -9,7 +9,7 @@ import pytest
 
 from handcal.errors import FileError
 from handcal.link.nudges import NudgeSum
-from handcal.station.procedure import State
+from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import VerdictName
 from handcal_gui.pages.wizard.steps import Wizard

@@ -8,8 +8,8 @@ import pytest
 
 from handcal.register.verdict import Advice
 from handcal.session.session import SessionRecord
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
 from handcal_gui.pages.wizard.steps import Wizard, is_complete, next_eyes
 from handcal_gui.pages.wizard.view import STEPS, Action, Step

@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QCheckBox, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import Alignment
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.panel import CloudPanel

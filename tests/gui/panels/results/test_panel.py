@@ -14,8 +14,8 @@ from pytestqt.qtbot import QtBot
 from handcal.geometry import transform
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig_types import Rig
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import EYES, Alignment, Verdict
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot

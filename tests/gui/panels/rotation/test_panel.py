@@ -11,8 +11,8 @@ from pytestqt.qtbot import QtBot
 
 from handcal.register.guard import turn_advice
 from handcal.session.journal import Event
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.widgets.plots import Plot

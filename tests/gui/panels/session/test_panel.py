@@ -22,8 +22,8 @@ from handcal.register.results import Results
 from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import EyeDistance
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.record_table import RecordTable

@@ -6,8 +6,8 @@ from PySide6.QtWidgets import QCheckBox, QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
-from handcal.station.procedure import State
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.station.wearer_view import EyeView
 from handcal.types import EYES, Eye
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas

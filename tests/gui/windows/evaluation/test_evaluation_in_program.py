@@ -23,7 +23,7 @@ def test_the_start_page_leads_to_evaluations(qtbot: QtBot, tmp_path: Path) -> No
     button.click()
     (window,) = program.window.findChildren(EvaluationWindow)
     assert window.isVisible()
-    assert program.evaluate() is window
+    assert program.windows.evaluate() is window
     assert window.entries.users.sessions == program.preferences.station.sessions
     window.page.form.enter(seed=11)
     program.window.close()

@@ -46,5 +46,5 @@ def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: 
 
 def test_a_missing_folder_is_reported_with_the_reason(program: Program, tmp_path: Path) -> None:
     (tmp_path / "config" / "rig").touch()
-    assert program.calibrate_rig() is None
+    assert program.windows.calibrate_rig() is None
     assert "cannot create the folder" in program.window.banner.text

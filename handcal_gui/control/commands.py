@@ -1,0 +1,152 @@
+"""Commands to the station: for each action of the guide, and for each request of a panel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+from handcal.errors import FileError
+from handcal.station.procedure import Calibration
+from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
+from handcal.station.station import Station
+from handcal_gui.docks import Panels
+from handcal_gui.engine.engine_thread import Command
+from handcal_gui.pages.wizard.planned import PlannedWizard
+from handcal_gui.pages.wizard.steps import Wizard
+from handcal_gui.pages.wizard.view import Action
+from handcal_gui.translation import tr
+
+_RECORD = tr("record the trial")
+_KINDS = {"alignment": tr("alignment"), "trial": tr("trial")}
+
+Submit = Callable[[str, Command], int]
+"""Gives the engine a command by a name that completes "could not …"; returns its number."""
+
+
+def calibrating(command: Callable[[Calibration], object]) -> Command:
+    """Return a command to the procedure, which keeps data that it cannot write yet."""
+
+    def command_station(station: Station) -> None:
+        with suppress(FileError):
+            command(station.calibration)
+
+    return command_station
+
+
+def command_of(action: Action, wizard: Wizard, snapshot: Snapshot) -> Command | None:
+    """Return the command of a guide's action; None for a move in which the engine has no part."""
+    eyes, unverified = wizard.eyes(snapshot), wizard.unverified(snapshot)
+    is_planned = isinstance(wizard, PlannedWizard)
+    commands: dict[Action, Callable[[Calibration], object]] = {
+        Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
+        Action.CONFIRM: _confirm,
+        Action.SOLVE: Calibration.solve,
+        Action.APPLY: Calibration.apply,
+        Action.REDO: Calibration.redo,
+        Action.VERIFIED: Calibration.verified,
+        Action.UNDO_NUDGE: Calibration.undo_nudge,
+    }
+    if unverified:
+        commands[Action.VERIFY] = lambda calibration: calibration.verify(unverified[0])
+    if snapshot.procedure.state is State.VERIFY:
+        commands[Action.SKIP] = _skip
+    if is_planned:
+        commands |= {
+            Action.ANOTHER: lambda calibration: calibration.make_cursor(eyes),
+            Action.CHECK_LEFT: lambda calibration: calibration.verify("left"),
+            Action.CHECK_RIGHT: lambda calibration: calibration.verify("right"),
+        }
+    stationwide: dict[Action, Command] = {Action.FINISH: Station.finish}
+    if is_planned:
+        stationwide |= {Action.TAKE_STEP: Station.take_step, Action.SKIP: _skip_planned}
+    if action in stationwide:
+        return stationwide[action]
+    return calibrating(commands[action]) if action in commands else None
+
+
+def connect_panels(
+    panels: Panels, submit: Submit, on_doubted: Callable[[str, str], object]
+) -> None:
+    """Connect the requests of the panels with commands.
+
+    `on_doubted` is called with a command's name and the reason why its trial may be wrong.
+    """
+    panels.link.restart_headset_requested.connect(
+        lambda: submit(tr("restart the headset"), Station.restart_headset)
+    )
+    _connect_fine_tuning(panels, submit)
+    _connect_trials(panels, submit)
+    panels.trials.doubted.connect(partial(on_doubted, _RECORD))
+    for panel in (panels.session, panels.trials):
+        panel.delete_requested.connect(
+            lambda kind, number: submit(
+                tr("delete the {}").format(_KINDS[kind]), lambda s: s.delete(kind, number)
+            )
+        )
+        panel.restore_requested.connect(
+            lambda kind, number: submit(
+                tr("restore the {}").format(_KINDS[kind]), lambda s: s.restore(kind, number)
+            )
+        )
+    panels.session.eye_distance_changed.connect(
+        lambda typed: submit(
+            tr("set the eye distance"), calibrating(lambda c: c.set_eye_distance(typed))
+        )
+    )
+
+
+def _connect_fine_tuning(panels: Panels, submit: Submit) -> None:
+    panels.fine_tune.shift_changed.connect(
+        lambda shifts_m: submit(tr("set φ"), calibrating(lambda c: c.set_shift(shifts_m)))
+    )
+    panels.fine_tune.shift_settled.connect(
+        lambda: submit(tr("record φ"), calibrating(Calibration.record_shift))
+    )
+
+
+def _connect_trials(panels: Panels, submit: Submit) -> None:
+    trials, compare = panels.trials, tr("compare")
+    # A φ shown only for comparison is not the one that the trial is about.
+    trials.trial_requested.connect(panels.fine_tune.settle)
+    trials.trial_requested.connect(
+        lambda eye, depth_m: submit(_RECORD, lambda s: s.trials.save(eye, depth_m))
+    )
+    trials.show_target_requested.connect(
+        lambda eye, depth_m: submit(
+            tr("show the target"), lambda s: s.trials.show_target(eye, depth_m)
+        )
+    )
+    trials.hide_target_requested.connect(
+        lambda: submit(tr("hide the target"), lambda s: s.trials.hide_target())
+    )
+    trials.compare_requested.connect(lambda: submit(compare, lambda s: s.trials.compare()))
+    trials.end_comparison_requested.connect(
+        lambda: submit(compare, lambda s: s.trials.comparing.end())
+    )
+    trials.show_compared_requested.connect(
+        lambda place: submit(compare, lambda s: s.trials.comparing.show(place))
+    )
+    trials.comparison_answered.connect(
+        lambda answer: submit(compare, lambda s: s.trials.comparing.answer(answer))
+    )
+
+
+def _confirm(calibration: Calibration) -> None:
+    """Confirm for the wearer, who may have done so already."""
+    if calibration.state is State.ALIGN:
+        calibration.confirm()
+
+
+def _skip_planned(station: Station) -> None:
+    """Skip the verification, which the wearer may have ended already; the plan continues."""
+    with suppress(FileError):
+        if station.calibration.state is State.VERIFY:
+            station.plan.skip()
+
+
+def _skip(calibration: Calibration) -> None:
+    """Skip the verification, which the wearer may have ended already."""
+    if calibration.state is State.VERIFY:
+        calibration.skip_verification()

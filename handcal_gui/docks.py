@@ -1,0 +1,188 @@
+"""The panels of the main window, in docks around its page: their arrangement, titles and tabs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Protocol
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QIcon
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QDockWidget,
+    QMainWindow,
+    QTabBar,
+    QTabWidget,
+    QWidget,
+)
+
+from handcal.station.snapshot import Snapshot
+from handcal_gui.panels.camera.panel import CameraPanel
+from handcal_gui.panels.cloud.panel import CloudPanel
+from handcal_gui.panels.fine_tune.panel import FineTunePanel
+from handcal_gui.panels.link.panel import LinkPanel
+from handcal_gui.panels.results.panel import ResultsPanel
+from handcal_gui.panels.rotation.panel import RotationPanel
+from handcal_gui.panels.session.panel import SessionPanel
+from handcal_gui.panels.trials.panel import TrialsPanel
+from handcal_gui.panels.wearer_view.panel import WearerViewPanel
+from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.translation import tr
+
+TITLES = {
+    "camera": tr("Camera"),
+    "cloud": tr("Hand cloud"),
+    "wearer_view": tr("Wearer's view"),
+    "rotation": tr("Rotation"),
+    "results": tr("Results"),
+    "fine_tune": tr("Fine-tune"),
+    "trials": tr("Trials"),
+    "session": tr("Session"),
+    "link": tr("Link"),
+}
+_NARROWEST_PX, _WIDEST_PX = 360, 720
+"""Limits of the initial width of a column of docks."""
+_LEFT_COLUMN, _RIGHT_COLUMN = ("camera", "cloud", "rotation"), ("results", "fine_tune")
+_LEFT, _RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+_CHILDREN_ONLY = Qt.FindChildOption.FindDirectChildrenOnly
+_TITLE_BUTTONS = {"qt_dockwidget_closebutton": "close", "qt_dockwidget_floatbutton": "float"}
+"""Icons of a dock's buttons, by the names that Qt gives the buttons."""
+_ICON_TABS = """
+    QTabBar::tab { padding: 5px 9px; width: 20px; border: 0; font-size: 1px; color: transparent; }
+    QTabBar::tab:hover { background: palette(midlight); }
+    QTabBar::tab:selected { background: palette(base); }
+    QTabBar::tab:selected { border-bottom: 2px solid palette(highlight); }
+"""
+"""Tabs without texts, which stay for screen readers and tooltips."""
+
+Docks = Mapping[str, QDockWidget]
+"""Docks by the names of their panels."""
+
+
+class Panel(Protocol):
+    """The interface of every panel."""
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the panel's part of a snapshot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Panels:
+    """All panels of the window."""
+
+    camera: CameraPanel
+    cloud: CloudPanel
+    wearer_view: WearerViewPanel
+    rotation: RotationPanel
+    results: ResultsPanel
+    fine_tune: FineTunePanel
+    trials: TrialsPanel
+    session: SessionPanel
+    link: LinkPanel
+
+    def all(self) -> Iterator[Panel]:
+        """Return an iterator over all panels."""
+        return (getattr(self, field.name) for field in fields(self))
+
+
+def make_docks(window: QMainWindow, panels: Panels) -> Docks:
+    """Return a dock for each panel, and let the window nest and tab them."""
+    # GroupedDragging: a dock without title can be undocked by its tab.
+    options = QMainWindow.DockOption
+    window.setDockOptions(
+        options.AnimatedDocks
+        | options.AllowNestedDocks
+        | options.AllowTabbedDocks
+        | options.GroupedDragging
+    )
+    window.setCorner(Qt.Corner.BottomLeftCorner, _LEFT)
+    window.setCorner(Qt.Corner.BottomRightCorner, _RIGHT)
+    docks = {}
+    for name, title in TITLES.items():
+        dock = QDockWidget(title, window)
+        dock.setObjectName(f"{name}Dock")
+        dock.setWidget(getattr(panels, name))
+        docks[name] = dock
+    return docks
+
+
+def arrange_docks(window: QMainWindow, docks: Docks, *, is_small: bool) -> None:
+    """Arrange the docks around the page, in a small window as tabs beside it."""
+    across = Qt.Orientation.Vertical
+    for dock in docks.values():
+        dock.hide()  # or the window grows while they stand below one another
+    for name in _LEFT_COLUMN:
+        window.addDockWidget(_LEFT, docks[name])
+    for name in _RIGHT_COLUMN:
+        window.addDockWidget(_LEFT if is_small else _RIGHT, docks[name])
+    behind: dict[str, tuple[str, ...]] = {"results": ("wearer_view", "trials", "session", "link")}
+    if is_small:
+        behind = {"camera": tuple(name for name in docks if name != "camera")}
+    else:
+        for above, below in (*pairwise(_LEFT_COLUMN), *pairwise(_RIGHT_COLUMN)):
+            window.splitDockWidget(docks[above], docks[below], across)
+    for front, others in behind.items():
+        for name in others:
+            window.tabifyDockWidget(docks[front], docks[name])
+    window.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+
+
+def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
+    """Divide the window among the docks of a page whose layout the user has not changed.
+
+    `page_px` is the width of a page that needs little space; None leaves it a share of the window.
+    """
+    across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
+    width, height = window.width(), window.height()
+    left, right = (
+        min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (26, 30)
+    )
+    if page_px is not None:
+        left = (width - page_px) * 45 // 100
+        right = width - page_px - left
+    window.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
+    column = [docks[name] for name in _LEFT_COLUMN]
+    window.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
+    results = height * 45 // 100
+    window.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
+
+
+def draw_title_buttons(docks: Docks) -> None:
+    """Draw the buttons of docks like other icons: Qt's own are dark in the dark theme, too."""
+    for dock in docks.values():
+        for name, drawing in _TITLE_BUTTONS.items():
+            button = dock.findChild(QAbstractButton, name)
+            if button is not None:
+                button.setIcon(icon(drawing))
+
+
+def leave_titles_to_tabs(window: QMainWindow, docks: Docks) -> None:
+    """Hide the titles of docks whose tabs show the same text."""
+    bars = window.findChildren(QTabBar, options=_CHILDREN_ONLY)
+    without_text = {name for bar in bars for name in _fit_tabs(bar, docks)}
+    for name, dock in docks.items():
+        shared = any(not other.isHidden() for other in window.tabifiedDockWidgets(dock))
+        is_said = shared and name not in without_text
+        title = dock.titleBarWidget()
+        if is_said and title is None:
+            dock.setTitleBarWidget(QWidget(dock))
+        elif not is_said and title is not None:
+            dock.setTitleBarWidget(None)  # type: ignore[arg-type]  # PySide's stub is wrong
+            title.deleteLater()
+    draw_title_buttons(docks)  # Qt recreates them with the titles
+
+
+def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
+    """Show icons in place of texts that do not fit; return the names of those docks."""
+    bar.setElideMode(Qt.TextElideMode.ElideNone)
+    named = {dock.windowTitle(): name for name, dock in docks.items()}
+    names = [named[bar.tabText(i)] for i in range(bar.count()) if bar.tabText(i) in named]
+    texts_px = sum(bar.fontMetrics().horizontalAdvance(docks[name].windowTitle()) for name in names)
+    room_px = max((docks[name].width() for name in names), default=0)
+    has_icons = texts_px + 3 * SPACING_PX * len(names) > room_px
+    bar.setStyleSheet(_ICON_TABS if has_icons else "")
+    for i, name in enumerate(names):
+        bar.setTabIcon(i, icon(name.replace("_", "-")) if has_icons else QIcon())
+    return names if has_icons else []

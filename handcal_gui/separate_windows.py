@@ -1,0 +1,247 @@
+"""The windows and dialogs beside the main window: opened for its menus, ended with the program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+
+from handcal.errors import FileError, HandcalError
+from handcal.export.export import ExportSettings, export_session
+from handcal.export.many import export_sessions
+from handcal.link.server import HeadsetServer
+from handcal.progress import Progress
+from handcal.rig.rig_file import read_rig
+from handcal.session.session import Session, SessionRecord
+from handcal.station.support import SupportSettings
+from handcal_gui.control.inspection import Inspection
+from handcal_gui.control.live import CalibrationController
+from handcal_gui.control.review import ReviewController
+from handcal_gui.dialogs.connect import ConnectDialog
+from handcal_gui.dialogs.export import Export, ExportDialog
+from handcal_gui.dialogs.preferences import PreferencesDialog
+from handcal_gui.dialogs.support import SupportDialog
+from handcal_gui.evaluation_entries import EvaluationEntries
+from handcal_gui.pages.start.start_page import StartPage
+from handcal_gui.preferences import CurrentPreferences
+from handcal_gui.theme import use_theme
+from handcal_gui.translation import tr
+from handcal_gui.widgets.placement import keep_on_screen
+from handcal_gui.window import MainWindow
+
+if TYPE_CHECKING:  # imported when they open: they take longer than all the rest
+    from handcal_gui.windows.evaluation.window import EvaluationWindow
+    from handcal_gui.windows.library.window import LibraryWindow
+    from handcal_gui.windows.rig.wizard import RigWizard
+
+
+class SeparateWindows(QObject):
+    """Opens windows and dialogs, and ends them with the program.
+
+    Parameters
+    ----------
+    window : MainWindow
+    start : StartPage
+    live : CalibrationController
+    review : ReviewController
+    current : CurrentPreferences
+
+    Attributes
+    ----------
+    open_requested, resume_requested : Signal(Path)
+        A session to open, or to resume.
+    """
+
+    open_requested = Signal(object)
+    resume_requested = Signal(object)
+    _ending = Signal()
+
+    def __init__(
+        self,
+        window: MainWindow,
+        start: StartPage,
+        live: CalibrationController,
+        review: ReviewController,
+        current: CurrentPreferences,
+    ) -> None:
+        super().__init__()
+        self._window, self._start = window, start
+        self._live, self._review = live, review
+        self._current = current
+        self._inspection = Inspection(window)
+        self._inspection.failed.connect(window.banner.show_message)
+
+    @property
+    def record(self) -> SessionRecord | None:
+        """The session shown, as stored on the disk."""
+        if self._live.snapshot is not None:
+            return self._live.snapshot.record
+        return self._review.record
+
+    def close(self) -> None:
+        """End everything that was opened; safe to call twice."""
+        self._ending.emit()
+        self._inspection.close()
+
+    def browse(self) -> None:
+        """Let the user choose a session's folder, and open it."""
+        folder = QFileDialog.getExistingDirectory(
+            self._window, tr("Open a session's folder"), self._current.now.station.sessions
+        )
+        if folder:
+            self.open_requested.emit(Path(folder))
+
+    def export(self, folder: Path | None = None) -> ExportDialog | None:
+        """Open the export dialog for the session shown; return None if it has no alignment.
+
+        Parameters
+        ----------
+        folder : Path, optional
+            Proposed folder; by default that of the last export.
+        """
+        record = self.record
+        if record is None or not record.alignments:
+            self._window.banner.show_message(tr("There is no alignment to export yet."))
+            return None
+        folder = folder or Path(self._current.now.export_folder or record.path.parent)
+        return self._open_export(record, folder, self._window, export_session, "")
+
+    def show_library(self, folder: Path | None = None) -> LibraryWindow:
+        """Show the sessions of a folder, by default of the session folder."""
+        folder = folder or Path(self._start.new.settings.sessions)
+        from handcal_gui.windows.library.window import LibraryWindow
+
+        window = LibraryWindow(folder, self._window)
+        window.open_requested.connect(self.open_requested)
+        window.resume_requested.connect(self.resume_requested)
+        window.export_requested.connect(lambda paths: self.export_many(paths, window))
+        window.finished.connect(self._start.look_for_sessions)
+        self._open(window, window.stop)
+        return window
+
+    def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog | None:
+        """Open the export dialog for several sessions, each to a folder of its own."""
+        try:
+            first = Session.open(paths[0])
+        except FileError as error:
+            self._window.banner.show_message(str(error))
+            return None
+
+        def export(
+            _: SessionRecord, target: Path, settings: ExportSettings, progress: Progress
+        ) -> tuple[Path, ...]:
+            return export_sessions(paths, target, settings, progress)
+
+        folder = Path(self._current.now.export_folder or paths[0].parent)
+        return self._open_export(
+            first, folder, parent, export, tr("{} sessions").format(len(paths))
+        )
+
+    def inspect(self) -> None:
+        """Show the alignments of the session shown in a 3D window."""
+        record = self.record
+        if record is None or not record.alignments:
+            self._window.banner.show_message(tr("There is no alignment to inspect yet."))
+            return
+        self._window.banner.show_message(tr("The 3D window opens in a few seconds."))
+        self._inspection.start(record)
+
+    def connect_headset(self) -> ConnectDialog | None:
+        """Open the dialog that pairs and tries a headset; return None if it cannot be opened."""
+        settings, snapshot = self._start.new.settings, self._live.snapshot
+        link = self._live.link
+        try:
+            rig = snapshot.record.rig if snapshot else read_rig(settings.rig_path)
+            server = link or HeadsetServer(self._current.pairings, (settings.host, settings.port))
+        except HandcalError as error:
+            self._window.banner.show_message(str(error))
+            return None
+        dialog = ConnectDialog(server, rig, is_calibrating=link is not None, parent=self._window)
+        dialog.finished.connect(self._start.new.check)
+        self._open(dialog, dialog.stop)
+        return dialog
+
+    def calibrate_rig(self) -> RigWizard | None:
+        """Open the wizard of the offline calibration; return None if its folder cannot be used."""
+        from handcal_gui.windows.rig.project_folder import ProjectFolder
+        from handcal_gui.windows.rig.wizard import RigWizard
+
+        try:
+            folder = ProjectFolder(self._current.folder / "rig")
+        except FileError as error:
+            self._window.banner.show_message(str(error))
+            return None
+        wizard = RigWizard(folder, self._window, self._start.new.settings.realsense)
+        wizard.rig_saved.connect(self._use_rig)
+        self._open(wizard, wizard.accept)
+        return wizard
+
+    def evaluate(self) -> EvaluationWindow:
+        """Show the evaluation window; there is at most one."""
+        from handcal_gui.windows.evaluation.specs import make_specs
+        from handcal_gui.windows.evaluation.window import EvaluationWindow
+
+        opened = [one for one in self._window.findChildren(EvaluationWindow) if one.isVisible()]
+        if opened:
+            opened[0].raise_()
+            opened[0].activateWindow()
+            return opened[0]
+        entries = self._current.now.evaluation
+        if not entries.users.sessions:
+            users = replace(entries.users, sessions=self._start.new.settings.sessions)
+            entries = replace(entries, users=users)
+        window = EvaluationWindow(make_specs(), entries, self._window)
+        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        window.remembered.connect(self._remember_evaluation)
+        self._ending.connect(window.stop)
+        window.show()
+        keep_on_screen(window)
+        return window
+
+    def make_support_bundle(self) -> SupportDialog:
+        """Open the dialog that writes a file to send with a bug report."""
+        sessions = Path(self._start.new.settings.sessions)
+        folder = self._current.folder
+        settings = SupportSettings(folder, (sessions,))
+        dialog = SupportDialog(settings, Path.home(), self._window)
+        self._open(dialog, dialog.stop)
+        return dialog
+
+    def edit_preferences(self) -> None:
+        """Let the user change the preferences."""
+        dialog = PreferencesDialog(self._current.now, self._window)
+        keep_on_screen(dialog)
+        if dialog.exec():
+            self._current.use(dialog.preferences())
+            use_theme(self._current.now.theme)
+            self._start.show_preferences(self._current.now)
+
+    def _open_export(
+        self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
+    ) -> ExportDialog:
+        dialog = ExportDialog(record, self._current.now.export, folder, parent, export, name)
+        dialog.remembered.connect(self._remember_export)
+        self._open(dialog, dialog.stop)
+        return dialog
+
+    def _open(self, dialog: QDialog, stop: Callable[[], object]) -> None:
+        """Show a dialog, which `stop` ends before the program does."""
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self._ending.connect(stop)
+        dialog.open()
+        keep_on_screen(dialog)
+
+    def _use_rig(self, path: Path) -> None:
+        station = replace(self._current.now.station, rig=str(path))
+        self._current.change(station=station)
+        self._start.set_rig(path)
+
+    def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
+        self._current.change(export=settings, export_folder=str(folder))
+
+    def _remember_evaluation(self, entries: EvaluationEntries) -> None:
+        self._current.change(evaluation=entries)

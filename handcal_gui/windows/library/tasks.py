@@ -1,0 +1,66 @@
+"""Tasks of the library: sessions checked, repaired and deleted, with progress and a message."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from handcal.progress import Progress
+from handcal.session.library import delete_session, restore_session
+from handcal.session.repair import check_session, repair_session
+from handcal_gui.translation import tr
+from handcal_gui.widgets.numbers import pluralize
+
+_MOST_NAMED = 3
+
+
+def check_sessions(paths: Sequence[Path], progress: Progress) -> str:
+    """Read every file of some sessions; return which are damaged, as a message."""
+    lines = []
+    for done, path in enumerate(paths):
+        progress.at(done / len(paths), tr("Checking {}").format(path.name))
+        found = check_session(path)
+        if found.state == "sound":
+            continue
+        named = "; ".join(map(str, found.damaged[:_MOST_NAMED]))
+        more = len(found.damaged) - _MOST_NAMED
+        others = tr(" (and {} more)").format(more) if more > 0 else ""
+        lines.append(f"{path.name}: {named}{others}")
+    sound = len(paths) - len(lines)
+    count = pluralize(sound, tr("session"), tr("sessions"))
+    return "\n".join((tr("{} sound, every file read.").format(count), *lines))
+
+
+def repair_beside(path: Path, progress: Progress) -> str:
+    """Copy what is sound of a session to a new one beside it; return a message."""
+    output = _free(path.with_name(f"{path.name}-repaired"))
+    progress.at(0.0, tr("Repairing {}").format(path.name))
+    made = repair_session(path, output)
+    kept = pluralize(len(made.alignments), tr("alignment"), tr("alignments"))
+    return tr("{}: a copy with {} and {}.").format(
+        output.name, kept, pluralize(len(made.trials), tr("trial"), tr("trials"))
+    )
+
+
+def delete_sessions(paths: Sequence[Path], progress: Progress) -> str:
+    """Delete some sessions, each of which can be restored; return a message."""
+    for done, path in enumerate(paths):
+        progress.at(done / len(paths), tr("Deleting {}").format(path.name))
+        delete_session(path)
+    return tr("{} deleted; Restore brings the last one back.").format(
+        pluralize(len(paths), tr("session"), tr("sessions"))
+    )
+
+
+def restore_deleted(path: Path, _progress: Progress) -> str:
+    """Restore a deleted session; return a message."""
+    return tr("{} restored.").format(restore_session(path).name)
+
+
+def _free(path: Path) -> Path:
+    """Return a path that does not exist, with a number if needed."""
+    number = 2
+    found = path
+    while found.exists():
+        found, number = path.with_name(f"{path.name}-{number}"), number + 1
+    return found
