@@ -180,6 +180,10 @@ def use_theme(theme: Literal["system", "light", "dark", "contrast"]) -> None:
     for special, kinds in ((boxes, _BOXES), (main, ("MainButton",))):
         for kind in kinds:  # as text; PySide's stub is wrong
             QApplication.setPalette(special, kind)  # type: ignore[arg-type]
+    for widget in QApplication.allWidgets():  # Qt leaves those with a style sheet as they are
+        if sheet := widget.styleSheet():
+            widget.setStyleSheet("")
+            widget.setStyleSheet(sheet)
 
 
 def is_dark() -> bool:

@@ -153,7 +153,6 @@ class MainWindow(QMainWindow):
         self._stack.setCurrentIndex(list(self._pages).index(page))
         is_small = self.width() < _SMALL_PX[0] or self.height() < _SMALL_PX[1]
         is_alone = self._arrangement == "station"
-        self._guide.picture.set_camera(is_small or is_alone)
         self._guide.fill_window(is_alone and not is_small)
         layout = self._layouts.get(page, self._default_layouts[is_small])
         self.restoreState(layout, _LAYOUT_VERSION)

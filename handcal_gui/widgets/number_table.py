@@ -80,6 +80,12 @@ class NumberTable(QTableWidget):
                 self.setSpan(number, len(row.cells) - 1, 1, len(columns) - len(row.cells) + 1)
         self._fit_columns()
 
+    @property
+    def whole_height_px(self) -> int:
+        """The height at which no row needs scrolling."""
+        rows_px = self.verticalHeader().length() + self.horizontalHeader().sizeHint().height()
+        return rows_px + 2 * self.frameWidth()
+
     def as_text(self) -> str:
         """Return the table as tab-separated lines."""
         return rows_as_text(self._columns, self._rows)

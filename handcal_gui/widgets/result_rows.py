@@ -11,7 +11,7 @@ from handcal.rig_types import EyeDisplay, Rig
 from handcal.types import EYES, Eye, EyeShift, VerdictName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
-from handcal_gui.widgets.numbers import signed
+from handcal_gui.widgets.numbers import pluralize, signed
 
 EYE_NAMES: Mapping[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
 VERDICT_WORDS: Mapping[VerdictName, str] = {
@@ -140,11 +140,9 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
         rows.append(
             Row(tr("Prior"), (learned,), tr("Where eyes are expected before any alignment"))
         )
-    return [
-        *rows,
-        Row(tr("Alignments"), (str(len(results.alignments)),), tr("Fused into these results")),
-        Row(tr("Method"), (results.method,), tr("The solver")),
-    ]
+    count = pluralize(len(results.alignments), tr("alignment"), tr("alignments"))
+    fused = f"{count}, {results.method}"
+    return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
 
 
 def verdict_rows(results: Results) -> list[Row]:

@@ -957,7 +957,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>These calibrations were interrupted. You can resume them.</source>
+        <source>Continue a calibration that was interrupted.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1129,6 +1129,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Waiting for the camera&apos;s first image…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>No image</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1214,6 +1218,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Sending…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Waiting for the hand…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solving…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

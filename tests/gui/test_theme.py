@@ -15,6 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.types import Float64
 from handcal_gui.theme import colors, follow_theme, icon, is_dark, use_theme
+from handcal_gui.widgets.fields import tool_button
 
 
 @pytest.fixture
@@ -47,6 +48,17 @@ def test_dark_is_dark_and_gives_way_again() -> None:
     assert not is_dark()
     assert QGuiApplication.palette() == before
     assert middle(icon("check")).lightness() < 128
+
+
+@pytest.mark.usefixtures("themes")
+def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
+    use_theme("light")
+    made = tool_button()
+    qtbot.addWidget(made)
+    made.show()
+    for theme in ("dark", "light", "contrast"):
+        use_theme(theme)
+        assert made.palette().button().color() == QGuiApplication.palette().button().color()
 
 
 def test_an_icon_takes_a_colour_with_a_meaning(qtbot: QtBot) -> None:

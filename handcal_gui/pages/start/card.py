@@ -36,7 +36,8 @@ class Card(QFrame):
         head.addWidget(paragraph(text=hint), 1, 0, 1, 3)
         self.body = QVBoxLayout()
         self.body.setSpacing(SPACING_PX)
-        vbox(head, (self.body, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
+        across, down = 2 * SPACING_PX, 3 * SPACING_PX // 2
+        vbox(head, (self.body, 1), on=self, margins=(across, down, across, down), spacing=down)
         follow_theme(self, self._refresh)
 
     def add_to_head(self, widget: QWidget) -> None:

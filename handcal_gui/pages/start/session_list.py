@@ -49,7 +49,7 @@ class SessionList(QWidget):
         self._list.setWordWrap(True)
         # As tall as the available space, not as the items need.
         self._list.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
-        self._list.setMinimumHeight(9 * SPACING_PX)
+        self._list.setMinimumHeight(6 * SPACING_PX)  # two rows, or one of two lines
         self._list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._list.setAlternatingRowColors(True)
         self._list.setIconSize(PICTURE_PX)

@@ -78,7 +78,7 @@ class StartPage(QWidget):
         self._folder = Path()
         self.new = NewCalibration(preferences, pairing_key, check)
         self._resume = Card(
-            tr("Resume"), tr("These calibrations were interrupted. You can resume them."), "resume"
+            tr("Resume"), tr("Continue a calibration that was interrupted."), "resume"
         )
         self._resume.setObjectName("resume")
         self._resume.hide()
@@ -190,7 +190,7 @@ class StartPage(QWidget):
         content.setMaximumSize(*_LARGEST_PX)
         hbox(1, (content, 1000), 1, on=self, margins=0)
         grid = QGridLayout(content)
-        grid.setContentsMargins(*4 * (2 * SPACING_PX,))
+        grid.setContentsMargins(2 * SPACING_PX, SPACING_PX, 2 * SPACING_PX, SPACING_PX)
         grid.setSpacing(2 * SPACING_PX)
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtGui import QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
@@ -53,6 +53,7 @@ class ActionBar(QWidget):
         super().__init__(parent)
         self.setObjectName("actionBar")
         self._view: WizardView | None = None
+        self._is_quiet = False
         self._is_repeat = False
         self._released = (0, 0)  # key, and time in ms
         self._main = main_button("wizardMain")
@@ -77,9 +78,15 @@ class ActionBar(QWidget):
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)
 
-    def show_view(self, view: WizardView | None) -> None:
-        """Show the buttons of a view; if it is None, no button can be pressed."""
+    def show_view(self, view: WizardView | None, *, is_quiet: bool = False) -> None:
+        """Show the buttons of a view; if it is None, no button can be pressed.
+
+        Quiet is a main button that nobody needs to press; it has no accent colour.
+        """
         before, self._view = self._view, view
+        if is_quiet != self._is_quiet:
+            self._is_quiet = is_quiet
+            self._color_main()
         self._main.setEnabled(view is not None and view.main.is_enabled)
         if view is not None:
             self._main.setText(view.main.label)
@@ -117,6 +124,7 @@ class ActionBar(QWidget):
         self._main.setFixedSize(self._main.sizeHint().width() + 4 * SPACING_PX, 5 * SPACING_PX)
         self._main.setText(label)
         follow_theme(self, self._draw_key)
+        follow_theme(self, self._color_main)
         scale_font(self._key, 0.9)
         widest = max(
             self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in (_KEY, _TEXT_KEY)
@@ -169,6 +177,10 @@ class ActionBar(QWidget):
 
     def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
         self._key.setText(_native(_TEXT_KEY if _takes_text(new) else _KEY))
+
+    def _color_main(self) -> None:
+        # Without a palette of its own, the button has the accent colour of its class.
+        self._main.setPalette(QApplication.palette() if self._is_quiet else QPalette())
 
     def _draw_key(self) -> None:
         shade = colors().muted

@@ -45,7 +45,6 @@ class GuidePicture(QWidget):
         super().__init__(parent)
         self.setObjectName("guidePicture")
         self.step = Step.CONNECT
-        self._has_camera = False
         self._frame: Frame | None = None
         self._camera = ImageView(tr("Guide camera"))
         self._eyes = {eye: EyeCanvas(tr("Guide {}").format(EYE_NAMES[eye])) for eye in EYES}
@@ -63,20 +62,16 @@ class GuidePicture(QWidget):
         views = QWidget()
         columns = hbox(*((one, 1) for one in self._columns.values()), spacing=SPACING_PX)
         self._layout = vbox((columns, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
-        self._nothing, self._views = QWidget(), views
+        self._views = views
         self._stack = QStackedLayout(self)
-        for page in (self._nothing, self._camera, self._views):
+        for page in (self._camera, self._views):
             self._stack.addWidget(page)
         self._show_before(False)
-
-    def set_camera(self, has_camera: bool) -> None:
-        """Choose whether the camera's image is shown while no eye's view helps."""
-        self._has_camera = has_camera
 
     @property
     def wants_views(self) -> bool:
         """True if the picture is of the eyes' views."""
-        return self.step not in (_OF_THE_HAND if self._has_camera else {Step.CONNECT})
+        return self.step not in _OF_THE_HAND
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the picture of a snapshot that fits the step."""
@@ -85,8 +80,7 @@ class GuidePicture(QWidget):
         # Of a cursor or a verification, only the eyes that it is for.
         is_of_some = self.step is Step.ALIGN or verifying is not None
         open_eyes = snapshot.procedure.eyes if is_of_some else EYES
-        has_views = bool(snapshot.views) or not self._has_camera or is_result
-        if self.wants_views and has_views:
+        if self.wants_views and (snapshot.views or is_result):
             self._show_eyes(snapshot, open_eyes, is_result=is_result)
         else:
             self._show_camera(snapshot)
@@ -94,16 +88,15 @@ class GuidePicture(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the result beside the eyes if that makes them larger."""
         super().resizeEvent(event)
-        is_wide = self.width() > max(_WIDE * self.height(), 2 * self.result.sizeHint().width())
+        least_px = 2 * self.result.minimumSizeHint().width()
+        is_wide = self.width() > max(_WIDE * self.height(), least_px)
         directions = QBoxLayout.Direction
         self._layout.setDirection(directions.LeftToRight if is_wide else directions.TopToBottom)
         self._layout.setStretchFactor(self.result, 1 if is_wide else 0)
 
     def _show_camera(self, snapshot: Snapshot) -> None:
         self.result.hide()  # or it takes its room in the layout
-        self._stack.setCurrentWidget(self._camera if self._has_camera else self._nothing)
-        if not self._has_camera:
-            return
+        self._stack.setCurrentWidget(self._camera)
         frame, seen = snapshot.frame, snapshot.observation
         if frame is not None and frame is not self._frame:
             self._frame = frame
@@ -116,7 +109,8 @@ class GuidePicture(QWidget):
                     overlay = HandOverlay(seen.cloud, depth_px, color_px, seen.is_over_limit)
                     outline = overlay.draw
             self._camera.show_overlay(outline)
-        self._camera.show_text(message=tr("No image") if snapshot.camera.problem else "")
+        message = "" if frame is not None else tr("Waiting for the camera's first image…")
+        self._camera.show_text(message=tr("No image") if snapshot.camera.problem else message)
 
     def _show_eyes(self, snapshot: Snapshot, eyes: tuple[Eye, ...], *, is_result: bool) -> None:
         message = missing_text(snapshot)

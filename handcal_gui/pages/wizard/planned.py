@@ -47,6 +47,7 @@ _STATES = {
 }
 _FOLLOWS = Step.SHOW_HAND
 """The guide's own step while the plan continues."""
+_WAITS_FOR_HAND, _SENDING = tr("Waiting for the hand…"), tr("Sending…")
 _CHECKS: dict[Eye, ButtonSpec] = {
     "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify l&eft eye")),
     "right": ButtonSpec(Action.VERIFY_RIGHT, tr("Verify &right eye")),
@@ -138,7 +139,7 @@ class PlannedWizard(Wizard):
                 "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
             ).format(DISTANCE),
             (hand_check(snapshot), still_check(snapshot)),
-            ButtonSpec(Action.TAKE_STEP, tr("Next"), False),
+            ButtonSpec(Action.TAKE_STEP, _WAITS_FOR_HAND, False),
             others,
         )
 
@@ -151,15 +152,16 @@ class PlannedWizard(Wizard):
             Step.MAKE_CURSOR,
             text,
             (hand_check(snapshot), still_check(snapshot)),
-            self._take_step(tr("Make cursor"), is_placed(snapshot)),
+            self._take_step(tr("Make cursor"), _WAITS_FOR_HAND, is_placed(snapshot)),
             (ButtonSpec(Action.BACK, tr("&Back")),),
         )
 
     def _solved(self, step: Step, snapshot: Snapshot) -> WizardView:
-        is_solved = snapshot.procedure.state is State.SOLVED
         text = tr("Solve for the positions of the eyes; the hand stays up.")
-        if is_solved:
+        main = self._take_step(tr("Solve"), tr("Solving…"), True)
+        if snapshot.procedure.state is State.SOLVED:
             text = tr("Send the corrected projections to the headset; the hand stays up.")
+            main = self._take_step(tr("Send to the headset"), _SENDING, True)
         redo = ButtonSpec(
             Action.REDO,
             tr("&Discard and repeat"),
@@ -169,7 +171,7 @@ class PlannedWizard(Wizard):
             step,
             text,
             verdict_checks(snapshot),
-            self._take_step(tr("Send to the headset") if is_solved else tr("Solve"), True),
+            main,
             (redo,) if snapshot.procedure.alignments else (),
             snapshot.problem,
         )
@@ -182,17 +184,21 @@ class PlannedWizard(Wizard):
                 EYE_WORDS[eye]
             ),
             (hand_check(snapshot), still_check(snapshot), *verdict_checks(snapshot)),
-            self._take_step(tr("Verify the {} eye").format(EYE_WORDS[eye]), is_steady(snapshot)),
+            self._take_step(
+                tr("Verify the {} eye").format(EYE_WORDS[eye]),
+                _WAITS_FOR_HAND,
+                is_steady(snapshot),
+            ),
             (ButtonSpec(Action.BACK, tr("&Back")),),
         )
 
     def _wait(self, step: Step, snapshot: Snapshot) -> WizardView:
-        planned = snapshot.procedure.next_step
+        procedure, planned = snapshot.procedure, snapshot.procedure.next_step
         text = tr("The hand stays up while the headset receives its projections.")
-        is_refused = planned is not None and planned.name is StepName.WAIT
-        if is_refused and planned is not None and snapshot.procedure.is_applied:
+        is_refused = procedure.is_applied and procedure.state is not State.APPLYING
+        if planned is not None and planned.name is StepName.WAIT and is_refused:
             text = f"{sentence(planned.text)}."
-        main = ButtonSpec(Action.TAKE_STEP, tr("Sending…"), False)
+        main = ButtonSpec(Action.TAKE_STEP, _SENDING, False)
         back = (ButtonSpec(Action.BACK, tr("&Back")),)
         return WizardView(step, text, verdict_checks(snapshot), main, back, snapshot.problem)
 
@@ -228,9 +234,11 @@ class PlannedWizard(Wizard):
         slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))
         return replace(view, others=(*view.others, slipped))
 
-    def _take_step(self, label: str, can_do: bool) -> ButtonSpec:
-        """Return the main button, which works only while the plan is held."""
-        return ButtonSpec(Action.TAKE_STEP, label, self.is_held and can_do)
+    def _take_step(self, label: str, doing: str, can_do: bool) -> ButtonSpec:
+        """Return the main button of a held plan; of one that runs, the present activity."""
+        if self.is_held:
+            return ButtonSpec(Action.TAKE_STEP, label, can_do)
+        return ButtonSpec(Action.TAKE_STEP, doing, False)
 
 
 def _drawn_otherwise(procedure: Procedure) -> str:

@@ -145,6 +145,7 @@ class WizardPanel(QWidget):
         """Let every step wait for a person, or let steps run by themselves."""
         self._automatic.is_held = self.wizard.is_held = is_held
         self._hold.setChecked(is_held)
+        self._refresh()
 
     def fill_window(self, is_alone: bool) -> None:
         """Use the room of a window without panels, or less."""
@@ -281,7 +282,9 @@ class WizardPanel(QWidget):
         )
         for action in self._go_back:
             action.setEnabled(view.step is not Step.CONNECT)
-        self.bar.show_view(view)
+        runs_itself = view.runs_after_s is not None and not self._automatic.is_held
+        # The wearer confirms; the technician only where the wearer cannot.
+        self.bar.show_view(view, is_quiet=runs_itself or view.main.action is Action.CONFIRM)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:
             self._plan.clearFocus()  # otherwise Qt would pass the focus on

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
@@ -34,6 +34,8 @@ _EMPTY = tr(
     "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve. Each eye's "
     "position, its uncertainty and the verdict then appear here."
 )
+_MARGINS_PX = 3 * SPACING_PX // 2
+"""Of the tab of the eyes: above the cards, between them and the numbers, and below."""
 
 
 class ResultsPanel(QWidget):
@@ -102,6 +104,12 @@ class ResultsPanel(QWidget):
         self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results, rig))
         self._another.setText(another_text(results, rig))
         self._compare.show_results(results, rig)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Fit the tab of the eyes into the panel."""
+        super().resizeEvent(event)
+        self._fit()
 
     def show_comparison(self, other: Results) -> None:
         """Show the results of another method for the same alignments."""
@@ -119,6 +127,20 @@ class ResultsPanel(QWidget):
         tables = self._numbers, self._alignments, self._compare.table
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 
+    def _fit(self) -> None:
+        """Show the reasons of the verdicts only where the numbers fit below them."""
+        width_px = (self.width() - 2 * SPACING_PX) // 2
+        room_px = self.height() - self._tabs.tabBar().sizeHint().height() - _MARGINS_PX
+        for is_shown in (True, False):
+            for card in self._cards.values():
+                card.show_reason(is_shown)
+            cards_px = max(
+                max(card.sizeHint().height(), card.heightForWidth(width_px))
+                for card in self._cards.values()
+            )
+            if cards_px + self._numbers.whole_height_px <= room_px:
+                break
+
     def _add_copy(self) -> None:
         self._copy = add_action(
             self,
@@ -135,7 +157,7 @@ class ResultsPanel(QWidget):
         empty.setWordWrap(True)
         empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         empty.setContentsMargins(*4 * (2 * SPACING_PX,))
-        tabs = QTabWidget()
+        self._tabs = tabs = QTabWidget()
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
         tabs.setUsesScrollButtons(False)  # a long title is shortened instead
@@ -154,7 +176,7 @@ class ResultsPanel(QWidget):
     def _eyes_tab(self) -> QWidget:
         cards = hbox(*((card, 1) for card in self._cards.values()), spacing=SPACING_PX)
         tab = QWidget()
-        vbox(cards, (self._numbers, 1), on=tab, spacing=SPACING_PX)
+        vbox(cards, (self._numbers, 1), on=tab, margins=SPACING_PX // 2, spacing=SPACING_PX // 2)
         return tab
 
     def _alignments_tab(self) -> QWidget:

@@ -17,7 +17,7 @@ _REASON_LINES = 4
 
 
 class VerdictCard(QFrame):
-    """Shows the verdict on one eye, at a fixed height."""
+    """Shows the verdict on one eye; its height does not depend on the reason."""
 
     def __init__(self, eye: Eye, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -51,8 +51,13 @@ class VerdictCard(QFrame):
         else:
             self._word.setText(VERDICT_WORDS[verdict.name])
             self._reason.setText(sentence(verdict.reason))
-        self._reason.setToolTip(self._reason.text())
+        self.setToolTip(self._reason.text())
+        self.setAccessibleDescription(self._reason.text())
         self._recolor()
+
+    def show_reason(self, is_shown: bool) -> None:
+        """Show the reason below the verdict, or only in the tooltip."""
+        self._reason.setVisible(is_shown)
 
     def _recolor(self) -> None:
         palette = QPalette(self.palette())

@@ -17,6 +17,8 @@ _SCALE_LIMITS = 2.0
 """End of the scale in multiples of the limit, which is thus at the top."""
 _WIDEST = 190
 """Maximum width of a line of text; the dial is 200 wide."""
+_LEAST_PX = 9.0
+"""Smallest readable text, on the screen."""
 
 
 class RotationDial(QWidget):
@@ -63,7 +65,8 @@ class RotationDial(QWidget):
         fixed, normal = number_font(), self.font()
         digits = "–" if self._angle_deg is None else f"{self._angle_deg:.1f}°"
         _write(painter, fixed, digits, -14, 46, self._color())
-        _write(painter, normal, tr("limit {:.1f}°").format(self._limit_deg), 22, 13, text)
+        limit_size = round(min(max(13.0, _LEAST_PX * 200 / side), 23.0))
+        _write(painter, normal, tr("limit {:.1f}°").format(self._limit_deg), 22, limit_size, text)
         _write(painter, normal, self._word, 64, 22, self._color())
 
     def _color(self) -> QColor:

@@ -141,12 +141,12 @@ class EyeCanvas(QWidget):
             painter.drawPolyline(line)
 
     def _to_widget(self) -> QTransform:
-        """Return the transform that fits the crop into the widget."""
-        crop = self._shown
+        """Return the transform that fits the crop into the widget, close to the title above."""
+        crop, display = self._shown, _display(self._view) if self._view else self._shown
         scale = min(self.width() / crop.width(), self.height() / crop.height())
-        to_widget = QTransform.fromTranslate(self.width() / 2, self.height() / 2)
-        to_widget.scale(scale, scale)
-        return to_widget.translate(-crop.center().x(), -crop.center().y())
+        left = self.width() / 2 - scale * crop.center().x()
+        top = min(self.height() / 2 - scale * crop.center().y(), -scale * display.top())
+        return QTransform.fromTranslate(left, top).scale(scale, scale)
 
     def _choose_crop(self) -> None:
         """Crop to the hand, but keep the present crop while it still fits."""

@@ -62,7 +62,7 @@ def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
         assert f"{eye} eye {error:.1f}′ → {another:.1f}′" in another_text(results, rig)
     assert results.eye_distance_m is not None
     assert cells(rows, "Eye distance") == (f"{1e3 * results.eye_distance_m:.1f} mm",)
-    assert cells(rows, "Alignments") == ("2",)
+    assert cells(rows, "Solved from") == (f"2 alignments, {results.method}",)
     assert [row.cells[1] for row in verdict_rows(results)] == [
         results.verdicts[eye].reason for eye in EYES
     ]

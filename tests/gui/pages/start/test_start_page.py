@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QListWidget,
     QPushButton,
+    QScrollArea,
     QSpinBox,
     QWidget,
 )
@@ -355,6 +356,19 @@ def test_unfinished_and_recent_sessions_are_offered(
     with qtbot.waitSignal(page.open_requested) as chosen:
         QTest.keyClick(find(opened, QListWidget), Qt.Key.Key_Return)
     assert chosen.args == [tmp_path / "b"]
+
+
+def test_nothing_scrolls_at_1920x1080_with_200_percent(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
+) -> None:
+    entries = tuple(Entry(tmp_path / name, name) for name in "abcd")
+    inspector.offers = KnownSessions(entries, entries)
+    page = open_page()
+    qtbot.waitUntil(find(page, QWidget, "resume").isVisible)
+    page.resize(960, 488)  # less the title bar and the menus
+    areas = [one for one in page.findChildren(QScrollArea) if one.isVisible()]
+    assert len(areas) == 2
+    qtbot.waitUntil(lambda: all(one.verticalScrollBar().maximum() == 0 for one in areas))
 
 
 def test_any_session_folder_can_be_opened(

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtGui import QGuiApplication
@@ -14,7 +15,8 @@ from handcal_gui.pages.wizard.picture import GuidePicture
 from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
-from tests.gui.helpers import button, show
+from handcal_gui.widgets.image_view import ImageView
+from tests.gui.helpers import button, child, show
 
 Maker = Callable[..., Snapshot]
 
@@ -34,6 +36,37 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     printer.setOutputFileName(str(tmp_path / "result.pdf"))
     bar.print_to(printer)
     assert (tmp_path / "result.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_camera_is_shown_until_an_eye_s_view_helps(qtbot: QtBot, snapshot: Maker) -> None:
+    picture = show(qtbot, GuidePicture(), 700, 500)
+    camera = child(picture, ImageView)
+    start, aligning = snapshot(), snapshot(State.ALIGN)
+    picture.show_snapshot(replace(start, frame=None, views={}))
+    assert camera.isVisible()
+    assert "first image" in camera.message
+    for step, shown, has_camera in (
+        (Step.CONNECT, start, True),
+        (Step.SHOW_HAND, start, True),
+        (Step.ALIGN, aligning, False),
+        (Step.ALIGN, replace(aligning, views={}), True),
+        (Step.VERIFY, snapshot(State.APPLIED), False),
+    ):
+        picture.step = step
+        picture.show_snapshot(shown)
+        assert camera.isVisible() == has_camera
+        assert camera.message == ""
+
+
+def test_the_result_stands_beside_the_eyes_in_a_low_wide_window(
+    qtbot: QtBot, snapshot: Maker
+) -> None:
+    picture = show(qtbot, GuidePicture(), 944, 230)  # of 1920x1080 at 200 %, without panels
+    picture.step = Step.VERIFY
+    picture.show_snapshot(snapshot(State.APPLIED))
+    eye = next(one for one in picture.findChildren(EyeCanvas) if one.isVisible())
+    qtbot.waitUntil(lambda: eye.height() > 150)
+    assert picture.result.x() > eye.width()
 
 
 def test_before_and_after_are_shown_in_turn(qtbot: QtBot, snapshot: Maker) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
@@ -14,6 +14,7 @@ from handcal.station.states import State
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
+from handcal_gui.theme import use_theme
 from tests.gui.views import all_views
 
 Maker = Callable[..., Snapshot]
@@ -68,6 +69,28 @@ def test_a_disabled_main_button_asks_for_nothing(
     panel.show_snapshot(snapshot(State.APPLYING))
     with qtbot.assertNotEmitted(panel.asked):
         panel.press_main()
+
+
+def test_the_main_button_has_its_colour_only_where_a_press_is_needed(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    def is_colored() -> bool:
+        shade = child(panel, "wizardMain").palette().button().color()
+        return shade != QApplication.palette().button().color()
+
+    try:
+        for theme in ("light", "dark"):
+            use_theme(theme)
+            panel.show_snapshot(snapshot(State.ALIGNED))
+            panel.hold(True)
+            assert is_colored()
+            panel.hold(False)
+            assert not is_colored()  # solved by itself
+            panel.hold(True)
+            panel.show_snapshot(snapshot(State.ALIGN))
+            assert not is_colored()  # the wearer confirms
+    finally:
+        use_theme("system")
 
 
 def test_the_other_buttons_come_and_go(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:

@@ -75,6 +75,19 @@ def test_without_results_it_says_how_to_get_them(panel: ResultsPanel, snapshot: 
     assert panel.as_text() == ""
 
 
+def test_a_low_panel_has_room_for_all_numbers(qtbot: QtBot, solved: ResultsPanel) -> None:
+    table = child(solved, NumberTable, "numbers-of-both-eyes")
+    other_px = 304 - 222  # tabs, cards without reasons, and margins
+    for room_px, has_reasons in ((280, True), (3, False), (280, True)):
+        solved.resize(375, table.whole_height_px + other_px + room_px)
+        qtbot.waitUntil(lambda: table.verticalScrollBar().maximum() == 0)
+        for card in solved.findChildren(VerdictCard):
+            reason = card.toolTip()
+            shown = [one.text() for one in card.findChildren(QLabel) if one.isVisible()]
+            assert reason
+            assert (reason in shown) == has_reasons
+
+
 def test_the_numbers_are_the_results(solved: ResultsPanel, results: Results) -> None:
     table = child(solved, NumberTable, "numbers-of-both-eyes")
     assert table.as_text().splitlines()[1].startswith("φ1 (mm)\t")
