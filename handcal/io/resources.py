@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from handcal.errors import FileError
@@ -15,12 +16,16 @@ def resource_path(name: str) -> Path:
     FileError
         If it is missing, because the installation is damaged.
     """
-    package = Path(__file__).parents[1]
-    root = package.parent
-    folders = [package / "_resources"]
-    if (root / "pyproject.toml").exists():  # a checkout
-        folders = [root / "resources", root]
-    for folder in folders:
+    for folder in _folders():
         if (path := folder / name).exists():
             return path
     raise FileError(f"the shipped file {name} is missing; install handcal again")
+
+
+@cache  # a window asks for hundreds of icons
+def _folders() -> tuple[Path, ...]:
+    package = Path(__file__).parents[1]
+    root = package.parent
+    if (root / "pyproject.toml").exists():  # a checkout
+        return root / "resources", root
+    return (package / "_resources",)

@@ -8,6 +8,7 @@ thumb is at +x, a left hand's at −x.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -108,6 +109,7 @@ class _Capsule:
     blend: float
 
 
+@lru_cache(maxsize=4)  # a program that simulates several cameras or wearers often has one hand
 def make_hand(seed: int, settings: HandSettings | None = None) -> HandModel:
     """Return the hand of a seed, which determines size, spread, curl, wrist, side and skin tone.
 

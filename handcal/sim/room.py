@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -43,6 +44,7 @@ class Room:
         freeze(self, "light", np.float64, 3)
 
 
+@lru_cache(maxsize=2)  # as hands are
 def make_room(seed: int, settings: RoomSettings | None = None) -> Room:
     """Return the room of a seed: distances and textures of its walls, and the light's direction."""
     settings = settings or RoomSettings()
@@ -70,6 +72,7 @@ def _wallpaper(rng: np.random.Generator, width: int, height: int) -> UInt8:
         size = rng.integers(20, 160, 2)
         color = rng.integers(20, 235, 3).tolist()
         cv2.rectangle(wall, corner.tolist(), (corner + size).tolist(), color, cv2.FILLED)
+    wall.setflags(write=False)
     return wall
 
 

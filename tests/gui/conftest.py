@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QCoreApplication, QEvent
 from scipy.spatial.transform import Rotation
 
 from handcal.camera.feed import CameraStatus
@@ -93,6 +94,14 @@ class Shots:
     live: PlacedHand
     frame: Frame
     rotation_rad: Float64
+
+
+@pytest.fixture(autouse=True)
+def _windows_are_deleted() -> Iterator[None]:
+    """Delete a test's windows at its end: each that is left makes all later ones slower."""
+    yield
+    if QCoreApplication.instance() is not None:
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.fixture(scope="session")
