@@ -3297,6 +3297,14 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Solved from</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>What was fused, and the solver</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Iterations</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3334,18 +3342,6 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
     </message>
     <message>
         <source>Where eyes are expected before any alignment</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Fused into these results</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Method</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The solver</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
