@@ -111,7 +111,7 @@ def devices_by_child() -> list[Device]:
         If the SDK is missing, cannot list devices, crashes, or does not answer.
     """
     advice = (
-        "unplug the camera and plug it in again; if it stays so, install pyrealsense2 again "
+        "unplug the camera and plug it in again; if it still fails, reinstall pyrealsense2 "
         "(the simulator, recordings and other cameras work without)"
     )
     command = [sys.executable, "-m", "handcal.camera.sdk_devices"]
