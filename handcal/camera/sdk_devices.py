@@ -124,6 +124,8 @@ def devices_by_child() -> list[Device]:
             errors="replace",
             timeout=_LONGEST_LISTING_S,
             check=False,
+            # On Windows a console would appear each time that the start page looks.
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
     except subprocess.TimeoutExpired as error:
         raise CameraError(
