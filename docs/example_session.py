@@ -1,4 +1,4 @@
-"""Makes resources/example_session anew: a simulated wearer, calibrated, with trials."""
+"""Replaces resources/example_session by a simulated wearer's calibration with trials."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TARGET = Path(__file__).parents[1] / "resources/example_session"
 SEED = 4
 POINTS, DEPTH_SIGMA_M = 5000, 0.001
 BY_HAND_SIGMA_M = 0.0005
-"""How closely a wearer can tell that the drawn target covers the real one."""
+"""Standard deviation with which a wearer puts the drawn target over the real one."""
 NOTES = "Simulated: made by docs/example_session.py."
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Takes pictures of the program, which operates itself on an X display without a screen.
 #
-#   docs/pictures.sh         the guide's pictures anew, in docs/pictures/
+#   docs/pictures.sh         the guide's pictures, in docs/pictures/
 #   docs/pictures.sh looks   every step, panel and dialog on the screens and in the colours that
 #                            people use, in artefacts/looks/, to be looked at
 set -euo pipefail

@@ -123,7 +123,7 @@ class EyeDistance:
         low_m, high_m = EYE_DISTANCES_M
         if not low_m <= self.value_m <= high_m:
             raise ValueError(
-                f"an eye distance of {1e3 * self.value_m:.1f} mm is not one of a person; "
+                f"nobody has an eye distance of {1e3 * self.value_m:.1f} mm; "
                 f"enter {1e3 * low_m:.0f} to {1e3 * high_m:.0f} mm"
             )
         if not 0.0 < self.sigma_m <= 0.02:

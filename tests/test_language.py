@@ -25,7 +25,7 @@ SUSPECT = re.compile(rf"[\"']\s*{QUESTION.pattern}|{WORDS.pattern}", re.IGNORECA
 
 def sources() -> list[Path]:
     """Return the files to check: code, tests, examples and pages."""
-    folders = "handcal", "handcal_gui", "examples", "tests"
+    folders = "handcal", "handcal_gui", "docs", "examples", "tests"
     code = [path for name in folders for path in (ROOT / name).rglob("*.py")]
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
     return sorted(path for path in code + pages if not path.stem.endswith("_pb2"))

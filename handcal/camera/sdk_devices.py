@@ -111,7 +111,7 @@ def devices_by_child() -> list[Device]:
         If the SDK is missing, cannot list devices, crashes, or does not answer.
     """
     advice = (
-        "unplug the camera and plug it in again; if it stays so, install pyrealsense2 again "
+        "unplug the camera and plug it in again; if it still fails, reinstall pyrealsense2 "
         "(the simulator, recordings and other cameras work without)"
     )
     command = [sys.executable, "-m", "handcal.camera.sdk_devices"]
@@ -124,6 +124,8 @@ def devices_by_child() -> list[Device]:
             errors="replace",
             timeout=_LONGEST_LISTING_S,
             check=False,
+            # On Windows a console would appear each time that the start page looks.
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
     except subprocess.TimeoutExpired as error:
         raise CameraError(

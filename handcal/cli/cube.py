@@ -105,7 +105,7 @@ def net(arguments: argparse.Namespace) -> None:
     if arguments.cube is not None:
         make_folder(arguments.cube.parent)
         write_cube(arguments.cube, cube)
-        console.print(f"{arguments.cube}: put the sides there as measured", markup=False)
+        console.print(f"{arguments.cube}: enter the measured sides there", markup=False)
 
 
 @command(

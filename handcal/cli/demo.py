@@ -229,7 +229,7 @@ def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
     try:
         return EyeDistance(true_m + error * _RULER_SIGMA_M)
     except ValueError as problem:
-        raise HandcalError(f"the worn rig does not fit a person: {problem}") from problem
+        raise HandcalError(f"no person can wear this rig: {problem}") from problem
 
 
 def _is_automatic(settings: DemoSettings) -> bool:

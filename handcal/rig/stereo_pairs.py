@@ -172,7 +172,7 @@ def why_apart(both: Mapping[str, Pair], alone: Alone, joint_px: Float64) -> tupl
             _shifted(alone)
             or _flipped(both, alone)
             or (
-                "hardly two pairs agree, though the board's pose in each image is sound (to "
+                "almost no two pairs agree, though the board's pose in each image is sound (to "
                 f"{np.median(alone.rms_px):.2f} px): the two images of a pair were not taken at "
                 "the same moment; synchronise the cameras, or hold the board on a stand"
             )
@@ -215,8 +215,8 @@ def _shifted(alone: Alone) -> str:
             T_H_D = moved.T_H_D
             if np.mean(_apart(differences(T_H_D[middle(T_H_D)], T_H_D)) < 1.0) > 0.8:
                 return (
-                    "hardly two pairs agree, but they do with the headset camera's images counted "
-                    f"{shift:+d}: number the images of a moment alike"
+                    "almost no two pairs agree, but the depth camera's image N and the headset "
+                    f"camera's N{shift:+d} do: give both images of a moment the same number"
                 )
     return ""
 

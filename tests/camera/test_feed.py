@@ -79,7 +79,7 @@ def test_a_camera_unplugged_and_plugged_in_again_goes_on() -> None:
         assert feed.status.problem == str(UNPLUGGED)
         assert read_frame(feed).index == 1
         assert feed.status.problem == ""
-        assert feed.status.dropped == 0  # it counts anew
+        assert feed.status.dropped == 0  # counting starts again
     assert [camera.is_closed for camera in opened] == [True, True]
 
 

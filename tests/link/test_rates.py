@@ -49,8 +49,8 @@ def test_where_nothing_passed_no_share_was_lost() -> None:
 
 
 def test_a_reconnected_headset_counts_from_zero() -> None:
-    anew = replace(START, sent=1100, received=600, lost=0, lost_inbound=0)
-    rates = link_rates(START, anew, 1.0)
+    restarted = replace(START, sent=1100, received=600, lost=0, lost_inbound=0)
+    rates = link_rates(START, restarted, 1.0)
     assert (rates.lost, rates.lost_inbound) == (0.0, 0.0)
 
 

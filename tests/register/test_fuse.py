@@ -330,7 +330,7 @@ def test_both_eyes_see_what_the_weights_say(apart_m: float) -> None:
     )
     solved = solve_alignment(alignment, RIG)
     assert np.sign(apart_m) * solved["left"].shift_m[2] > 0.007
-    # Whoever holds the eyes for well placed, but knows no eye distance, must find it from this.
+    # With a prior that the eyes are well placed, but no eye distance, this must give it.
     prior = PriorSettings(eye_difference_sigma_m=(0.1, 1e-6, 1e-6), eye_box_sigma_m=0.003)
     unknowing = FuseSettings(prior=prior)
     fused = fuse_alignments([(alignment, solved)], RIG, unknowing).shifts

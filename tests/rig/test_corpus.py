@@ -86,7 +86,7 @@ def with_right(pairs: Pairs, order: list[int]) -> Pairs:
     ("order", "reason"),
     [
         ([7, 4, 10, 1, 11, 0, 12, 2, 9, 3, 8, 5, 6], "not taken at the same moment"),
-        ([*range(1, 13)], "images counted -1"),
+        ([*range(1, 13)], "headset camera's N-1 do"),
         ([0, 4, 2, 3, 1, *range(5, 13)], r"pair left0[25]\.jpg alone puts the cameras"),
     ],
     ids=["mixed up", "numbered from another", "two exchanged"],

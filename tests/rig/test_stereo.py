@@ -157,7 +157,7 @@ def test_pairs_numbered_differently_are_named() -> None:
     shifted = [(pairs[place][0], pairs[place - 1][1]) for place in range(len(pairs))]
     verdict = calibrate_stereo(shifted, DEPTH, HEADSET).verdict
     assert verdict.name == "bad"
-    assert "hardly two pairs agree" in verdict.reason
+    assert "almost no two pairs agree" in verdict.reason
 
 
 def test_cameras_that_are_not_synchronised_are_named() -> None:

@@ -31,7 +31,7 @@ def test_only_those_not_finished_are_listed_the_newest_first(
     assert (newest.path, oldest.path) == (tmp_path / "a-second", tmp_path / "b-first")
     assert (oldest.wearer, oldest.alignments, oldest.trials, oldest.problem) == ("P7", 1, 0, "")
     assert oldest.started == Session.open(oldest.path).events[0].time
-    with Session(oldest.path):  # it can be gone on with
+    with Session(oldest.path):  # it can be resumed
         pass
 
 

@@ -97,7 +97,7 @@ def test_own_shifts_are_told_from_others(stream: ShiftStream, see: Callable[...,
     assert arrival(stream) is Arrival.SENDING
     assert not see(shifts_of(0.001))
     assert arrival(stream) is Arrival.ARRIVED
-    assert see(shifts_of(0.002)), "solved anew and applied, for instance"
+    assert see(shifts_of(0.002)), "solved again and applied, for instance"
 
 
 def test_others_do_not_settle(qtbot: QtBot, stream: ShiftStream, see: Callable[..., bool]) -> None:
