@@ -37,9 +37,6 @@ from handcal.types import Bool, EyeShift, Float64
 _POINTS = 1000
 # Number of points at which the distance between neighbours of a whole cloud is measured.
 _SPACING_POINTS = 200
-# φ is fitted to at most this many of the pairs of clouds that hold different points: all points
-# of the hand were moved alike, so that more say no more.
-_FITTED = 5000
 # First a coarse registration, to cut both clouds alike, then a fine one.
 _COARSE = RigidSettings(tolerance_m=1e-3)
 _FINE = RigidSettings()
@@ -92,6 +89,8 @@ class HandMatch:
     """(6, 6); of `rigid`, see `motion_covariance`."""
     shape: ShapeChange
     """From the hand to the cursor."""
+    thinned_m: Float64
+    """(K, 3); the hand's points within the common cut, thinned."""
     outline_m: Float64
     """(K, 3); the cursor's outline, which the wearer sees."""
 
@@ -143,8 +142,9 @@ def match_hands(
         pairs=pairs,
         same_points=bool(paired_once > _SAME_POINTS * len(partners)),
         rigid=fine,
-        covariance=motion_covariance(fine.rows, hand, cursor, T_cursor_hand),
+        covariance=motion_covariance(fine.rows, hand, T_cursor_hand),
         shape=measure_shape_change(hand, cursor, T_cursor_hand, _FINE, fine.rows),
+        thinned_m=hand.points_m,
         outline_m=outline_m,
     )
 
@@ -166,14 +166,11 @@ def fit_match(
         `model.cursor_displacement`.
     """
     T_cursor = T_E if T_drawn is None else T_drawn @ T_E
-    T_back = np.asarray(np.linalg.inv(T_cursor))
     gap_m, index, kept = match.pairs
     history = [float(np.mean(gap_m[kept] ** 2))]
     inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
-    chosen = np.flatnonzero(kept)
-    if not match.same_points:
-        chosen = chosen[:: 1 + len(chosen) // (_FITTED + 1)]
-    hand_m = match.hand_m[chosen]
+    # All points of clouds that hold different points were moved alike: fewer say as much.
+    hand_m = match.hand_m[kept] if match.same_points else match.thinned_m
     paired = transform(T_E, hand_m)
     R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))
     turn = _measure_turn(match, T_E, R, paired)
@@ -189,6 +186,7 @@ def fit_match(
         hand = transform(T_E, match.hand_m)
         shape = predict(hand, shift_m, distance_m, exact=True)
         cursor = transform(T_cursor, match.cursor_m)
+        T_back = np.asarray(np.linalg.inv(T_cursor))
         kept = kept & _is_nearest(index, gap_m)
     while same_points:
         fitted = hand[kept]

@@ -30,6 +30,9 @@ _PATCH_M = 0.022
 _OUTLINE_GAPS = 0.1
 # After this many steps they become shorter, so that pairs that change to and fro come to rest.
 _FULL_STEPS = 12
+# Each step is about a quarter of the one before, as the pairs slide. The last one is made longer by
+# what is left of that geometric series, which saves the steps that would follow.
+_LEFT_AFTER_STEP = 0.3
 # Lower bound of each variance, so that exact clouds have one: 10 µm, and 10 µrad.
 _EXACT_M2 = 1e-10
 
@@ -44,9 +47,10 @@ class RigidSettings:
     """Interior points used from each cloud until a step is below `near_m`, and then all. With a
     known start all are used at once."""
     near_m: float = 1e-3
-    """Largest step of a hand point below which all interior points are used."""
+    """Largest step of a hand point below which all interior points are used. A tolerance as large
+    does not need them."""
     max_iterations: int = 40
-    tolerance_m: float = 3e-5
+    tolerance_m: float = 1e-4
     """The iteration stops when a step moves no point of the hand by more than this."""
     outlier_m: float = 0.004
     """Distance at which an outline pair has a weight of one quarter (Geman-McClure), once most
@@ -70,17 +74,19 @@ class Rows:
     gap_m: Float64
     weight: Float64
     """(N,); from target to source along the direction, and the weight of each row."""
+    apart_m: Float64
+    """(K,); distance from each of the source's points in use to the target's nearest."""
 
     @property
     def jacobian(self) -> Float64:
-        """(N, 6); of the gaps with respect to a rotation about the centre and a translation."""
+        """(6, N); of the gaps with respect to a rotation about the centre and a translation."""
         at, to = (self.at_m - self.centre_m).T, self.toward.T
         J = np.empty((6, len(self.at_m)))
         J[0] = at[1] * to[2] - at[2] * to[1]
         J[1] = at[2] * to[0] - at[0] * to[2]
         J[2] = at[0] * to[1] - at[1] * to[0]
         J[3:] = to
-        return J.T
+        return J
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,17 +129,21 @@ def register_rigid(
     information = np.eye(6)
     reason = None
     is_near = T_start is not None
+    needs_all = settings.tolerance_m < settings.near_m
     for _ in range(settings.max_iterations):
         most = None if is_near else settings.start_interior
         rows = registration_rows(source, target, T_target_source, settings, max_interior=most)
         share = 1.0 / max(len(history) - _FULL_STEPS, 1)
         step, information = _step(rows, share)
+        length_m = np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:])
+        is_last = length_m < settings.tolerance_m and (is_near or not needs_all)
+        if is_last:
+            reason = f"step below {settings.tolerance_m * 1e6:.0f} µm"
+            step *= 1.0 + _LEFT_AFTER_STEP
         T_step = _about(rows.centre_m, step)
         T_target_source = T_step @ T_target_source
         history.append(float(rows.weight @ rows.gap_m**2 / rows.weight.sum()))
-        length_m = np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:])
-        if is_near and length_m < settings.tolerance_m:
-            reason = f"step below {settings.tolerance_m * 1e6:.0f} µm"
+        if is_last:
             break
         is_near = is_near or bool(length_m < settings.near_m)
     return RigidResult(
@@ -146,7 +156,7 @@ def register_rigid(
             rows,
             at_m=transform(T_step, rows.at_m),
             centre_m=rows.centre_m + step[3:],
-            gap_m=rows.gap_m + rows.jacobian @ step,
+            gap_m=rows.gap_m + step @ rows.jacobian,
         ),
     )
 
@@ -183,7 +193,7 @@ def registration_rows(
     outline, partner, toward, weight = _outline_pairs(
         source, target, moved, T_source_target, outward, settings, trees[1]
     )
-    inner, inner_partner, normal = _interior_pairs(
+    inner, inner_partner, normal, apart_m = _interior_pairs(
         source, target, moved, T_source_target, R, trees[0], max_interior
     )
     first = np.concatenate([outline, inner])
@@ -198,44 +208,42 @@ def registration_rows(
         toward=direction,
         gap_m=np.einsum("nd,nd->n", at - target.points_m.take(second, axis=0), direction),
         weight=np.concatenate([weight, np.ones(len(inner))]),
+        apart_m=apart_m,
     )
 
 
-def motion_covariance(
-    rows: Rows, source: Surface, target: Surface, T_target_source: Float64
-) -> Float64:
+def motion_covariance(rows: Rows, source: Surface, T_target_source: Float64) -> Float64:
     """Return the covariance (6, 6) of a registration: rotation about the mean, and translation.
 
     It is estimated from the residuals, of which those in one patch of the surface may be
     correlated in any way (cluster-robust, Liang & Zeger 1986).
     """
     jacobian = rows.jacobian
-    J = rows.weight[:, None] * jacobian
-    inverse = np.linalg.inv(J.T @ jacobian + 1e-9 * np.eye(6))
+    J = rows.weight * jacobian
+    inverse = np.linalg.inv(J @ jacobian.T + 1e-9 * np.eye(6))
     moved = transform(T_target_source, source.points_m)
     centres = cube_means(moved, _PATCH_M)
     patch = nearest(KdTree(centres), moved)[1][rows.index]
     count = len(centres)
-    scores = _sums(patch, rows.gap_m[:, None] * J, count)
-    outlines = _sums(patch[: rows.outlines], J[: rows.outlines], count)
-    apart_m, _ = nearest(target.tree, moved)
-    unknown_m = _OUTLINE_GAPS * float(np.median(apart_m))
-    meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores.T @ scores
-    meat += unknown_m**2 * outlines.T @ outlines
+    scores = sums(patch, rows.gap_m * J, count)
+    outlines = sums(patch[: rows.outlines], J[:, : rows.outlines], count)
+    unknown_m = _OUTLINE_GAPS * float(np.median(rows.apart_m))
+    meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores @ scores.T
+    meat += unknown_m**2 * outlines @ outlines.T
     return np.asarray(inverse @ meat @ inverse + _EXACT_M2 * np.eye(6))
 
 
-def _sums(group: Indices, values: Float64, count: int) -> Float64:
-    """Return the sums of the values (N, K) of each of `count` groups, (count, K)."""
-    return np.stack([np.bincount(group, column, count) for column in values.T], axis=1)
+def sums(group: Indices, values: Float64, count: int) -> Float64:
+    """Return the sums of the values (K, N) of each of `count` groups, (K, count)."""
+    return np.array([np.bincount(group, row, count) for row in values])
 
 
 def _step(rows: Rows, share: float) -> tuple[Float64, Float64]:
     """Return a share of a Gauss-Newton step, (6,), and its matrix."""
     J = rows.jacobian
-    weighted = rows.weight[:, None] * J
-    information = weighted.T @ J
-    gradient = weighted.T @ rows.gap_m
+    weighted = rows.weight * J
+    information = weighted @ J.T
+    gradient = weighted @ rows.gap_m
     step = -share * np.asarray(np.linalg.solve(information + 1e-9 * np.eye(6), gradient))
     return step, information
 
@@ -283,22 +291,22 @@ def _interior_pairs(
     R: Float64,
     source_tree: KdTree,
     max_interior: int | None,
-) -> tuple[Indices, Indices, Float64]:
-    """Return pairs found from both clouds: source and target indices, target normals."""
-    used = [
-        np.arange(0, count, 1 if max_interior is None else 1 + (count - 1) // max_interior)
-        for count in (len(source.points_m), len(target.points_m))
-    ]
-    _, i_1 = nearest(target.tree, moved[used[0]])
-    keep_1 = ~target.near_cut[i_1]
-    _, i_2 = nearest(source_tree, transform(T_source_target, target.points_m[used[1]]))
-    keep_2 = ~source.near_cut[i_2]
-    first = np.concatenate([used[0][keep_1], i_2[keep_2]])
-    second = np.concatenate([i_1[keep_1], used[1][keep_2]])
+) -> tuple[Indices, Indices, Float64, Float64]:
+    """Return pairs found from both clouds: indices, mean normals; distances from the source."""
+    step_1, step_2 = (
+        1 if max_interior is None else 1 + (len(points_m) - 1) // max_interior
+        for points_m in (source.points_m, target.points_m)
+    )
+    apart_m, i_1 = nearest(target.tree, moved[::step_1])
+    keep_1 = np.flatnonzero(~target.near_cut[i_1])
+    _, i_2 = nearest(source_tree, transform(T_source_target, target.points_m[::step_2]))
+    keep_2 = np.flatnonzero(~source.near_cut[i_2])
+    first = np.concatenate([step_1 * keep_1, i_2[keep_2]])
+    second = np.concatenate([i_1[keep_1], step_2 * keep_2])
     # On a curved surface a point lies below its partner's tangent plane; the mean of both normals
     # has no such bias (symmetric ICP, Rusinkiewicz 2019).
     normals = target.normals.take(second, axis=0)
     others = (source.normals @ R.T).take(first, axis=0)
     normals += np.copysign(1.0, np.einsum("nd,nd->n", normals, others))[:, None] * others
     normals /= np.sqrt(np.einsum("nd,nd->n", normals, normals))[:, None]
-    return first, second, normals
+    return first, second, normals, apart_m
