@@ -13,11 +13,10 @@ from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from small_gicp import KdTree
 
 from handcal.display import update_matrix
-from handcal.geometry import transform
+from handcal.geometry import rotation_matrix, rotation_vector, transform
 from handcal.register.cut import CUT_BAND_M, common_cut
 from handcal.register.model import balance, balanced_turn, design, predict
 from handcal.register.rcicp import best_rotation
@@ -143,7 +142,7 @@ def match_hands(
         same_points=bool(paired_once > _SAME_POINTS * len(partners)),
         rigid=fine,
         covariance=motion_covariance(fine.rows, hand, T_cursor_hand),
-        shape=measure_shape_change(hand, cursor, T_cursor_hand, _FINE, fine.rows),
+        shape=measure_shape_change(hand, cursor, fine, _FINE),
         thinned_m=hand.points_m,
         outline_m=outline_m,
     )
@@ -174,7 +173,7 @@ def fit_match(
     paired = transform(T_E, hand_m)
     R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))
     turn = _measure_turn(match, T_E, R, paired)
-    R_turned = Rotation.from_rotvec(turn.share * turn.turned_rad).as_matrix()
+    R_turned = rotation_matrix(turn.share * turn.turned_rad)
     outline_m = transform(T_cursor, match.outline_m)
     moved_m = _BALANCE_SHARE * balanced_turn(outline_m, R_turned, mean_point(unturned))
     unturned += moved_m
@@ -259,7 +258,7 @@ def _covariance(
     which is as far from either extreme; the change of the hand's shape; and a lower bound.
     """
     R_E = T_E[:3, :3]
-    R = Rotation.from_rotvec(np.sqrt(turn.share) * turn.turned_rad).as_matrix()
+    R = rotation_matrix(np.sqrt(turn.share) * turn.turned_rad)
     lever = np.eye(3) - R
     turned = lever @ turn.scatter_m2 @ lever.T
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
@@ -281,7 +280,7 @@ def _measure_turn(match: HandMatch, T_E: Float64, R: Float64, hand_m: Float64) -
     R_E = T_E[:3, :3]
     centred = _centred(hand_m)
     scatter_m2 = np.asarray(centred.T @ centred / len(hand_m))
-    turned_rad = Rotation.from_matrix(R).as_rotvec()
+    turned_rad = rotation_vector(R)
     inertia_m2 = np.trace(scatter_m2) * np.eye(3) - scatter_m2
     shape_m2 = (_SHAPE_SHARE * match.shape.rms_m) ** 2 / 3.0
     explained_rad2 = R_E @ match.covariance[:3, :3] @ R_E.T + shape_m2 * np.linalg.inv(inertia_m2)

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from small_gicp import KdTree
 
-from handcal.geometry import invert, rigid, transform
-from handcal.register.surface import Indices, Surface, cube_means, mean_point, nearest
+from handcal.geometry import invert, rigid, rotation_matrix, transform
+from handcal.register.surface import Indices, Surface, cube_means, mean_point, nearest, quantile
 from handcal.types import Float64
 
 # Pairs are searched again at every step, which lets them slide with the motion they measure, so
@@ -35,6 +35,8 @@ _FULL_STEPS = 12
 _LEFT_AFTER_STEP = 0.3
 # Lower bound of each variance, so that exact clouds have one: 10 µm, and 10 µrad.
 _EXACT_M2 = 1e-10
+# Against singular equations, of a motion that no row measures.
+_DAMPING = 1e-9 * np.eye(6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +124,10 @@ def register_rigid(
     T_start : (4, 4) float64, optional
         Initial T_target_source; by default the means coincide.
     """
-    offset_m = mean_point(target.points_m) - mean_point(source.points_m)
+    middle_m = mean_point(source.points_m)
+    offset_m = mean_point(target.points_m) - middle_m
     T_target_source = rigid(translation_m=offset_m) if T_start is None else T_start
-    reach_m = np.sqrt(source.points_m.var(axis=0).sum())
+    reach_m = np.linalg.norm(source.points_m - middle_m) / np.sqrt(len(source.points_m))
     history: list[float] = []
     information = np.eye(6)
     reason = None
@@ -188,10 +191,9 @@ def registration_rows(
         outline_tree = KdTree(bent_m[source.outline]) if len(source.outline) else None
         trees = KdTree(bent_m), outline_tree
     moved = transform(T_target_source, source_m)
-    outward = source.outward @ R.T
     T_source_target = invert(T_target_source)
     outline, partner, toward, weight = _outline_pairs(
-        source, target, moved, T_source_target, outward, settings, trees[1]
+        source, target, moved, T_source_target, R, settings, trees[1]
     )
     inner, inner_partner, normal, apart_m = _interior_pairs(
         source, target, moved, T_source_target, R, trees[0], max_interior
@@ -220,14 +222,14 @@ def motion_covariance(rows: Rows, source: Surface, T_target_source: Float64) -> 
     """
     jacobian = rows.jacobian
     J = rows.weight * jacobian
-    inverse = np.linalg.inv(J @ jacobian.T + 1e-9 * np.eye(6))
+    inverse = np.linalg.inv(J @ jacobian.T + _DAMPING)
     moved = transform(T_target_source, source.points_m)
     centres = cube_means(moved, _PATCH_M)
     patch = nearest(KdTree(centres), moved)[1][rows.index]
     count = len(centres)
     scores = sums(patch, rows.gap_m * J, count)
     outlines = sums(patch[: rows.outlines], J[:, : rows.outlines], count)
-    unknown_m = _OUTLINE_GAPS * float(np.median(rows.apart_m))
+    unknown_m = _OUTLINE_GAPS * quantile(rows.apart_m, 0.5)
     meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores @ scores.T
     meat += unknown_m**2 * outlines @ outlines.T
     return np.asarray(inverse @ meat @ inverse + _EXACT_M2 * np.eye(6))
@@ -244,15 +246,14 @@ def _step(rows: Rows, share: float) -> tuple[Float64, Float64]:
     weighted = rows.weight * J
     information = weighted @ J.T
     gradient = weighted @ rows.gap_m
-    step = -share * np.asarray(np.linalg.solve(information + 1e-9 * np.eye(6), gradient))
+    step = -share * np.asarray(np.linalg.solve(information + _DAMPING, gradient))
     return step, information
 
 
 def _about(centre_m: Float64, step: Float64) -> Float64:
     """Return the transform of a step: a rotation about a centre, and a translation."""
-    T = rigid(step[:3])
-    T[:3, 3] = centre_m + step[3:] - T[:3, :3] @ centre_m
-    return T
+    R = rotation_matrix(step[:3])
+    return rigid(R, centre_m + step[3:] - R @ centre_m)
 
 
 def _outline_pairs(
@@ -260,7 +261,7 @@ def _outline_pairs(
     target: Surface,
     moved: Float64,
     T_source_target: Float64,
-    outward: Float64,
+    R: Float64,
     settings: RigidSettings,
     source_outline_tree: KdTree | None,
 ) -> tuple[Indices, Indices, Float64, Float64]:
@@ -268,16 +269,16 @@ def _outline_pairs(
     if source_outline_tree is None or target.outline_tree is None:
         none = np.empty(0, dtype=np.intp)
         return none, none, np.empty((0, 3)), np.empty(0)
-    d_1, i_1 = nearest(target.outline_tree, moved[source.outline])
-    back = transform(T_source_target, target.points_m[target.outline])
+    d_1, i_1 = nearest(target.outline_tree, moved.take(source.outline, axis=0))
+    back = transform(T_source_target, target.points_m.take(target.outline, axis=0))
     d_2, i_2 = nearest(source_outline_tree, back)
     first = np.concatenate([source.outline, source.outline[i_2]])
     second = np.concatenate([target.outline[i_1], target.outline])
     distance_m = np.concatenate([d_1, d_2])
-    toward = outward[first] + target.outward[second]
+    toward = source.outward.take(first, axis=0) @ R.T + target.outward.take(second, axis=0)
     agreement = 0.5 * np.sqrt(np.einsum("nd,nd->n", toward, toward))
     toward /= np.maximum(2.0 * agreement, 1e-9)[:, None]
-    scale_m = max(settings.outlier_m, 3.0 * float(np.median(distance_m)))
+    scale_m = max(settings.outlier_m, 3.0 * quantile(distance_m, 0.5))
     weight = np.concatenate([source.outline_weight, target.outline_weight])
     weight *= agreement**4 / (1.0 + (distance_m / scale_m) ** 2) ** 2
     return first, second, toward, weight
@@ -307,6 +308,7 @@ def _interior_pairs(
     # has no such bias (symmetric ICP, Rusinkiewicz 2019).
     normals = target.normals.take(second, axis=0)
     others = (source.normals @ R.T).take(first, axis=0)
-    normals += np.copysign(1.0, np.einsum("nd,nd->n", normals, others))[:, None] * others
-    normals /= np.sqrt(np.einsum("nd,nd->n", normals, normals))[:, None]
+    cosine = np.einsum("nd,nd->n", normals, others)
+    normals += np.copysign(1.0, cosine)[:, None] * others
+    normals /= np.sqrt(2.0 + 2.0 * np.abs(cosine))[:, None]
     return first, second, normals, apart_m

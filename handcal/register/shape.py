@@ -19,8 +19,8 @@ from small_gicp import KdTree
 from handcal.frozen import brief, freeze
 from handcal.geometry import invert, transform
 from handcal.register.rcicp import best_rigid
-from handcal.register.rigid import RigidSettings, Rows, registration_rows, sums
-from handcal.register.surface import Indices, Surface, cube_means
+from handcal.register.rigid import RigidResult, RigidSettings, registration_rows, sums
+from handcal.register.surface import Indices, Surface, cube_means, mean_point
 from handcal.types import Float64
 
 _NODE_SPACING_M = 0.018
@@ -35,6 +35,8 @@ _STEPS = 2
 _NOISE_FACTOR = 4.5
 # Nodes as near as this to the one that moved most are reported together.
 _REGION_M = 0.035
+# Places of a symmetric (3, 3) matrix, each of its pairs once.
+_HALF = np.tril_indices(3)
 # A spread thumb reaches less far than this share of the fingers' reach.
 _THUMB_REACH = 0.6
 
@@ -73,32 +75,24 @@ class ShapeChange:
 
 
 def measure_shape_change(
-    cursor: Surface,
-    hand: Surface,
-    T_hand_cursor: Float64,
-    settings: RigidSettings = RigidSettings(),
-    rows: Rows | None = None,
+    cursor: Surface, hand: Surface, fit: RigidResult, settings: RigidSettings = RigidSettings()
 ) -> ShapeChange:
     """Measure how the shape of registered hands differs.
 
     Parameters
     ----------
     cursor, hand : Surface
-    T_hand_cursor : (4, 4) float64
-        From `register_rigid`.
+    fit : RigidResult
+        From `register_rigid`, of the cursor to the hand.
     settings : RigidSettings
         Of the search for pairs.
-    rows : Rows, optional
-        Of the registration, if they are known.
     """
-    points = cursor.points_m
+    points, rows, T_hand_cursor = cursor.points_m, fit.rows, fit.T_target_source
     nodes = cube_means(points, _NODE_CUBE_M)
     count = len(nodes)
     node, share = _shares(nodes, points)
     shares = _sparse(node, share, count)
     products = _products(node, share, count)
-    if rows is None:
-        rows = registration_rows(cursor, hand, T_hand_cursor, settings)
     stiffness = _STIFFNESS * _laplacian(nodes) + 1e-4 * np.eye(count)
     moved: Float64 = np.zeros((count, 3))
     point_moved: Float64 = np.zeros_like(points)
@@ -108,26 +102,28 @@ def measure_shape_change(
             rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
         toward = T_hand_cursor[:3, :3].T @ rows.toward.T
         before_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - rows.gap_m
-        measured, wanted = _normal_equation(
+        normal, wanted = _normal_equation(
             shares, products, rows.index, toward, rows.weight, before_m
         )
-        normal = measured.copy()
+        prior = len(rows.gap_m) / count * stiffness
         for i in range(3):
-            normal[i::3, i::3] += len(rows.gap_m) / count * stiffness
+            normal[i::3, i::3] += prior
         factor = _factor(normal)
         moved = lapack.dpotrs(factor, wanted)[0].reshape(-1, 3)
         point_moved = shares @ moved
     left_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - before_m
     variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
+    # The trace of M⁻¹ (M - P) M⁻¹ with the normal matrix M and its part P from the prior, which is
+    # alike for each coordinate.
     inverse = _inverse(factor)
-    scatter = np.sum((inverse @ measured) * inverse)
-    cut_m = points[cursor.near_cut]
+    of_node = inverse.reshape(count, -1)
+    scatter = np.trace(inverse) - np.vdot(of_node, prior @ of_node)
+    cut_m, middle_m = points[cursor.near_cut], mean_point(points)
     T_moved = best_rigid(nodes, nodes + moved)
     return ShapeChange(
         nodes_m=nodes,
         moved_m=transform(invert(T_moved), nodes + moved) - nodes,
-        toward_arm=(cut_m.mean(axis=0) if len(cut_m) else points.mean(axis=0))
-        - points.mean(axis=0),
+        toward_arm=(mean_point(cut_m) if len(cut_m) else middle_m) - middle_m,
         noise_m=float(np.sqrt(variance_m2 * scatter / count)),
     )
 
@@ -143,8 +139,9 @@ def _shares(nodes_m: Float64, points_m: Float64) -> tuple[Indices, Float64]:
 
 def _sparse(column: Indices, values: Float64, width: int) -> csr_array:
     """Return a sparse matrix (N, width) from the columns and values of its rows, (N, K) each."""
-    ends = np.arange(0, values.size + 1, values.shape[1])
-    return csr_array((values.ravel(), column.ravel(), ends), shape=(len(values), width))
+    ends = np.arange(0, values.size + 1, values.shape[1], dtype=np.int32)
+    columns = column.astype(np.int32).ravel()
+    return csr_array((values.ravel(), columns, ends), shape=(len(values), width))
 
 
 def _products(node: Indices, share: Float64, count: int) -> csr_array:
@@ -172,7 +169,7 @@ def _normal_equation(
     are added first, as they share its nodes.
     """
     points, count = shares.shape
-    i, j = np.tril_indices(3)
+    i, j = _HALF
     weighted = weight * toward
     summed = products.T @ sums(point, weighted[i] * toward[j], points).T
     half = summed.reshape(count, count, -1).transpose(2, 0, 1)
@@ -252,7 +249,8 @@ def _part(across: Float64, along: Float64, at_across: float, at_along: float) ->
 
 def _laplacian(nodes_m: Float64) -> Float64:
     """Return the graph Laplacian of neighbouring nodes, (K, K), of mean diagonal 1."""
-    apart_m2 = np.sum((nodes_m[:, None] - nodes_m) ** 2, axis=2)
+    apart_m = nodes_m[:, None] - nodes_m
+    apart_m2 = np.einsum("ijd,ijd->ij", apart_m, apart_m)
     weight = np.exp(-0.5 * apart_m2 / _NODE_SPACING_M**2)
     weight[apart_m2 > (2.0 * _NODE_SPACING_M) ** 2] = 0.0
     np.fill_diagonal(weight, 0.0)
