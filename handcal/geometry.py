@@ -20,7 +20,7 @@ def rigid(rotation: ArrayLike | None = None, translation_m: ArrayLike | None = N
     T = np.eye(4)
     if rotation is not None:
         R = np.asarray(rotation, dtype=np.float64)
-        T[:3, :3] = Rotation.from_rotvec(R).as_matrix() if R.shape == (3,) else R
+        T[:3, :3] = rotation_matrix(R) if R.shape == (3,) else R
     if translation_m is not None:
         T[:3, 3] = translation_m
     return T
@@ -30,6 +30,21 @@ def invert(T_dst_src: Float64) -> Float64:
     """Return ``T_src_dst`` of a rigid ``T_dst_src``."""
     R = T_dst_src[:3, :3]
     return rigid(R.T, -R.T @ T_dst_src[:3, 3])
+
+
+def rotation_matrix(rotation_rad: Float64) -> Float64:
+    """Return the matrix of a rotation vector, (3,); SciPy takes ten times as long."""
+    return np.asarray(cv2.Rodrigues(rotation_rad)[0], dtype=np.float64)
+
+
+def rotation_vector(R: Float64) -> Float64:
+    """Return the vector, (3,), rad, of a rotation by less than half a turn.
+
+    SciPy, which makes any matrix a rotation first, takes ten times as long.
+    """
+    axis = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(R)) - 1.0)
+    return axis * (np.arctan2(sine, cosine) / sine if sine > 0.0 else 1.0)
 
 
 def is_rigid(T: Float64, reach_m: float, tolerance: float = _ROTATION_TOLERANCE) -> bool:

@@ -11,6 +11,8 @@ from handcal.geometry import (
     is_rigid,
     project,
     rigid,
+    rotation_matrix,
+    rotation_vector,
     transform,
 )
 from handcal.types import Float64, Intrinsics
@@ -52,6 +54,16 @@ def test_rigid_takes_a_vector_or_a_matrix() -> None:
     assert close(transform(T, [[1.0, 0.0, 0.0]]), np.array([[1.0, 3.0, 3.0]]))
     assert close(rigid(T[:3, :3], T[:3, 3]), T)
     assert close(rigid(), np.eye(4))
+
+
+@given(VECTORS)
+def test_a_rotation_vector_and_its_matrix_are_scipys(rotation_rad: tuple[float, ...]) -> None:
+    # Below half a turn; shorter ones to where both are the identity.
+    for scale in (0.5, 1e-5, 1e-12):
+        vector = scale * np.array(rotation_rad)
+        matrix = rotation_matrix(vector)
+        assert close(matrix, Rotation.from_rotvec(vector).as_matrix())
+        np.testing.assert_allclose(rotation_vector(matrix), vector, rtol=1e-9, atol=1e-15)
 
 
 def test_project_by_hand() -> None:

@@ -13,11 +13,10 @@ from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from small_gicp import KdTree
 
 from handcal.display import update_matrix
-from handcal.geometry import transform
+from handcal.geometry import rotation_matrix, rotation_vector, transform
 from handcal.register.cut import CUT_BAND_M, common_cut
 from handcal.register.model import balance, balanced_turn, design, predict
 from handcal.register.rcicp import best_rotation
@@ -37,9 +36,6 @@ from handcal.types import Bool, EyeShift, Float64
 _POINTS = 1000
 # Number of points at which the distance between neighbours of a whole cloud is measured.
 _SPACING_POINTS = 200
-# φ is fitted to at most this many of the pairs of clouds that hold different points: all points
-# of the hand were moved alike, so that more say no more.
-_FITTED = 5000
 # First a coarse registration, to cut both clouds alike, then a fine one.
 _COARSE = RigidSettings(tolerance_m=1e-3)
 _FINE = RigidSettings()
@@ -92,6 +88,8 @@ class HandMatch:
     """(6, 6); of `rigid`, see `motion_covariance`."""
     shape: ShapeChange
     """From the hand to the cursor."""
+    thinned_m: Float64
+    """(K, 3); the hand's points within the common cut, thinned."""
     outline_m: Float64
     """(K, 3); the cursor's outline, which the wearer sees."""
 
@@ -143,8 +141,9 @@ def match_hands(
         pairs=pairs,
         same_points=bool(paired_once > _SAME_POINTS * len(partners)),
         rigid=fine,
-        covariance=motion_covariance(fine.rows, hand, cursor, T_cursor_hand),
-        shape=measure_shape_change(hand, cursor, T_cursor_hand, _FINE, fine.rows),
+        covariance=motion_covariance(fine.rows, hand, T_cursor_hand),
+        shape=measure_shape_change(hand, cursor, fine, _FINE),
+        thinned_m=hand.points_m,
         outline_m=outline_m,
     )
 
@@ -166,18 +165,15 @@ def fit_match(
         `model.cursor_displacement`.
     """
     T_cursor = T_E if T_drawn is None else T_drawn @ T_E
-    T_back = np.asarray(np.linalg.inv(T_cursor))
     gap_m, index, kept = match.pairs
     history = [float(np.mean(gap_m[kept] ** 2))]
     inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
-    chosen = np.flatnonzero(kept)
-    if not match.same_points:
-        chosen = chosen[:: 1 + len(chosen) // (_FITTED + 1)]
-    hand_m = match.hand_m[chosen]
+    # All points of clouds that hold different points were moved alike: fewer say as much.
+    hand_m = match.hand_m[kept] if match.same_points else match.thinned_m
     paired = transform(T_E, hand_m)
     R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))
     turn = _measure_turn(match, T_E, R, paired)
-    R_turned = Rotation.from_rotvec(turn.share * turn.turned_rad).as_matrix()
+    R_turned = rotation_matrix(turn.share * turn.turned_rad)
     outline_m = transform(T_cursor, match.outline_m)
     moved_m = _BALANCE_SHARE * balanced_turn(outline_m, R_turned, mean_point(unturned))
     unturned += moved_m
@@ -189,6 +185,7 @@ def fit_match(
         hand = transform(T_E, match.hand_m)
         shape = predict(hand, shift_m, distance_m, exact=True)
         cursor = transform(T_cursor, match.cursor_m)
+        T_back = np.asarray(np.linalg.inv(T_cursor))
         kept = kept & _is_nearest(index, gap_m)
     while same_points:
         fitted = hand[kept]
@@ -261,7 +258,7 @@ def _covariance(
     which is as far from either extreme; the change of the hand's shape; and a lower bound.
     """
     R_E = T_E[:3, :3]
-    R = Rotation.from_rotvec(np.sqrt(turn.share) * turn.turned_rad).as_matrix()
+    R = rotation_matrix(np.sqrt(turn.share) * turn.turned_rad)
     lever = np.eye(3) - R
     turned = lever @ turn.scatter_m2 @ lever.T
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
@@ -283,7 +280,7 @@ def _measure_turn(match: HandMatch, T_E: Float64, R: Float64, hand_m: Float64) -
     R_E = T_E[:3, :3]
     centred = _centred(hand_m)
     scatter_m2 = np.asarray(centred.T @ centred / len(hand_m))
-    turned_rad = Rotation.from_matrix(R).as_rotvec()
+    turned_rad = rotation_vector(R)
     inertia_m2 = np.trace(scatter_m2) * np.eye(3) - scatter_m2
     shape_m2 = (_SHAPE_SHARE * match.shape.rms_m) ** 2 / 3.0
     explained_rad2 = R_E @ match.covariance[:3, :3] @ R_E.T + shape_m2 * np.linalg.inv(inertia_m2)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from handcal.geometry import transform
-from handcal.register.surface import mean_point
+from handcal.register.surface import mean_point, quantile
 from handcal.types import Bool, Float64
 
 # Points this near the common cut count as beside it.
@@ -60,11 +60,11 @@ def common_cut(
     middle_m = np.mean([mean_point(cloud) for cloud in clouds], axis=0)
     along = (wrist_m - middle_m) / max(float(np.linalg.norm(wrist_m - middle_m)), 1e-9)
     places = [cloud @ along for cloud in clouds]
-    ends = [float(np.quantile(place, _OUTERMOST)) for place in places]
+    ends = [quantile(place, _OUTERMOST) for place in places]
     for edge in edges:
         at_wrist = edge[np.linalg.norm(edge - wrist_m, axis=1) < _ONE_EDGE_M]
         if len(at_wrist):
-            ends.append(float(np.quantile(at_wrist @ along, _INNERMOST)))
+            ends.append(quantile(at_wrist @ along, _INNERMOST))
     limit = min(ends)
     if min(float(np.mean(place <= limit)) for place in places) < _LEAST_KEPT:
         return None

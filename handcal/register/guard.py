@@ -7,13 +7,12 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
-from handcal.geometry import rigid
+from handcal.geometry import rigid, rotation_vector
 from handcal.register.rigid import RigidResult, RigidSettings, register_rigid
 from handcal.register.shape import ShapeChange, measure_shape_change
 from handcal.register.solve import check_cloud
-from handcal.register.surface import Surface, describe_surface
+from handcal.register.surface import Surface, describe_surface, mean_point
 from handcal.types import Bool, Float64
 
 Axis: TypeAlias = Literal["x", "y", "z"]
@@ -100,7 +99,7 @@ class RotationGuard:
         """
         hand = self._describe(hand_m, hand_cut)
         self._newest = hand_m, hand
-        middle_m = hand.points_m.mean(axis=0)
+        middle_m = mean_point(hand.points_m)
         fit = None
         if self._found is not None:
             last, last_middle_m = self._found
@@ -134,10 +133,10 @@ class RotationGuard:
         T_start = None
         if self._found is not None:
             last, last_middle_m = self._found
-            moved_m = hand.points_m.mean(axis=0) - last_middle_m
+            moved_m = mean_point(hand.points_m) - last_middle_m
             T_start = rigid(translation_m=moved_m) @ last.T_target_source
         fit = register_rigid(cursor, hand, settings, T_start)
-        return measure_shape_change(cursor, hand, fit.T_target_source, settings)
+        return measure_shape_change(cursor, hand, fit, settings)
 
     def _describe(self, hand_m: Float64, hand_cut: Bool | None) -> Surface:
         return describe_surface(hand_m, hand_cut, self._settings.max_points)
@@ -147,7 +146,7 @@ class RotationGuard:
 
 
 def _rotation(fit: RigidResult) -> Float64:
-    return Rotation.from_matrix(fit.T_target_source[:3, :3]).as_rotvec()
+    return rotation_vector(fit.T_target_source[:3, :3])
 
 
 def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:

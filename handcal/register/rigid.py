@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from small_gicp import KdTree
 
-from handcal.geometry import invert, rigid, transform
-from handcal.register.surface import Indices, Surface, cube_means, mean_point, nearest
+from handcal.geometry import invert, rigid, rotation_matrix, transform
+from handcal.register.surface import Indices, Surface, cube_means, mean_point, nearest, quantile
 from handcal.types import Float64
 
 # Pairs are searched again at every step, which lets them slide with the motion they measure, so
@@ -30,8 +30,13 @@ _PATCH_M = 0.022
 _OUTLINE_GAPS = 0.1
 # After this many steps they become shorter, so that pairs that change to and fro come to rest.
 _FULL_STEPS = 12
+# Each step is about a quarter of the one before, as the pairs slide. The last one is made longer by
+# what is left of that geometric series, which saves the steps that would follow.
+_LEFT_AFTER_STEP = 0.3
 # Lower bound of each variance, so that exact clouds have one: 10 µm, and 10 µrad.
 _EXACT_M2 = 1e-10
+# Against singular equations, of a motion that no row measures.
+_DAMPING = 1e-9 * np.eye(6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +49,10 @@ class RigidSettings:
     """Interior points used from each cloud until a step is below `near_m`, and then all. With a
     known start all are used at once."""
     near_m: float = 1e-3
-    """Largest step of a hand point below which all interior points are used."""
+    """Largest step of a hand point below which all interior points are used. A tolerance as large
+    does not need them."""
     max_iterations: int = 40
-    tolerance_m: float = 3e-5
+    tolerance_m: float = 1e-4
     """The iteration stops when a step moves no point of the hand by more than this."""
     outlier_m: float = 0.004
     """Distance at which an outline pair has a weight of one quarter (Geman-McClure), once most
@@ -70,17 +76,19 @@ class Rows:
     gap_m: Float64
     weight: Float64
     """(N,); from target to source along the direction, and the weight of each row."""
+    apart_m: Float64
+    """(K,); distance from each of the source's points in use to the target's nearest."""
 
     @property
     def jacobian(self) -> Float64:
-        """(N, 6); of the gaps with respect to a rotation about the centre and a translation."""
+        """(6, N); of the gaps with respect to a rotation about the centre and a translation."""
         at, to = (self.at_m - self.centre_m).T, self.toward.T
         J = np.empty((6, len(self.at_m)))
         J[0] = at[1] * to[2] - at[2] * to[1]
         J[1] = at[2] * to[0] - at[0] * to[2]
         J[2] = at[0] * to[1] - at[1] * to[0]
         J[3:] = to
-        return J.T
+        return J
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,24 +124,29 @@ def register_rigid(
     T_start : (4, 4) float64, optional
         Initial T_target_source; by default the means coincide.
     """
-    offset_m = mean_point(target.points_m) - mean_point(source.points_m)
+    middle_m = mean_point(source.points_m)
+    offset_m = mean_point(target.points_m) - middle_m
     T_target_source = rigid(translation_m=offset_m) if T_start is None else T_start
-    reach_m = np.sqrt(source.points_m.var(axis=0).sum())
+    reach_m = np.linalg.norm(source.points_m - middle_m) / np.sqrt(len(source.points_m))
     history: list[float] = []
     information = np.eye(6)
     reason = None
     is_near = T_start is not None
+    needs_all = settings.tolerance_m < settings.near_m
     for _ in range(settings.max_iterations):
         most = None if is_near else settings.start_interior
         rows = registration_rows(source, target, T_target_source, settings, max_interior=most)
         share = 1.0 / max(len(history) - _FULL_STEPS, 1)
         step, information = _step(rows, share)
+        length_m = np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:])
+        is_last = length_m < settings.tolerance_m and (is_near or not needs_all)
+        if is_last:
+            reason = f"step below {settings.tolerance_m * 1e6:.0f} µm"
+            step *= 1.0 + _LEFT_AFTER_STEP
         T_step = _about(rows.centre_m, step)
         T_target_source = T_step @ T_target_source
         history.append(float(rows.weight @ rows.gap_m**2 / rows.weight.sum()))
-        length_m = np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:])
-        if is_near and length_m < settings.tolerance_m:
-            reason = f"step below {settings.tolerance_m * 1e6:.0f} µm"
+        if is_last:
             break
         is_near = is_near or bool(length_m < settings.near_m)
     return RigidResult(
@@ -146,7 +159,7 @@ def register_rigid(
             rows,
             at_m=transform(T_step, rows.at_m),
             centre_m=rows.centre_m + step[3:],
-            gap_m=rows.gap_m + rows.jacobian @ step,
+            gap_m=rows.gap_m + step @ rows.jacobian,
         ),
     )
 
@@ -178,12 +191,11 @@ def registration_rows(
         outline_tree = KdTree(bent_m[source.outline]) if len(source.outline) else None
         trees = KdTree(bent_m), outline_tree
     moved = transform(T_target_source, source_m)
-    outward = source.outward @ R.T
     T_source_target = invert(T_target_source)
     outline, partner, toward, weight = _outline_pairs(
-        source, target, moved, T_source_target, outward, settings, trees[1]
+        source, target, moved, T_source_target, R, settings, trees[1]
     )
-    inner, inner_partner, normal = _interior_pairs(
+    inner, inner_partner, normal, apart_m = _interior_pairs(
         source, target, moved, T_source_target, R, trees[0], max_interior
     )
     first = np.concatenate([outline, inner])
@@ -198,53 +210,50 @@ def registration_rows(
         toward=direction,
         gap_m=np.einsum("nd,nd->n", at - target.points_m.take(second, axis=0), direction),
         weight=np.concatenate([weight, np.ones(len(inner))]),
+        apart_m=apart_m,
     )
 
 
-def motion_covariance(
-    rows: Rows, source: Surface, target: Surface, T_target_source: Float64
-) -> Float64:
+def motion_covariance(rows: Rows, source: Surface, T_target_source: Float64) -> Float64:
     """Return the covariance (6, 6) of a registration: rotation about the mean, and translation.
 
     It is estimated from the residuals, of which those in one patch of the surface may be
     correlated in any way (cluster-robust, Liang & Zeger 1986).
     """
     jacobian = rows.jacobian
-    J = rows.weight[:, None] * jacobian
-    inverse = np.linalg.inv(J.T @ jacobian + 1e-9 * np.eye(6))
+    J = rows.weight * jacobian
+    inverse = np.linalg.inv(J @ jacobian.T + _DAMPING)
     moved = transform(T_target_source, source.points_m)
     centres = cube_means(moved, _PATCH_M)
     patch = nearest(KdTree(centres), moved)[1][rows.index]
     count = len(centres)
-    scores = _sums(patch, rows.gap_m[:, None] * J, count)
-    outlines = _sums(patch[: rows.outlines], J[: rows.outlines], count)
-    apart_m, _ = nearest(target.tree, moved)
-    unknown_m = _OUTLINE_GAPS * float(np.median(apart_m))
-    meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores.T @ scores
-    meat += unknown_m**2 * outlines.T @ outlines
+    scores = sums(patch, rows.gap_m * J, count)
+    outlines = sums(patch[: rows.outlines], J[:, : rows.outlines], count)
+    unknown_m = _OUTLINE_GAPS * quantile(rows.apart_m, 0.5)
+    meat = PAIRING_FACTOR * count / max(count - 6, 1) * scores @ scores.T
+    meat += unknown_m**2 * outlines @ outlines.T
     return np.asarray(inverse @ meat @ inverse + _EXACT_M2 * np.eye(6))
 
 
-def _sums(group: Indices, values: Float64, count: int) -> Float64:
-    """Return the sums of the values (N, K) of each of `count` groups, (count, K)."""
-    return np.stack([np.bincount(group, column, count) for column in values.T], axis=1)
+def sums(group: Indices, values: Float64, count: int) -> Float64:
+    """Return the sums of the values (K, N) of each of `count` groups, (K, count)."""
+    return np.array([np.bincount(group, row, count) for row in values])
 
 
 def _step(rows: Rows, share: float) -> tuple[Float64, Float64]:
     """Return a share of a Gauss-Newton step, (6,), and its matrix."""
     J = rows.jacobian
-    weighted = rows.weight[:, None] * J
-    information = weighted.T @ J
-    gradient = weighted.T @ rows.gap_m
-    step = -share * np.asarray(np.linalg.solve(information + 1e-9 * np.eye(6), gradient))
+    weighted = rows.weight * J
+    information = weighted @ J.T
+    gradient = weighted @ rows.gap_m
+    step = -share * np.asarray(np.linalg.solve(information + _DAMPING, gradient))
     return step, information
 
 
 def _about(centre_m: Float64, step: Float64) -> Float64:
     """Return the transform of a step: a rotation about a centre, and a translation."""
-    T = rigid(step[:3])
-    T[:3, 3] = centre_m + step[3:] - T[:3, :3] @ centre_m
-    return T
+    R = rotation_matrix(step[:3])
+    return rigid(R, centre_m + step[3:] - R @ centre_m)
 
 
 def _outline_pairs(
@@ -252,7 +261,7 @@ def _outline_pairs(
     target: Surface,
     moved: Float64,
     T_source_target: Float64,
-    outward: Float64,
+    R: Float64,
     settings: RigidSettings,
     source_outline_tree: KdTree | None,
 ) -> tuple[Indices, Indices, Float64, Float64]:
@@ -260,16 +269,16 @@ def _outline_pairs(
     if source_outline_tree is None or target.outline_tree is None:
         none = np.empty(0, dtype=np.intp)
         return none, none, np.empty((0, 3)), np.empty(0)
-    d_1, i_1 = nearest(target.outline_tree, moved[source.outline])
-    back = transform(T_source_target, target.points_m[target.outline])
+    d_1, i_1 = nearest(target.outline_tree, moved.take(source.outline, axis=0))
+    back = transform(T_source_target, target.points_m.take(target.outline, axis=0))
     d_2, i_2 = nearest(source_outline_tree, back)
     first = np.concatenate([source.outline, source.outline[i_2]])
     second = np.concatenate([target.outline[i_1], target.outline])
     distance_m = np.concatenate([d_1, d_2])
-    toward = outward[first] + target.outward[second]
+    toward = source.outward.take(first, axis=0) @ R.T + target.outward.take(second, axis=0)
     agreement = 0.5 * np.sqrt(np.einsum("nd,nd->n", toward, toward))
     toward /= np.maximum(2.0 * agreement, 1e-9)[:, None]
-    scale_m = max(settings.outlier_m, 3.0 * float(np.median(distance_m)))
+    scale_m = max(settings.outlier_m, 3.0 * quantile(distance_m, 0.5))
     weight = np.concatenate([source.outline_weight, target.outline_weight])
     weight *= agreement**4 / (1.0 + (distance_m / scale_m) ** 2) ** 2
     return first, second, toward, weight
@@ -283,22 +292,23 @@ def _interior_pairs(
     R: Float64,
     source_tree: KdTree,
     max_interior: int | None,
-) -> tuple[Indices, Indices, Float64]:
-    """Return pairs found from both clouds: source and target indices, target normals."""
-    used = [
-        np.arange(0, count, 1 if max_interior is None else 1 + (count - 1) // max_interior)
-        for count in (len(source.points_m), len(target.points_m))
-    ]
-    _, i_1 = nearest(target.tree, moved[used[0]])
-    keep_1 = ~target.near_cut[i_1]
-    _, i_2 = nearest(source_tree, transform(T_source_target, target.points_m[used[1]]))
-    keep_2 = ~source.near_cut[i_2]
-    first = np.concatenate([used[0][keep_1], i_2[keep_2]])
-    second = np.concatenate([i_1[keep_1], used[1][keep_2]])
+) -> tuple[Indices, Indices, Float64, Float64]:
+    """Return pairs found from both clouds: indices, mean normals; distances from the source."""
+    step_1, step_2 = (
+        1 if max_interior is None else 1 + (len(points_m) - 1) // max_interior
+        for points_m in (source.points_m, target.points_m)
+    )
+    apart_m, i_1 = nearest(target.tree, moved[::step_1])
+    keep_1 = np.flatnonzero(~target.near_cut[i_1])
+    _, i_2 = nearest(source_tree, transform(T_source_target, target.points_m[::step_2]))
+    keep_2 = np.flatnonzero(~source.near_cut[i_2])
+    first = np.concatenate([step_1 * keep_1, i_2[keep_2]])
+    second = np.concatenate([i_1[keep_1], step_2 * keep_2])
     # On a curved surface a point lies below its partner's tangent plane; the mean of both normals
     # has no such bias (symmetric ICP, Rusinkiewicz 2019).
     normals = target.normals.take(second, axis=0)
     others = (source.normals @ R.T).take(first, axis=0)
-    normals += np.copysign(1.0, np.einsum("nd,nd->n", normals, others))[:, None] * others
-    normals /= np.sqrt(np.einsum("nd,nd->n", normals, normals))[:, None]
-    return first, second, normals
+    cosine = np.einsum("nd,nd->n", normals, others)
+    normals += np.copysign(1.0, cosine)[:, None] * others
+    normals /= np.sqrt(2.0 + 2.0 * np.abs(cosine))[:, None]
+    return first, second, normals, apart_m

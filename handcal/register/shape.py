@@ -13,13 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import lapack
+from scipy.sparse import csr_array
 from small_gicp import KdTree
 
 from handcal.frozen import brief, freeze
 from handcal.geometry import invert, transform
 from handcal.register.rcicp import best_rigid
-from handcal.register.rigid import RigidSettings, Rows, registration_rows
-from handcal.register.surface import Indices, Surface, cube_means
+from handcal.register.rigid import RigidResult, RigidSettings, registration_rows, sums
+from handcal.register.surface import Indices, Surface, cube_means, mean_point
 from handcal.types import Float64
 
 _NODE_SPACING_M = 0.018
@@ -34,6 +35,8 @@ _STEPS = 2
 _NOISE_FACTOR = 4.5
 # Nodes as near as this to the one that moved most are reported together.
 _REGION_M = 0.035
+# Places of a symmetric (3, 3) matrix, each of its pairs once.
+_HALF = np.tril_indices(3)
 # A spread thumb reaches less far than this share of the fingers' reach.
 _THUMB_REACH = 0.6
 
@@ -72,60 +75,55 @@ class ShapeChange:
 
 
 def measure_shape_change(
-    cursor: Surface,
-    hand: Surface,
-    T_hand_cursor: Float64,
-    settings: RigidSettings = RigidSettings(),
-    rows: Rows | None = None,
+    cursor: Surface, hand: Surface, fit: RigidResult, settings: RigidSettings = RigidSettings()
 ) -> ShapeChange:
     """Measure how the shape of registered hands differs.
 
     Parameters
     ----------
     cursor, hand : Surface
-    T_hand_cursor : (4, 4) float64
-        From `register_rigid`.
+    fit : RigidResult
+        From `register_rigid`, of the cursor to the hand.
     settings : RigidSettings
         Of the search for pairs.
-    rows : Rows, optional
-        Of the registration, if they are known.
     """
-    points = cursor.points_m
+    points, rows, T_hand_cursor = cursor.points_m, fit.rows, fit.T_target_source
     nodes = cube_means(points, _NODE_CUBE_M)
     count = len(nodes)
     node, share = _shares(nodes, points)
-    if rows is None:
-        rows = registration_rows(cursor, hand, T_hand_cursor, settings)
-    both = _products(node, share, count)
+    shares = _sparse(node, share, count)
+    products = _products(node, share, count)
     stiffness = _STIFFNESS * _laplacian(nodes) + 1e-4 * np.eye(count)
     moved: Float64 = np.zeros((count, 3))
+    point_moved: Float64 = np.zeros_like(points)
     for step in range(_STEPS):
-        point_moved = np.einsum("nk,nkd->nd", share, moved[node])
         if step:
             bent = points + point_moved
             rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
-        toward = rows.toward @ T_hand_cursor[:3, :3]
-        before_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - rows.gap_m
-        measured, wanted = _normal_equation(
-            node, share, both, rows.index, toward, rows.weight, before_m, count
+        toward = T_hand_cursor[:3, :3].T @ rows.toward.T
+        before_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - rows.gap_m
+        normal, wanted = _normal_equation(
+            shares, products, rows.index, toward, rows.weight, before_m
         )
-        normal = measured.copy()
+        prior = len(rows.gap_m) / count * stiffness
         for i in range(3):
-            normal[i::3, i::3] += len(toward) / count * stiffness
+            normal[i::3, i::3] += prior
         factor = _factor(normal)
         moved = lapack.dpotrs(factor, wanted)[0].reshape(-1, 3)
-    point_moved = np.einsum("nk,nkd->nd", share, moved[node])
-    left_m = np.einsum("nd,nd->n", toward, point_moved[rows.index]) - before_m
+        point_moved = shares @ moved
+    left_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - before_m
     variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
+    # The trace of M⁻¹ (M - P) M⁻¹ with the normal matrix M and its part P from the prior, which is
+    # alike for each coordinate.
     inverse = _inverse(factor)
-    scatter = np.sum((inverse @ measured) * inverse)
-    cut_m = points[cursor.near_cut]
+    of_node = inverse.reshape(count, -1)
+    scatter = np.trace(inverse) - np.vdot(of_node, prior @ of_node)
+    cut_m, middle_m = points[cursor.near_cut], mean_point(points)
     T_moved = best_rigid(nodes, nodes + moved)
     return ShapeChange(
         nodes_m=nodes,
         moved_m=transform(invert(T_moved), nodes + moved) - nodes,
-        toward_arm=(cut_m.mean(axis=0) if len(cut_m) else points.mean(axis=0))
-        - points.mean(axis=0),
+        toward_arm=(mean_point(cut_m) if len(cut_m) else middle_m) - middle_m,
         noise_m=float(np.sqrt(variance_m2 * scatter / count)),
     )
 
@@ -139,41 +137,46 @@ def _shares(nodes_m: Float64, points_m: Float64) -> tuple[Indices, Float64]:
     return index.view(np.intp), share / share.sum(axis=1, keepdims=True)
 
 
-def _products(node: Indices, share: Float64, count: int) -> tuple[Indices, Float64]:
-    """Return places in a (K, K) matrix and what each point adds there, half of a symmetric one."""
+def _sparse(column: Indices, values: Float64, width: int) -> csr_array:
+    """Return a sparse matrix (N, width) from the columns and values of its rows, (N, K) each."""
+    ends = np.arange(0, values.size + 1, values.shape[1], dtype=np.int32)
+    columns = column.astype(np.int32).ravel()
+    return csr_array((values.ravel(), columns, ends), shape=(len(values), width))
+
+
+def _products(node: Indices, share: Float64, count: int) -> csr_array:
+    """Return what each point adds to a (K, K) matrix, (N, K²), half of a symmetric one."""
     first, second = np.triu_indices(node.shape[1])
     halved = np.where(first == second, 0.5, 1.0)
-    return node[:, first] * count + node[:, second], halved * share[:, first] * share[:, second]
+    return _sparse(
+        node[:, first] * count + node[:, second],
+        halved * share[:, first] * share[:, second],
+        count**2,
+    )
 
 
 def _normal_equation(
-    node: Indices,
-    share: Float64,
-    both: tuple[Indices, Float64],
+    shares: csr_array,
+    products: csr_array,
     point: Indices,
     toward: Float64,
     weight: Float64,
     wanted_m: Float64,
-    count: int,
 ) -> tuple[Float64, Float64]:
     """Return the normal matrix (3K, 3K) and right side (3K,) of the K nodes' movements.
 
-    A row says that its point moves by `wanted_m` along `toward`. The rows of one point are added
-    first, as they share its nodes.
+    A row says that its point moves by `wanted_m` along `toward`, (3, rows). The rows of one point
+    are added first, as they share its nodes.
     """
-    places, products = both
-    weighted = toward * weight[:, None]
+    points, count = shares.shape
+    i, j = _HALF
+    weighted = weight * toward
+    summed = products.T @ sums(point, weighted[i] * toward[j], points).T
+    half = summed.reshape(count, count, -1).transpose(2, 0, 1)
     normal = np.empty((count, 3, count, 3))
-    wanted = np.empty((count, 3))
-    for i in range(3):
-        at_point = np.bincount(point, weighted[:, i] * wanted_m, len(node))
-        wanted[:, i] = np.bincount(node.ravel(), (share * at_point[:, None]).ravel(), count)
-        for j in range(i + 1):
-            at_point = np.bincount(point, weighted[:, i] * toward[:, j], len(node))
-            half = np.bincount(places.ravel(), (products * at_point[:, None]).ravel(), count**2)
-            half = half.reshape(count, count)
-            normal[:, i, :, j] = normal[:, j, :, i] = half + half.T
-    return normal.reshape(3 * count, 3 * count), wanted.ravel()
+    normal[:, i, :, j] = normal[:, j, :, i] = half + half.transpose(0, 2, 1)
+    wanted = shares.T @ sums(point, weighted * wanted_m, points).T
+    return normal.reshape(3 * count, 3 * count), np.asarray(wanted.ravel())
 
 
 def _factor(normal: Float64) -> Float64:
@@ -186,8 +189,8 @@ def _factor(normal: Float64) -> Float64:
 
 def _inverse(factor: Float64) -> Float64:
     """Return the inverse of the matrix of Cholesky's factor."""
-    upper = np.triu(lapack.dpotri(factor)[0])
-    return np.asarray(upper + np.triu(upper, 1).T)
+    upper = lapack.dpotri(factor)[0]
+    return np.asarray(upper + upper.T - np.diag(upper.diagonal()))
 
 
 def change_text(change: ShapeChange, R_D: Float64) -> str:
@@ -246,7 +249,8 @@ def _part(across: Float64, along: Float64, at_across: float, at_along: float) ->
 
 def _laplacian(nodes_m: Float64) -> Float64:
     """Return the graph Laplacian of neighbouring nodes, (K, K), of mean diagonal 1."""
-    apart_m2 = np.sum((nodes_m[:, None] - nodes_m) ** 2, axis=2)
+    apart_m = nodes_m[:, None] - nodes_m
+    apart_m2 = np.einsum("ijd,ijd->ij", apart_m, apart_m)
     weight = np.exp(-0.5 * apart_m2 / _NODE_SPACING_M**2)
     weight[apart_m2 > (2.0 * _NODE_SPACING_M) ** 2] = 0.0
     np.fill_diagonal(weight, 0.0)

@@ -28,7 +28,7 @@ _SEEN = 0.5
 # A hand is where it was unless noise explains the movement found with less than 0.1 %: the quantile
 # of χ² with six degrees of freedom.
 _MOVED = 22.5
-_SETTINGS = RigidSettings(max_points=700, tolerance_m=1e-4)
+_SETTINGS = RigidSettings(max_points=700, tolerance_m=5e-5)
 
 
 def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand:
@@ -106,5 +106,5 @@ def _is_at(surface: Surface, place: Surface) -> bool:
     middle_m = mean_point(surface.points_m)
     moved_m = transform(T, middle_m[None])[0] - middle_m
     moved = np.concatenate([Rotation.from_matrix(T[:3, :3]).as_rotvec(), moved_m])
-    noise = motion_covariance(fit.rows, surface, place, T)
+    noise = motion_covariance(fit.rows, surface, T)
     return float(moved @ np.linalg.solve(noise, moved)) < _MOVED

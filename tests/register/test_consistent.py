@@ -148,11 +148,16 @@ def test_the_covariance_grows_with_turn_and_noise() -> None:
     assert sigma_m(0.0, 0.0005) < sigma_m(0.0, 0.003) < sigma_m(5.0, 0.003) < sigma_m(9.0, 0.003)
 
 
-def test_a_share_of_the_pairs_gives_the_shift_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_thinned_points_give_the_shift_of_all() -> None:
     made = _measured(1, 3.0)
-    of_all = solve_trial(made, "consistent")
-    monkeypatch.setattr(consistent, "_FITTED", 400)
-    of_some = solve_trial(made, "consistent")
+    clouds = made.cursor_m, made.hand_m, made.cursor_cut, made.hand_cut
+    match = consistent.match_hands(*clouds)
+    assert len(match.thinned_m) < 0.5 * len(made.hand_m)
+    _, _, kept = match.pairs
+    of_all, of_some = (
+        consistent.fit_match(one, made.T_E_W, made.display_distance_m)
+        for one in (replace(match, thinned_m=made.hand_m[kept]), match)
+    )
     assert of_some.inlier_ratio == of_all.inlier_ratio
     moved_m = of_some.shift_m - of_all.shift_m
     assert np.any(moved_m != 0.0)

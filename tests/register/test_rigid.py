@@ -55,7 +55,7 @@ def test_the_same_points_are_found_again(made: SimulatedAlignment, hand: Surface
     assert miss_mm < 0.1
     assert miss_deg < 0.05
     assert result.converged
-    assert result.stop_reason == "step below 30 µm"
+    assert result.stop_reason == "step below 100 µm"
     assert result.history_m2[-1] < 1e-4 * result.history_m2[0]
 
 

@@ -11,6 +11,7 @@ from handcal.register.surface import (
     describe_surface,
     near_cut_edge,
     nearest,
+    quantile,
     thin,
     thinnest,
 )
@@ -25,6 +26,13 @@ def square_m() -> Float64:
     """A square in the plane z = 0.5."""
     u, v = np.meshgrid(np.arange(SIZE), np.arange(SIZE))
     return np.column_stack([PITCH_M * u.ravel(), PITCH_M * v.ravel(), np.full(u.size, 0.5)])
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1), st.sampled_from([0.0, 0.1, 0.5, 0.99, 1.0]))
+def test_the_quantile_is_the_value_of_its_rank(values: list[float], share: float) -> None:
+    found, rank = quantile(np.array(values), share), share * (len(values) - 1)
+    below, not_above = (np.less(values, found).sum(), np.less_equal(values, found).sum())
+    assert below - 0.5 <= rank <= not_above - 0.5
 
 
 @pytest.fixture(scope="module")
