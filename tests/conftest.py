@@ -3,6 +3,7 @@
 import multiprocessing.process
 import os
 import platform
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Generator, Sequence
@@ -27,6 +28,18 @@ hypothesis.settings.load_profile("handcal")
 # Images of machines turn bytecode off, and then each worker rewrites all assertions in every run.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# The tests write thousands of small files to the disk for good, and wait for each. In memory they
+# do not wait, where there is space, and programs can run that the tests write.
+_MEMORY = Path("/dev/shm")
+_MEMORY_BYTES = 4e9
+if (
+    sys.platform == "linux"
+    and os.access(_MEMORY, os.W_OK)
+    and not os.statvfs(_MEMORY).f_flag & os.ST_NOEXEC
+    and shutil.disk_usage(_MEMORY).free > _MEMORY_BYTES
+):
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(_MEMORY))
 
 platform.platform()  # starts a process the first time, which a quick test may not
 
