@@ -51,7 +51,16 @@ _IN_REAL_TIME = {
 _WINDOWS = {"qtbot", "display"}
 _PROCESSES = {"display", "process", "begun", "cluster"}
 _NOT_QUICK = "window", "process", "slow", "campaign"
-_LONG = {"tests/register/test_consistent.py", "tests/rig/test_board.py", "tests/rig/test_stereo.py"}
+_LONG = {
+    "tests/cli/test_accept.py",
+    "tests/cli/test_study.py",
+    "tests/lab/bench/test_offline.py",
+    "tests/lab/bench/test_run.py",
+    "tests/register/test_consistent.py",
+    "tests/rig/test_board.py",
+    "tests/rig/test_corpus.py",
+    "tests/rig/test_stereo.py",
+}
 """Files of long series that are not quick; the files beside them test the same code."""
 _PROGRAMS = {
     "tests/gui/test_real_window.py",
