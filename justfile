@@ -8,7 +8,7 @@ default:
 
 # style, layers, and the tests without windows and processes, within two minutes
 quick:
-    ruff check && ruff format --check && lint-imports && python -m pytest -q -n 2 -m quick
+    ruff check && ruff format --check && lint-imports && python -m pytest -q -n 3 -m quick
 
 # set-up, then every check, and every test that is not slow
 test *arguments:

@@ -3,6 +3,7 @@
 import multiprocessing.process
 import os
 import platform
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Generator, Sequence
@@ -28,6 +29,18 @@ hypothesis.settings.load_profile("handcal")
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# The tests write thousands of small files to the disk for good, and wait for each. In memory they
+# do not wait, where there is space, and programs can run that the tests write.
+_MEMORY = Path("/dev/shm")
+_MEMORY_BYTES = 4e9
+if (
+    sys.platform == "linux"
+    and os.access(_MEMORY, os.W_OK)
+    and not os.statvfs(_MEMORY).f_flag & os.ST_NOEXEC
+    and shutil.disk_usage(_MEMORY).free > _MEMORY_BYTES
+):
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(_MEMORY))
+
 platform.platform()  # starts a process the first time, which a quick test may not
 
 _IN_REAL_TIME = {
@@ -38,7 +51,16 @@ _IN_REAL_TIME = {
 _WINDOWS = {"qtbot", "display"}
 _PROCESSES = {"display", "process", "begun", "cluster"}
 _NOT_QUICK = "window", "process", "slow", "campaign"
-_LONG = {"tests/register/test_consistent.py", "tests/rig/test_board.py", "tests/rig/test_stereo.py"}
+_LONG = {
+    "tests/cli/test_accept.py",
+    "tests/cli/test_study.py",
+    "tests/lab/bench/test_offline.py",
+    "tests/lab/bench/test_run.py",
+    "tests/register/test_consistent.py",
+    "tests/rig/test_board.py",
+    "tests/rig/test_corpus.py",
+    "tests/rig/test_stereo.py",
+}
 """Files of long series that are not quick; the files beside them test the same code."""
 _PROGRAMS = {
     "tests/gui/test_real_window.py",

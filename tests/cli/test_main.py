@@ -30,6 +30,9 @@ INTERRUPTIBLE = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from handcal.cli.main import main
+from handcal.sim.camera import CAMERA_FAULTS, SyntheticSettings
+
+CAMERA_FAULTS[""] = SyntheticSettings(rate_hz=6.0)  # what costs most is the frames
 main()
 """
 

@@ -160,7 +160,7 @@ def turning_head(delay_s: float) -> Iterator[tuple[HeadsetServer, PunctualCamera
         t_ns = time.monotonic_ns()
         return SceneState(t_ns, head(1e-9 * t_ns) @ RIG.T_H_D, T_W_hand)
 
-    settings = SyntheticSettings(clock_offset_s=0.0, clock_drift=0.0)
+    settings = SyntheticSettings(rate_hz=15.0, clock_offset_s=0.0, clock_drift=0.0)
     world = World(make_hand(1), make_room(1))
     camera = PunctualCamera(world, scene, depth_intrinsics=intrinsics, settings=settings)
     is_over = threading.Event()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -11,9 +12,11 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QFileDialog
 
+from handcal.rig import board_finder
+from handcal.rig.board import Board, Int64
 from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_photographs
-from handcal.types import Intrinsics, UInt8
+from handcal.types import Float64, Intrinsics, UInt8
 from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
     RigInputs,
@@ -21,6 +24,25 @@ from handcal_gui.windows.rig.project_folder import (
     ViewpointEntries,
 )
 from handcal_gui.windows.rig.shots import read_color
+
+find_corners = board_finder.find_corners
+
+
+@lru_cache(maxsize=500)
+def _find_corners(pixels: bytes, shape: tuple[int, int], board: Board) -> tuple[Int64, Float64]:
+    return find_corners(np.frombuffer(pixels, np.uint8).reshape(shape), board)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _corners_are_found_once() -> Iterator[None]:
+    """Find the corners of each photograph once: most tests open a window on the same ones."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            board_finder,
+            "find_corners",
+            lambda gray, board: _find_corners(gray.tobytes(), gray.shape, board),
+        )
+        yield
 
 
 @dataclass(frozen=True)
