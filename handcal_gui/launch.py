@@ -63,11 +63,7 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     except HandcalError as error:
         raise LaunchError(error, 1) from error
     sys.excepthook = lambda *error: _report_error(program, *error)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # From the event loop, which may not run yet.
-        signal.signal(number, lambda *_: QTimer.singleShot(0, program.window.close))
-    awake = QTimer()  # runs Python code regularly, so that signals are handled
-    awake.start(200)
+    close_on_signals(program.window)
     if arguments.size:
         program.window.resize(arguments.size)
         program.window.show()
@@ -83,6 +79,16 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     program.close()
     if demonstration is not None and demonstration.complaint is not None:
         raise LaunchError(demonstration.complaint, 1)
+
+
+def close_on_signals(window: QWidget) -> None:
+    """Have the signals that end a process close a window."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # From the event loop, which may not run yet.
+        signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
+    awake = QTimer(window, interval=200)
+    awake.timeout.connect(lambda: None)  # Python handles signals only while it runs
+    awake.start()
 
 
 def _begin(program: Program, arguments: argparse.Namespace) -> Demonstration | None:

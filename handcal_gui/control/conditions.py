@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from handcal.camera.feed import CameraStatus
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import Observation
 from handcal_gui.translation import tr
 
 _LASTS_S = 0.8
@@ -47,6 +48,8 @@ class Conditions:
         self._dropped: deque[tuple[float, int]] = deque()
         self._problem, self._problem_since_s = "", 0.0
         self._hand_problem, self._hand_since_s = "", 0.0
+        self._seen: Observation | None = None
+        self._seen_s = 0.0
         self._has_started = False
 
     def condition(self, snapshot: Snapshot) -> str:
@@ -79,8 +82,16 @@ class Conditions:
         return found if now_s - self._problem_since_s >= lasts_s else ""
 
     def calm(self, snapshot: Snapshot) -> Snapshot:
-        """Return the snapshot without a passing problem of a hand that is seen."""
+        """Return the snapshot without a passing problem of a hand that is seen.
+
+        While the camera is late, the newest observation stays.
+        """
         seen, now_s = snapshot.observation, 1e-9 * snapshot.t_host_ns
+        if seen is not None:
+            self._seen, self._seen_s = seen, now_s
+        elif self._is_late(snapshot, now_s):
+            seen = self._seen
+            snapshot = replace(snapshot, observation=seen)
         problem = "" if seen is None or seen.cloud is None else seen.problem
         if bool(problem) != bool(self._hand_problem):
             self._hand_since_s = now_s
@@ -88,6 +99,12 @@ class Conditions:
         if seen is None or not problem or now_s - self._hand_since_s >= _LASTS_S:
             return snapshot
         return replace(snapshot, observation=replace(seen, problem=""))
+
+    def _is_late(self, snapshot: Snapshot, now_s: float) -> bool:
+        """Return whether a frame is awaited that could tell more than the newest observation."""
+        is_same_state = self._seen is not None and self._seen.state is snapshot.procedure.state
+        is_new = now_s - self._seen_s < _LASTS_S
+        return is_same_state and is_new and not snapshot.camera.problem
 
     def _watch_rate(self, camera: CameraStatus, now_s: float) -> None:
         """Note that frames are few or many are lost, or that it is over, once this has lasted."""

@@ -214,7 +214,7 @@ class CalibrationController(QObject):
         if self._engine is None or not self._timer.isActive():
             return
         snapshot, shown = self._engine.newest()
-        if snapshot is None or snapshot is self._snapshot or self._is_early(snapshot):
+        if snapshot is None or self._is_shown(snapshot) or self._is_early(snapshot):
             return
         self._shown, self._shown_ns = shown, time.monotonic_ns()
         self._count += 1
@@ -245,6 +245,9 @@ class CalibrationController(QObject):
         self._hold_plan(isinstance(wizard, PlannedWizard) and wizard.holds_plan)
         self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
+
+    def _is_shown(self, snapshot: Snapshot) -> bool:
+        return self._snapshot is not None and snapshot.number == self._snapshot.number
 
     def _is_early(self, snapshot: Snapshot) -> bool:
         """Return True for a frame soon after the one shown, until one in time would have come."""

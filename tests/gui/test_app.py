@@ -6,13 +6,18 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QApplication, QMessageBox
+from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QApplication, QMessageBox, QWidget
+from pytestqt.qtbot import QtBot
 
 from handcal_gui import app
+from handcal_gui.launch import close_on_signals
 
 START_S = 40.0
 
@@ -148,3 +153,27 @@ def is_listening(pid: int) -> bool:
     status = Path(f"/proc/{pid}/status").read_text()
     (caught,) = (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt"))
     return bool(int(caught, 16) & 1 << signal.SIGTERM - 1)
+
+
+def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot) -> None:
+    loop, closed = QEventLoop(), []
+
+    class Window(QWidget):
+        def closeEvent(self, _: QCloseEvent) -> None:
+            closed.append(True)
+            loop.quit()
+
+    window = Window()
+    qtbot.addWidget(window)
+    window.show()
+    numbers = signal.SIGINT, signal.SIGTERM
+    before = [signal.getsignal(number) for number in numbers]
+    try:
+        close_on_signals(window)
+        QTimer.singleShot(10_000, loop.quit)  # runs no Python code, which would handle the signal
+        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        loop.exec()
+        assert closed == [True]
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -157,13 +157,16 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     other: Eye = "right" if eye == "left" else "left"
     across = EYE_WORDS["left" if moved.right_arcmin < 0 else "right"]
     along = tr("up") if moved.down_arcmin < 0 else tr("down")
+    text = tr(
+        "Close the {} eye. Move the outline onto the hand: in the headset, or here with the "
+        "arrow keys, + and −."
+    ).format(EYE_WORDS[other])
+    if eye in snapshot.procedure.verifications:
+        text = tr("Once more, to be sure. {}").format(text)
     total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
     return WizardView(
         Step.VERIFY,
-        tr(
-            "Close the {} eye. Arrow keys move the outline, + and − change its size, "
-            "until it covers the hand."
-        ).format(EYE_WORDS[other]),
+        text,
         (hand_check(snapshot), still_check(snapshot)),
         ButtonSpec(Action.VERIFIED, tr("It covers the hand"), is_steady(snapshot)),
         (

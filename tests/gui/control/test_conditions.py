@@ -124,3 +124,15 @@ def test_a_gap_in_the_poses_flashes_nowhere(snapshot: Maker) -> None:
     assert problem(gap, 0.3) == ""
     assert problem(gap, 1.2) == "a gap of 64 ms"
     assert problem(no_hand, 1.3) == "no hand"
+
+
+def test_a_late_frame_does_not_take_the_hand_away(snapshot: Maker) -> None:
+    conditions = Conditions()
+    fine = snapshot(State.SHOW_HAND)
+    late = replace(fine, observation=None)
+    assert conditions.calm(fine).observation is fine.observation
+    assert conditions.calm(after(late, 0.5)).observation is fine.observation
+    unplugged = replace(snapshot(State.SHOW_HAND, **UNPLUGGED), observation=None)
+    other_state = replace(snapshot(State.ALIGN), observation=None)
+    for other in (after(late, 0.9), unplugged, other_state):
+        assert conditions.calm(other).observation is None

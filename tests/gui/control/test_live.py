@@ -68,6 +68,12 @@ class Stream:
         self.wait(1_000_000_000 // self.rate_hz)
         return self._newest
 
+    def miss(self, seen: Snapshot) -> None:
+        """Let the camera be late after a snapshot, and poll."""
+        self._number += 1
+        self._newest = replace(seen, observation=None, number=self._number)
+        self.wait(1_000_000_000 // self.rate_hz)
+
     def wait(self, time_ns: int) -> None:
         """Poll for a while as the timer does, without a new frame."""
         for _ in range(4):
@@ -109,3 +115,9 @@ def test_thirty_frames_a_second_are_shown_and_the_last_by_every_panel(stream: St
         stream.wait(100_000_000)
         assert stream.polled[-1] is last
         assert len(stream.polled) == len(set(map(id, stream.polled)))
+
+
+def test_a_late_frame_is_shown_once_with_the_newest_hand(stream: Stream) -> None:
+    seen = stream.see(0.1)
+    stream.miss(seen)
+    assert [one.observation for one in stream.polled] == [seen.observation, seen.observation]
