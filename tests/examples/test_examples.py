@@ -1,4 +1,4 @@
-"""Every example, run as its reader would from the repository's root."""
+"""Every example, run from the repository's root as its reader would."""
 
 from __future__ import annotations
 
@@ -182,9 +182,7 @@ def test_a_wrong_path_is_one_line(
     assert error.count("\n") == 1
 
 
-def test_a_figure_that_cannot_be_written_is_one_line(
-    run: Callable[..., str], tmp_path: Path
-) -> None:
+def test_a_figure_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "FILE").write_text("no folder")
     error = run_apart(
         "07_plot_a_report_figure.py", "--output", tmp_path / "FILE/figure.png", code=1
