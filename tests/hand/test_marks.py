@@ -68,5 +68,6 @@ def test_without_an_arm_nothing_is_marked(is_cut: bool) -> None:
 
 
 def test_points_may_be_repeated() -> None:
-    outline_m, is_cut = (np.repeat(one, 3, axis=0) for one in comb())
-    assert np.isfinite(outline_marks(outline_m, is_cut)).all()
+    outline_m, is_cut = comb()
+    marks_m = outline_marks(outline_m.repeat(3, axis=0), is_cut.repeat(3))
+    assert np.isfinite(marks_m).all()
