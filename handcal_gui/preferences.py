@@ -24,8 +24,8 @@ from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.translation import tr
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
-PREFERENCES_VERSION = 2
-"""Version 1 had no number."""
+PREFERENCES_VERSION = 3
+"""Version 1 had no number; version 2 had the verifications of a plan as checks."""
 _MOST_SESSIONS = 8
 _OLD_ERROR_MAX_ARCMIN = 15.0
 """Default of version 1, which nobody chose."""
@@ -105,7 +105,7 @@ class PreferencesFile:
             said = ""
             if version > PREFERENCES_VERSION:
                 data, said = _known(Preferences, data), self._keep_newer()
-            elif version == 1:
+            elif version < PREFERENCES_VERSION:
                 data = _upgraded(data)
             return read_settings(Preferences, data, "preferences"), said
         except FileError as error:
@@ -221,17 +221,16 @@ def _default_path() -> Path:
 
 
 def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
-    """Return preferences of version 1 with today's names.
+    """Return preferences of an older version with today's names.
 
     A lab's own limit of the expected error becomes its target. The solver's settings, which the
     program never offered to change, take their present defaults.
     """
     upgraded = deepcopy(data)
-    solve: Any = upgraded
-    for name in ("station", "calibration", "solve"):
-        solve = solve.get(name) if isinstance(solve, dict) else None
-    if not isinstance(solve, dict):
-        return upgraded
+    placement = _part(upgraded, "station", "plan", "placement")
+    if "checks" in placement:
+        placement["verifications"] = placement.pop("checks")
+    solve = _part(upgraded, "station", "calibration", "solve")
     fuse, verdict = solve.get("fuse"), solve.get("verdict")
     if isinstance(fuse, dict) and "eye_box_sigma_m" in fuse:
         del solve["fuse"]
@@ -240,6 +239,13 @@ def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
         if limit_arcmin != _OLD_ERROR_MAX_ARCMIN:
             verdict.setdefault("target_arcmin", limit_arcmin)
     return upgraded
+
+
+def _part(data: Any, *names: str) -> dict[str, Any]:
+    """Return the object inside objects that the names lead to; an empty one if there is none."""
+    for name in names:
+        data = data.get(name) if isinstance(data, dict) else None
+    return data if isinstance(data, dict) else {}
 
 
 def _known(kind: Any, data: dict[str, Any]) -> dict[str, Any]:

@@ -15,5 +15,5 @@ ruff check
 ruff format --check
 mypy
 lint-imports
-pytest -n 3 "$@" # more than cores: a fifth of the time is waiting
+pytest -n 3 "$@" # three, as each waits for a fifth of its time
 python -m tests.campaigns --short

@@ -29,8 +29,8 @@ hypothesis.settings.load_profile("handcal")
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# The tests write thousands of small files to the disk for good, and wait for each. In memory they
-# do not wait, where there is space, and programs can run that the tests write.
+# The tests write thousands of small files through to the disk and wait for each. They write into
+# memory instead, where it has room and lets programs run, which some tests write.
 _MEMORY = Path("/dev/shm")
 _MEMORY_BYTES = 4e9
 if (

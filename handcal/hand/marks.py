@@ -44,7 +44,7 @@ def outline_marks(outline_m: Float64, is_cut: Bool) -> Float64:
     apart_m = np.abs(along_m[:, None] - along_m[marked])
     apart_m = np.minimum(apart_m, along_m[-1] - apart_m)
     near = (apart_m <= _HALF_LENGTH_M).any(axis=1)
-    beside = max(1, round(_HALF_WIDTH_M / float(np.median(step_m))))
+    beside = max(1, round(_HALF_WIDTH_M / max(float(np.median(step_m)), 1e-6)))
     tangent = (np.roll(image_m, -beside, axis=0) - np.roll(image_m, beside, axis=0))[near]
     across = np.column_stack([tangent[:, 1], -tangent[:, 0], np.zeros(len(tangent))])
     across *= _HALF_WIDTH_M / np.maximum(np.linalg.norm(across, axis=1), 1e-9)[:, None]

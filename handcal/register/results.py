@@ -145,7 +145,7 @@ def solve_session(
     contradictions : sequence of str
         Evidence from outside the solver against the result, a sentence each.
     verified : mapping of eye to Verification
-        Checks by the wearer. With them, alignments may be missing.
+        The wearer's verifications. With them, alignments may be missing.
     plan : {"paper", "recommended"}, optional
         The plan that the session follows; advice counts its next alignments.
     usable_eyes : tuple of eye

@@ -49,8 +49,8 @@ class RigidSettings:
     """Interior points used from each cloud until a step is below `near_m`, and then all. With a
     known start all are used at once."""
     near_m: float = 1e-3
-    """Largest step of a hand point below which all interior points are used. A tolerance as large
-    does not need them."""
+    """Largest step of a hand point below which all interior points are used. With a tolerance as
+    large they never are."""
     max_iterations: int = 40
     tolerance_m: float = 1e-4
     """The iteration stops when a step moves no point of the hand by more than this."""

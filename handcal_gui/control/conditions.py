@@ -101,7 +101,7 @@ class Conditions:
         return replace(snapshot, observation=replace(seen, problem=""))
 
     def _is_late(self, snapshot: Snapshot, now_s: float) -> bool:
-        """Return whether a frame is awaited that could tell more than the newest observation."""
+        """Return True if the newest observation still holds: its next frame is only late."""
         is_same_state = self._seen is not None and self._seen.state is snapshot.procedure.state
         is_new = now_s - self._seen_s < _LASTS_S
         return is_same_state and is_new and not snapshot.camera.problem

@@ -171,7 +171,7 @@ def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot) -> None
     try:
         close_on_signals(window)
         QTimer.singleShot(10_000, loop.quit)  # runs no Python code, which would handle the signal
-        threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        threading.Timer(0.05, signal.raise_signal, (signal.SIGTERM,)).start()
         loop.exec()
         assert closed == [True]
     finally:

@@ -14,6 +14,7 @@ from handcal.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.register.guard import GuardSettings
+from handcal.register.placement import PlacementSettings
 from handcal.station.settings import StationSettings
 from handcal.station.states import CalibrationSettings
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
@@ -74,6 +75,17 @@ def test_a_file_of_version_1_is_upgraded(file: PreferencesFile) -> None:
     assert json.loads(file.path.read_text())["version"] == PREFERENCES_VERSION
     assert file.load() == (preferences, "")
     assert [one.name for one in file.path.parent.iterdir()] == [file.path.name]
+
+
+def test_checks_of_version_2_are_verifications(file: PreferencesFile) -> None:
+    plan = replace(CHANGED.station.plan, placement=PlacementSettings(verifications=5))
+    changed = replace(CHANGED, station=replace(CHANGED.station, plan=plan))
+    file.save(changed)
+    data = json.loads(file.path.read_text()) | {"version": 2}
+    placement = data["station"]["plan"]["placement"]
+    placement["checks"] = placement.pop("verifications")
+    file.path.write_text(json.dumps(data))
+    assert file.load() == (changed, "")
 
 
 def test_the_old_default_of_a_limit_is_no_choice(file: PreferencesFile) -> None:

@@ -65,3 +65,9 @@ def test_all_five_fingers_of_a_simulated_hand_are_marked(shot: Shot) -> None:
 def test_without_an_arm_nothing_is_marked(is_cut: bool) -> None:
     outline_m, cut = comb()
     assert not len(outline_marks(outline_m, np.full_like(cut, is_cut)))
+
+
+def test_points_may_be_repeated() -> None:
+    outline_m, is_cut = comb()
+    marks_m = outline_marks(outline_m.repeat(3, axis=0), is_cut.repeat(3))
+    assert np.isfinite(marks_m).all()

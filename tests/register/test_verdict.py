@@ -164,7 +164,7 @@ def test_advice_counts_the_plans_own_next_steps() -> None:
     assert told.endswith("expected after verifying each eye")
 
 
-def test_a_verdict_tells_the_error_that_the_check_found() -> None:
+def test_a_verdict_tells_the_error_that_the_verification_found() -> None:
     fused = _fused({"left": GOOD})
     check = Verification((0.002, -0.001, 0.003), (0.0, 0.0), (0.002, -0.001, 0.003))
     moved = replace(check, before_m=(0.006, -0.001, 0.003)).after(None)

@@ -48,7 +48,7 @@ _STATES = {
 _FOLLOWS = Step.SHOW_HAND
 """The guide's own step while the plan continues."""
 _WAITS_FOR_HAND, _SENDING = tr("Waiting for the hand…"), tr("Sending…")
-_CHECKS: dict[Eye, ButtonSpec] = {
+_VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
     "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify l&eft eye")),
     "right": ButtonSpec(Action.VERIFY_RIGHT, tr("Verify &right eye")),
 }
@@ -221,7 +221,7 @@ class PlannedWizard(Wizard):
             main,
             (
                 ButtonSpec(Action.ANOTHER, tr("&Add alignment")),
-                *(_CHECKS[eye] for eye in self.usable_eyes),
+                *(_VERIFY_AGAIN[eye] for eye in self.usable_eyes),
             ),
             snapshot.problem,
             fact=_drawn_otherwise(procedure),

@@ -1,4 +1,4 @@
-"""The fine-tuning panel, and what it is shown and sends."""
+"""Fixtures: the fine-tuning panel, snapshots that it shows, and the changes that it sends."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal_gui.panels.fine_tune.history import Shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
-from tests.gui.panels.fine_tune.controls import (
-    Show,
-)
+from tests.gui.panels.fine_tune.controls import Show
 
 
 @pytest.fixture
