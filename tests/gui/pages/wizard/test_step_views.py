@@ -11,7 +11,7 @@ from handcal.errors import FileError
 from handcal.link.nudges import NudgeSum
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
-from handcal.types import VerdictName, Verification
+from handcal.types import Eye, VerdictName, Verification
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from tests.gui.views import Maker, actions, judged
@@ -117,7 +117,7 @@ def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> 
     assert view.note == "Hold your hand still."
     assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
     assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]
-    before = {"left": Verification(triple, (0.0, 0.0), triple)}
+    before: dict[Eye, Verification] = {"left": Verification(triple, (0.0, 0.0), triple)}
     again = replace(seen, procedure=replace(seen.procedure, verifications=before))
     assert Wizard().view(again).sentence == f"Once more, to be sure. {view.sentence}"
 
