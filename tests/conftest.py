@@ -1,5 +1,6 @@
 """Fixtures for all tests, and the rules of a run: markers, order, processes and second tries."""
 
+import gc
 import multiprocessing.process
 import os
 import platform
@@ -24,6 +25,8 @@ from handcal.types import EYES, Alignment, Eye
 # A busy machine fails no test.
 hypothesis.settings.register_profile("handcal", deadline=None)
 hypothesis.settings.load_profile("handcal")
+
+gc.disable()  # until all modules are imported and all tests collected: none of that is garbage
 
 # Images of machines turn bytecode off, and then each worker rewrites all assertions in every run.
 sys.dont_write_bytecode = False
@@ -71,6 +74,15 @@ _PROGRAMS = {
 """Files that start whole programs, each of which can keep more than one core busy."""
 _SECOND_TRIES = 1
 """Most tests of a run that may need a second try."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collect garbage again, but never look through what was imported and collected."""
+    result = yield
+    gc.enable()
+    gc.freeze()
+    return result
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m selects

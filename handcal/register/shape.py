@@ -117,7 +117,7 @@ def measure_shape_change(
     # alike for each coordinate.
     inverse = _inverse(factor)
     of_node = inverse.reshape(count, -1)
-    scatter = np.trace(inverse) - np.vdot(of_node, prior @ of_node)
+    scatter = max(np.trace(inverse) - np.vdot(of_node, prior @ of_node), 0.0)
     cut_m, middle_m = points[cursor.near_cut], mean_point(points)
     T_moved = best_rigid(nodes, nodes + moved)
     return ShapeChange(

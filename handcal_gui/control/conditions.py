@@ -64,12 +64,15 @@ class Conditions:
         camera, link = snapshot.camera, snapshot.link
         self._has_started |= camera.rate_hz > 0 and link.pose_rate_hz > 0
         self._watch_rate(camera, now_s)
-        ended = snapshot.link_problem if self._is_virtual and self._has_started else ""
+        # The only virtual headset that asks to connect is the connected one, after a stall.
+        is_stall = self._is_virtual and snapshot.link_problem == link.notice
+        link_problem = "" if is_stall else snapshot.link_problem
+        ended = link_problem if self._is_virtual and self._has_started else ""
         found = (
             (tr("{}; press Restart headset in Link").format(ended.rstrip(".")) if ended else "")
             or snapshot.problem
             or camera.problem
-            or snapshot.link_problem
+            or link_problem
             or snapshot.contradiction
             or self._slow_text
         )

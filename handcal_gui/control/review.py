@@ -116,6 +116,7 @@ class ReviewController(QObject):
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)
         panels.trials.show_record(record)
+        panels.cloud.clear(note)  # of the session shown before
         if stored.results is not None:
             number, last = list(record.alignments.items())[-1]
             residuals_m = stored.results.alignments[number][last.eyes[0]].residuals_m

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.register.results import Results
 from handcal.types import EYES, Eye, VerdictName
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import vbox
@@ -136,7 +136,9 @@ class _Column(QWidget):
         self._result: EyeResult | None = None
         self._verdict = QLabel()
         self._verdict.setObjectName(f"card-verdict-{eye}")
-        scale_font(self._verdict, 1.1, is_bold=True)
+        bold = QFont()
+        bold.setBold(True)
+        self._verdict.setFont(bold)  # its size is the card's
         self._bars = _Bars()
         self._another = QLabel()
         self._reason = paragraph(f"card-reason-{eye}")

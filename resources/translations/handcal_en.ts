@@ -1405,6 +1405,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Close the {} eye. Move the outline onto the hand: in the headset, or here with the arrow keys, + and −.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Once more, to be sure. {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The alignments have changed. Solve again.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1498,10 +1506,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>down</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Close the {} eye. Arrow keys move the outline, + and − change its size, until it covers the hand.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import socket
 import threading
 import time
@@ -127,17 +128,27 @@ def results(rig: Rig, alignments: Sequence[Alignment]) -> Results:
     return solve_session(alignments, rig, SolveSettings())
 
 
-@pytest.fixture
-def record(
-    tmp_path: Path, rig: Rig, alignments: Sequence[Alignment], results: Results
-) -> SessionRecord:
-    """Return the record of a solved session."""
+@pytest.fixture(scope="session")
+def solved_session(
+    tmp_path_factory: pytest.TempPathFactory,
+    rig: Rig,
+    alignments: Sequence[Alignment],
+    results: Results,
+) -> Path:
+    """Return the folder of a solved session, which no test changes."""
     settings = settings_json(CalibrationSettings())
-    with Session.create(tmp_path / "sessions", rig, settings, "wearer-1") as session:
+    with Session.create(tmp_path_factory.mktemp("solved"), rig, settings, "wearer-1") as session:
         for alignment in alignments:
             session.save_alignment(alignment)
         session.save_results(results_json(results))
-    return Session.open(session.path)
+    return session.path
+
+
+@pytest.fixture
+def record(tmp_path: Path, solved_session: Path) -> SessionRecord:
+    """Return the record of a copy of the solved session."""
+    copy = tmp_path / "sessions" / solved_session.name
+    return Session.open(shutil.copytree(solved_session, copy))
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
 
 from handcal.errors import FileError
@@ -14,6 +15,8 @@ from handcal.types import Eye
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.times import local_time
+
+_MOST_RECENT = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,17 +50,28 @@ class KnownSessions:
 def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
     """Return the unfinished sessions in a folder, and the recent ones; may take a while.
 
-    Empty sessions are left out.
+    Recent are those opened last, then the newest others in the folder. Empty sessions are left out.
     """
-    offered = (_recent(path) for path in recent if path.exists())
+    unfinished = unfinished_sessions(folder)
+    listed = {path.absolute() for path in (*recent, *(session.path for session in unfinished))}
+    journals = sorted(folder.glob("*/journal.jsonl"), key=_changed_s, reverse=True)
+    others = (path.parent for path in journals if path.parent.absolute() not in listed)
+    offered = (_recent(path) for path in chain(recent, others) if path.exists())
     return KnownSessions(
         unfinished=tuple(
             _unfinished(session)
-            for session in unfinished_sessions(folder)
+            for session in unfinished
             if session.problem or session.alignments or session.trials
         ),
-        recent=tuple(entry for entry in offered if entry is not None),
+        recent=tuple(islice((entry for entry in offered if entry is not None), _MOST_RECENT)),
     )
+
+
+def _changed_s(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:  # deleted meanwhile
+        return 0.0
 
 
 def _unfinished(session: UnfinishedSession) -> Entry:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from functools import partial
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
@@ -36,6 +36,8 @@ _MOST_CHECKS = 3
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
 _SENTENCE_SCALE, _CHECK_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
+_LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
+"""Width and height from which the guide has larger texts, and their scale."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -96,6 +98,7 @@ class WizardPanel(QWidget):
         self.wizard = Wizard()
         self.shown: WizardView | None = None
         self.picture = GuidePicture()
+        self._is_alone = self._is_large = False
         self._automatic = Automatic()
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
@@ -149,16 +152,31 @@ class WizardPanel(QWidget):
 
     def fill_window(self, is_alone: bool) -> None:
         """Use the room of a window without panels, or less."""
+        self._is_alone = is_alone
+        self._scale_texts()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Enlarge the texts of a guide that is so large that it is read from afar."""
+        super().resizeEvent(event)
+        least = QSize(*_LARGE_PX)
+        is_large = self.size().expandedTo(least) == self.size()
+        if is_large != self._is_large:
+            self._is_large = is_large
+            self._scale_texts()
+
+    def _scale_texts(self) -> None:
+        larger = _LARGE_SCALE if self._is_large else 1.0
         for texts, scale in (
-            ([self._sentence], _SENTENCE_SCALE[is_alone]),
-            ([*self._checks, self._fact, self._note], _CHECK_SCALE[is_alone]),
+            ([self._sentence], _SENTENCE_SCALE[self._is_alone]),
+            ([*self._checks, self._fact, self._note], _CHECK_SCALE[self._is_alone]),
+            ([self.picture.result], 1.0),
         ):
             font = self.font()
-            font.setPointSizeF(scale * font.pointSizeF())
+            font.setPointSizeF(larger * scale * font.pointSizeF())
             for text in texts:
                 text.setFont(font)
         self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
-        self._ring.set_diameter(_RING_PX[is_alone])
+        self._ring.set_diameter(round(larger * _RING_PX[self._is_alone]))
 
     def press_main(self) -> None:
         """Press the main button."""
@@ -224,7 +242,7 @@ class WizardPanel(QWidget):
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
         self._sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.fill_window(False)
+        self._scale_texts()
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._plan.addItems(list(PLANS.values()))
         self._plan.setToolTip(

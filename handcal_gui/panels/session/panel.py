@@ -153,7 +153,7 @@ class SessionPanel(QWidget):
             return
         self._wearer.setText(record.wearer or "–")
         self._folder.setText(str(record.path))
-        began = local_time(record.events[0].time, "%Y-%m-%d %H:%M:%S")
+        began = local_time(record.events[0].time)
         self._started.setText(tr("{}, finished").format(began) if record.is_finished else began)
         if not self._eye_distance.isModified():
             self._show_eye_distance(record.facts.eye_distance)

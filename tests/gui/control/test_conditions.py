@@ -41,6 +41,16 @@ def test_a_virtual_headset_that_ended_is_the_cause_of_all_else(snapshot: Maker) 
         assert watch(conditions, ended, [0.0, 5.0])[-1] == text
 
 
+def test_a_virtual_headset_that_connects_again_after_a_stall_is_no_problem(
+    snapshot: Maker,
+) -> None:
+    notice = "headset Virtual headset asks to connect; Virtual headset is connected"
+    again = replace(snapshot(link={"notice": notice}), link_problem=notice)
+    for is_virtual, text in ((True, ""), (False, notice)):
+        conditions = Conditions(is_virtual=is_virtual)
+        assert watch(conditions, again, [0.0, 5.0])[-1] == text
+
+
 def test_a_start_is_no_problem(snapshot: Maker) -> None:
     conditions = Conditions()
     silent = snapshot(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,12 @@ from handcal.errors import CancelledError
 from handcal.progress import Progress
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
+from handcal.station.solve_again import stored_solve_settings
+from handcal_gui.control.review import _Stored
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from handcal_gui.widgets.legend import LegendEntry
 
 PATIENCE_MS = 20_000
 
@@ -69,6 +73,19 @@ def test_the_example_is_opened_from_the_start_page(
     program.show_start()
     program.start.example_requested.emit(tmp_path / "preferences.json" / "none")
     assert "preferences.json" in program.window.banner.text
+
+
+def test_a_session_without_alignments_shows_no_hand_of_another(
+    program: Program, record: SessionRecord, results: Results
+) -> None:
+    settings = stored_solve_settings(record)
+    points = []
+    for alignments, solved in ((record.alignments, results), ({}, None)):
+        one = replace(record, alignments=alignments)
+        program.review._show(_Stored(one, settings, solved))
+        points.append([e.text for e in program.window.panels.cloud.findChildren(LegendEntry)])
+    assert not any(text.endswith("–") for text in points[0])
+    assert all(text.endswith("–") for text in points[1])
 
 
 def test_a_session_is_shown_and_closed_again(

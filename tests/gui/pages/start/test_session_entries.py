@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
@@ -82,3 +83,18 @@ def test_a_recent_session_shows_its_results_unless_they_are_damaged(
         session.save_results({"version": 2, "eyes": ["damaged"]})
     (entry,) = find_sessions(tmp_path, [path]).recent
     assert entry.eyes == {}
+
+
+def test_a_new_user_finds_the_newest_sessions_of_the_folder(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    ada, bea, cid = (make(tmp_path, name, [alignment], is_done=True) for name in ("a", "b", "c"))
+    make(tmp_path, "d", [alignment], is_done=False)
+    make(tmp_path, "e", [], is_done=True)
+    for age_s, path in enumerate((bea, cid, ada)):
+        os.utime(path / "journal.jsonl", (1e9 - age_s, 1e9 - age_s))
+    found = find_sessions(tmp_path, ())
+    assert [entry.path for entry in found.recent] == [bea, cid, ada]
+    assert found.wearers == ("b", "c", "a", "d")
+    opened_last = find_sessions(tmp_path, [ada])
+    assert [entry.path for entry in opened_last.recent] == [ada, bea, cid]

@@ -93,6 +93,19 @@ def test_the_main_button_has_its_colour_only_where_a_press_is_needed(
         use_theme("system")
 
 
+def test_a_large_guide_has_larger_texts(panel: WizardPanel, snapshot: Maker) -> None:
+    panel.show_snapshot(snapshot(State.APPLIED))
+    assert panel.shown is not None
+    verdict = panel.findChild(QLabel, "card-verdict-left")
+    sentence = next(one for one in panel.findChildren(QLabel) if one.text() == panel.shown.sentence)
+    assert isinstance(verdict, QLabel)
+    before = [one.fontInfo().pointSizeF() for one in (sentence, verdict)]
+    for size_px, scale in (((2000, 1500), 1.5), ((460, 420), 1.0)):
+        panel.resize(*size_px)
+        now = [one.fontInfo().pointSizeF() for one in (sentence, verdict)]
+        assert now == pytest.approx([scale * one for one in before], rel=0.1)
+
+
 def test_the_other_buttons_come_and_go(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
     panel.show_snapshot(snapshot(State.ALIGNED))
     other = child(panel, "wizardOther0")
