@@ -62,7 +62,7 @@ def numbers(pattern: str, text: str) -> list[float]:
 
 def test_a_session_is_solved() -> None:
     said = run("01_solve_a_session.py")
-    assert "left: φ = (-3.96 ± 0.70, +0.83 ± 0.67, +2.29 ± 1.86) mm; rms 1.42 mm" in said
+    assert "left: φ = (-3.95 ± 0.70, +0.84 ± 0.67, +2.29 ± 1.87) mm; rms 1.42 mm" in said
     assert "right: repeat: expected error" in said
     assert "Unity's projection, right eye:" in said
 
