@@ -173,7 +173,7 @@ def to_openxr(rig: Rig, results: Solved) -> dict[Eye, tuple[Pose, Fov]]:
     >>> session = handcal.open_session("resources/example_session")
     >>> pose, fov = handcal.to_openxr(session.rig, handcal.solve(session))["left"]
     >>> (1e3 * pose.position_m).round(2)  # mm: the eye in V
-    array([-3.46, -1.83, -0.29])
+    array([-3.45, -1.84, -0.29])
     """
     return {eye: openxr_view(one) for eye, one in _rendered(rig, results).items()}
 
