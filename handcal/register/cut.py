@@ -20,6 +20,8 @@ _ONE_EDGE_M = 0.05
 _INNERMOST, _OUTERMOST = 0.1, 0.99
 # What would cut off more of a cloud than a wrist and some palm is no cut across the forearm.
 _LEAST_KEPT = 0.6
+# The limit is the coordinate of a point; this much beyond it, no rounding leaves that point out.
+_BEYOND_POINT_M = 1e-9
 
 
 def common_cut(
@@ -65,7 +67,7 @@ def common_cut(
         at_wrist = edge[np.linalg.norm(edge - wrist_m, axis=1) < _ONE_EDGE_M]
         if len(at_wrist):
             ends.append(quantile(at_wrist @ along, _INNERMOST))
-    limit = min(ends)
+    limit = min(ends) + _BEYOND_POINT_M
     if min(float(np.mean(place <= limit)) for place in places) < _LEAST_KEPT:
         return None
     return along, limit

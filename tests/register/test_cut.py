@@ -78,3 +78,13 @@ def test_a_cut_that_is_not_across_the_forearm_is_left_alone() -> None:
     middle_m = made.cursor_m.mean(axis=0)
     across = np.linalg.norm(made.cursor_m - middle_m, axis=1) < 0.02
     assert common_cut(made.cursor_m, made.cursor_m, across, across, np.eye(4)) is None
+
+
+def test_no_point_lies_on_the_cut() -> None:
+    """Rounding, which differs between processors, decides about none."""
+    made = trial_alignment(0, 0.0, MAKING)
+    found = common_cut(made.cursor_m, made.hand_m, made.cursor_cut, made.hand_cut, np.eye(4))
+    assert found is not None
+    along, limit_m = found
+    beyond_m = np.concatenate([made.cursor_m, made.hand_m]) @ along - limit_m
+    assert np.abs(beyond_m).min() > 1e-10
