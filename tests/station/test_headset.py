@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -138,13 +139,18 @@ def test_a_delay_is_in_milliseconds() -> None:
 
 
 LATENCY_S = 0.03
+POSE_NS = 1_000_000_000 // 60
+FRAMES = 50
 
 
 class PunctualCamera(SyntheticCamera):
     """A camera whose frames arrive at once, however long the simulation renders."""
 
+    frames = 0
+
     def read(self, timeout_s: float = 1.0) -> Frame:
         frame = super().read(timeout_s)
+        self.frames += 1
         return replace(frame, t_host_ns=frame.t_camera_ns + round(1e9 * LATENCY_S))
 
 
@@ -167,9 +173,11 @@ def turning_head(delay_s: float) -> Iterator[tuple[HeadsetServer, PunctualCamera
     with HeadsetServer(KEY) as server, HeadsetClient(server.address, KEY, DEVICE) as client:
 
         def send() -> None:
+            t_ns = time.monotonic_ns()
             while not is_over.wait(1 / 100):
-                now_ns = time.monotonic_ns()
-                client.send_pose(head(1e-9 * now_ns + delay_s), now_ns)
+                while t_ns < time.monotonic_ns():  # also what a busy machine has missed
+                    client.send_pose(head(1e-9 * t_ns + delay_s), t_ns)
+                    t_ns += POSE_NS
 
         thread = threading.Thread(target=send)
         thread.start()
@@ -181,9 +189,16 @@ def turning_head(delay_s: float) -> Iterator[tuple[HeadsetServer, PunctualCamera
             thread.join()
 
 
+def pass_by_frames(patch: pytest.MonkeyPatch, camera: PunctualCamera, duration_s: float) -> None:
+    """Let a duration pass in `FRAMES` frames: a busy machine gives few in a second."""
+    clock = SimpleNamespace(monotonic=lambda: camera.frames * duration_s / FRAMES)
+    patch.setattr("handcal.station.headset.time", clock)
+
+
 @pytest.mark.process
-def test_wrong_stamps_are_found_over_the_link() -> None:
+def test_wrong_stamps_are_found_over_the_link(monkeypatch: pytest.MonkeyPatch) -> None:
     with turning_head(0.04) as (server, camera):
+        pass_by_frames(monkeypatch, camera, 4.0)
         found = run_pose_delay(server, camera, RIG.T_H_D, LATENCY_S, 4.0)
         assert found.delay_s == pytest.approx(0.04, abs=0.005)
         assert found.is_wrong
@@ -198,6 +213,7 @@ def test_the_doctor_reports_on_a_headset(monkeypatch: pytest.MonkeyPatch) -> Non
         (absent,) = examine_headset(server, None, None, 0.1)
     assert (absent.health, absent.what) == (Health.BROKEN, "Headset")
     with turning_head(0.0) as (server, camera):
+        pass_by_frames(monkeypatch, camera, 8.0)
         headset, stamps = examine_headset(server, RIG, camera, 5.0)
     assert headset.found.startswith("Lab 9 (runtime 1, app 3, protocol 2)")
     assert (stamps.what, stamps.health) == ("Pose stamps", Health.GOOD)
