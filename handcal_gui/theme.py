@@ -180,10 +180,6 @@ def use_theme(theme: Literal["system", "light", "dark", "contrast"]) -> None:
     for special, kinds in ((boxes, _BOXES), (main, ("MainButton",))):
         for kind in kinds:  # as text; PySide's stub is wrong
             QApplication.setPalette(special, kind)  # type: ignore[arg-type]
-    for widget in QApplication.allWidgets():  # Qt leaves those with a style sheet as they are
-        if sheet := widget.styleSheet():
-            widget.setStyleSheet("")
-            widget.setStyleSheet(sheet)
 
 
 def is_dark() -> bool:
@@ -200,16 +196,36 @@ def colors() -> Colors:
 
 def follow_theme(widget: QWidget, redraw: Callable[[], object]) -> None:
     """Call a method of a widget now and after each change of the widget's palette."""
-    _PaletteWatch(widget).changed.connect(redraw)
+    _PaletteWatch(widget, QEvent.Type.PaletteChange).changed.connect(redraw)
     redraw()
+
+
+def set_style(widget: QWidget, sheet: str) -> None:
+    """Give a widget a style sheet, and again after each change of the theme.
+
+    Qt does not update the colours of a widget that has one.
+    """
+    styled = 0
+
+    def restyle() -> None:
+        nonlocal styled
+        palette = QGuiApplication.palette().cacheKey()
+        if styled != palette:  # a change of the theme comes as a dozen events
+            styled = palette
+            widget.setStyleSheet("")
+            widget.setStyleSheet(sheet)
+
+    _PaletteWatch(widget, QEvent.Type.ApplicationPaletteChange).changed.connect(restyle)
+    restyle()
 
 
 def flat_header(header: QHeaderView) -> None:
     """Make a table's header look like its cells, with muted text."""
-    header.setStyleSheet(
+    set_style(
+        header,
         "QHeaderView { background: palette(base); }"
         "QHeaderView::section { background: transparent; border: 0; padding: 2px 4px;"
-        " color: palette(placeholder-text); }"
+        " color: palette(placeholder-text); }",
     )
 
 
@@ -244,16 +260,17 @@ def icon(name: str, color: str = "") -> QIcon:
 
 
 class _PaletteWatch(QObject):
-    """Emits `changed` when the palette of its parent changes."""
+    """Emits `changed` at each event of its parent that tells of a palette."""
 
     changed = Signal()
 
-    def __init__(self, widget: QWidget) -> None:
+    def __init__(self, widget: QWidget, kind: QEvent.Type) -> None:
         super().__init__(widget)
+        self._kind = kind
         widget.installEventFilter(self)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.PaletteChange:
+        if event.type() == self._kind:
             self.changed.emit()
         return False
 

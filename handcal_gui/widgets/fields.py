@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.theme import SPACING_PX, scale_font, set_style
 from handcal_gui.widgets.layouts import hbox
 
 Field = TypeVar("Field", bound=QWidget)
@@ -84,9 +84,10 @@ def main_button(name: str, text: str = "") -> MainButton:
 def tool_button() -> QToolButton:
     """Return a tool button that stands out while checked, also in the dark theme."""
     made = QToolButton()
-    made.setStyleSheet(
+    set_style(
+        made,
         "QToolButton:checked { background: palette(highlight); color: palette(highlighted-text);"
-        " border: 1px solid palette(text); border-radius: 2px; }"
+        " border: 1px solid palette(text); border-radius: 2px; }",
     )
     return made
 

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import flat_header, follow_theme, number_font
+from handcal_gui.theme import flat_header, number_font, set_style
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,12 @@ class NumberTable(QTableWidget):
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(self.verticalHeader().minimumSectionSize())
         self.verticalHeader().setSectionsClickable(False)
-        follow_theme(self, self._recolor)
+        flat_header(self.horizontalHeader())
+        flat_header(self.verticalHeader())
+        for corner in self.findChildren(QAbstractButton):
+            set_style(
+                corner, "QTableCornerButton::section { background: palette(base); border: 0; }"
+            )
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
 
@@ -94,14 +99,6 @@ class NumberTable(QTableWidget):
         """Distribute the available width."""
         super().resizeEvent(event)
         self._fit_columns()
-
-    def _recolor(self) -> None:
-        flat_header(self.horizontalHeader())
-        flat_header(self.verticalHeader())
-        for corner in self.findChildren(QAbstractButton):
-            corner.setStyleSheet(
-                "QTableCornerButton::section { background: palette(base); border: 0; }"
-            )
 
     def _fit_columns(self) -> None:
         """Give each column the width of its contents, and an equal share of the rest."""

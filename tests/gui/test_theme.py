@@ -56,9 +56,13 @@ def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
     made = tool_button()
     qtbot.addWidget(made)
     made.show()
+
+    def follows() -> bool:
+        return made.palette().button().color() == QGuiApplication.palette().button().color()
+
     for theme in ("dark", "light", "contrast"):
         use_theme(theme)
-        assert made.palette().button().color() == QGuiApplication.palette().button().color()
+        qtbot.waitUntil(follows)
 
 
 def test_an_icon_takes_a_colour_with_a_meaning(qtbot: QtBot) -> None:
