@@ -9,6 +9,7 @@ import json
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from handcal.geometry import rigid
 from handcal.link import exchange, greetings, messages, nudges, wire
@@ -34,7 +35,8 @@ DEVICE = int(DEVICE_ID, 16)
 NONCE, PC_NONCE, COOKIE = bytes(range(16)), bytes(range(16, 32)), bytes(range(32, 48))
 WELCOME = Welcome(0x1122334455667788, NONCE, PC_NONCE)
 T_NS = 1_000_000_000_123
-T_V_H = rigid([0.01, 0.02, 0.03], [0.032, 0.0, 0.015])
+# The published bytes hold this matrix as SciPy rounds it.
+T_V_H = rigid(Rotation.from_rotvec([0.01, 0.02, 0.03]).as_matrix(), [0.032, 0.0, 0.015])
 P = np.array([[1500.0, 0.5, 634.0, -3.0], [0.0, 1490.0, 360.0, 2.0], [0.0, 0.0, 1.0, 0.001]])
 
 
