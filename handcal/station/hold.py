@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 from handcal.errors import HandError
-from handcal.geometry import invert, transform
+from handcal.geometry import invert, rotation_vector, transform
 from handcal.register.rigid import RigidSettings, motion_covariance, register_rigid
 from handcal.register.surface import Surface, describe_surface, mean_point
 from handcal.station.hands import PlacedHand
@@ -105,6 +104,6 @@ def _is_at(surface: Surface, place: Surface) -> bool:
     T = fit.T_target_source
     middle_m = mean_point(surface.points_m)
     moved_m = transform(T, middle_m[None])[0] - middle_m
-    moved = np.concatenate([Rotation.from_matrix(T[:3, :3]).as_rotvec(), moved_m])
+    moved = np.concatenate([rotation_vector(T[:3, :3]), moved_m])
     noise = motion_covariance(fit.rows, surface, T)
     return float(moved @ np.linalg.solve(noise, moved)) < _MOVED
