@@ -202,9 +202,10 @@ def fit_match(
             break
         history.append(error_m2)
         inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
-        unturned, paired = partner, fitted
-        turn = _measure_turn(match, T_E, R_next, paired)
+        R, unturned, paired = R_next, partner, fitted
         shift_m, aspect_m, moved_m = fit_m, np.zeros(3), np.zeros(3)
+    if len(history) > 1:
+        turn = _measure_turn(match, T_E, R, paired)
     return EyeShift(
         shift_m=shift_m,
         covariance_m2=_covariance(match, T_E, turn, moved_m, unturned, paired, distance_m)
