@@ -207,7 +207,7 @@ def unity_world_to_camera(T_V_W: Float64) -> Float64:
 def slicer_transform(T: Float64) -> Float64:
     """Convert a rigid (4, 4) transform to 3D Slicer's: mm, axes right, anterior, superior.
 
-    Both frames turn alike: right stays, forward is anterior, up is superior.
+    Both of its frames are converted: right stays, forward is anterior, up is superior.
     """
     turn = rigid(_SLICER_FROM_OPENCV)
     turned = turn @ T @ turn.T

@@ -54,7 +54,7 @@ class DemoSettings:
     plan: PlanName = "paper"
     alignments: int = 1
     """Number of alignments of the paper's plan; of each eye, if `eyes` is ``"each"``. The
-    recommended plan decides by itself."""
+    recommended plan makes its own choice."""
     eyes: EyePlan = "both"
     """Only one for a wearer who sees with one eye."""
     verify: bool = True
@@ -233,7 +233,7 @@ def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
 
 
 def _is_automatic(settings: DemoSettings) -> bool:
-    """Return whether the station follows the plan by itself; else the script does."""
+    """Return whether the station follows the plan automatically; otherwise the script does."""
     return settings.plan == "recommended" or bool(settings.former)
 
 

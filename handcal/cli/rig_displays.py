@@ -71,8 +71,8 @@ def gray(arguments: argparse.Namespace) -> None:
     for name, pattern in made.items():
         write_png(arguments.output / f"{name}.png", pattern)
     console.print(
-        f"{arguments.output}: {len(made)} patterns; show each unscaled, and name the camera's "
-        "image of it alike",
+        f"{arguments.output}: {len(made)} patterns; show each unscaled, and give the camera's "
+        "image of it the same name",
         markup=False,
     )
 
@@ -82,8 +82,8 @@ def gray(arguments: argparse.Namespace) -> None:
     arg(
         "--gray-code",
         action="store_true",
-        help="the images are one folder with those of the Gray-code patterns, named alike (handcal "
-        "rig gray)",
+        help="the images are one folder with those of the Gray-code patterns, with the same "
+        "names (handcal rig gray)",
     ),
     arg("--eye", choices=EYES, required=True, help="eye whose display is calibrated"),
     arg(

@@ -15,7 +15,7 @@ from handcal.station.station import Station
 from handcal.types import Eye
 
 _DELIVERY_S = 5.0
-# Steps that the station does by itself, within a few frames.
+# Steps that the station takes automatically, within a few frames.
 _PASSING = (StepName.SOLVE, StepName.APPLY, StepName.WAIT, StepName.CURSOR, StepName.VERIFY)
 
 

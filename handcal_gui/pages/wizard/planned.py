@@ -55,7 +55,7 @@ _VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
 
 
 class PlannedWizard(Wizard):
-    """The current step of a plan that the station follows by itself.
+    """The current step of a plan that the station follows automatically.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ class PlannedWizard(Wizard):
 
 
 def _drawn_otherwise(procedure: Procedure) -> str:
-    """Return a note if the headset draws with another φ than the result's; else empty."""
+    """Return a note if the headset draws with a φ other than that of the result; else empty."""
     results, drawn_m = procedure.results, procedure.applied_shift_m
     if results is None or procedure.state is not State.APPLIED:
         return ""
@@ -250,5 +250,5 @@ def _drawn_otherwise(procedure: Procedure) -> str:
     if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
         return ""
     return tr(
-        "The headset draws with another φ than this result's: an earlier or a fine-tuned one."
+        "The headset draws with a different φ from this result's: an earlier or a fine-tuned one."
     )

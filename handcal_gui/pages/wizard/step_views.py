@@ -30,7 +30,7 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
-"""Waiting times of steps that run by themselves: for the hand, and to read a text or advice."""
+"""Waiting times of automatic steps: for the hand, and to read a text or advice."""
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _LEAST_ALIGN_NS = 1_500_000_000
 _SENDS_UNUSABLE = tr("Draws with a result that should not be used")

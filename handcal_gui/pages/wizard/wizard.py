@@ -71,7 +71,7 @@ class WizardPanel(QWidget):
         The view shown; None before the first snapshot.
     picture : GuidePicture
     asked : Signal(Action)
-        A button was pressed, by a person or by itself.
+        A button was pressed, by a person or automatically.
     plan_changed : Signal(str)
     hold_changed : Signal(bool)
         A person has chosen whether every step waits for a person.
@@ -145,7 +145,7 @@ class WizardPanel(QWidget):
         self._run(view, snapshot)
 
     def hold(self, is_held: bool) -> None:
-        """Let every step wait for a person, or let steps run by themselves."""
+        """Let every step wait for a person, or let steps run automatically."""
         self._automatic.is_held = self.wizard.is_held = is_held
         self._hold.setChecked(is_held)
         self._refresh()
@@ -187,10 +187,10 @@ class WizardPanel(QWidget):
             self,
             tr("Hold"),
             "H",
-            tooltip=tr("Hold: no step runs by itself, each waits for you (H)"),
+            tooltip=tr("Hold: no step runs automatically; each waits for you (H)"),
         )
         hold.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
-        hold.setWhatsThis(tr("Hold the steps that run by themselves, or let them run"))
+        hold.setWhatsThis(tr("Hold the automatic steps, or let them run"))
         hold.setCheckable(True)
         hold.triggered.connect(self._choose_hold)
         return hold
@@ -229,7 +229,7 @@ class WizardPanel(QWidget):
         self.asked.emit(action)
 
     def _run(self, view: WizardView, snapshot: Snapshot) -> None:
-        """Press the main button once a step that runs by itself has waited long enough."""
+        """Press the main button once an automatic step has waited long enough."""
         now_s = 1e-9 * snapshot.t_host_ns
         share = self._automatic.share(view, now_s)
         done = len(snapshot.procedure.alignments)
@@ -264,7 +264,7 @@ class WizardPanel(QWidget):
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addSpacing(SPACING_PX)
         layout.addLayout(head)
-        self._ring.setToolTip(tr("Alignments made; the ring fills until a step runs by itself"))
+        self._ring.setToolTip(tr("Alignments made; a full ring runs the next step"))
         texts = vbox(
             self._sentence, *self._checks, self._fact, self._note, 0, spacing=SPACING_PX // 2
         )
@@ -281,7 +281,7 @@ class WizardPanel(QWidget):
         self._sentence.setText(view.sentence)
         # The result card gives the verdicts, with their reasons.
         has_card = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
-        # The station's plan chooses the eyes by itself.
+        # The station's plan chooses the eyes.
         is_planned = isinstance(self.wizard, PlannedWizard)
         self._choice.setVisible(view.step not in OF_THE_RESULT and not is_planned)
         self.picture.result.buttons.setVisible(has_card)
