@@ -181,14 +181,9 @@ def to_openxr(rig: Rig, results: Solved) -> dict[Eye, tuple[Pose, Fov]]:
 def opengl_transform(T: Float64) -> Float64:
     """Convert a (4, 4) transform between OpenCV's and OpenGL's (or OpenXR's) axes, either way.
 
-    ``F T F`` with F = diag(1, -1, -1, 1): for poses, view matrices (``T_V_W``) and UQ alike.
+    ``F T F`` with F = diag(1, -1, -1, 1): for poses, view matrices (``T_V_W``) and UQ.
     """
     return _OPENGL_FROM_OPENCV @ T @ _OPENGL_FROM_OPENCV
-
-
-def winrt_transform(T: Float64) -> Float64:
-    """Convert a (4, 4) transform to WinRT's Matrix4x4: OpenGL's axes, row vectors."""
-    return opengl_transform(T).T
 
 
 def unity_transform(T: Float64) -> Float64:
