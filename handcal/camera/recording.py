@@ -159,7 +159,7 @@ class _Playback:
         self.profile = self._active.get_stream(stream)
 
     def identity(self) -> CameraIdentity:
-        """Return the recorded device's identity, as far as the recording contains it."""
+        """Return the recorded device's identity, with empty texts for what is missing."""
         return describe_device(self._device).identity
 
     def recorded_profile(self, stream: Any) -> Any | None:

@@ -196,7 +196,7 @@ def _inverse(factor: Float64) -> Float64:
 def change_text(change: ShapeChange, R_D: Float64) -> str:
     """Say in a few words where the hand's shape differs most, without a full stop.
 
-    Parts of the hand are told by their place in its outline alone, so "fingers" are not numbered,
+    Parts of the hand are told only by their place in its outline, so "fingers" are not numbered,
     and a folded thumb is not told from the palm.
 
     Parameters
