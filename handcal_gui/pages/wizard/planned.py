@@ -8,7 +8,7 @@ from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Eye, EyePlan
-from handcal_gui.pages.wizard.checks import (
+from handcal_gui.pages.wizard.preconditions import (
     hand_check,
     is_placed,
     is_steady,

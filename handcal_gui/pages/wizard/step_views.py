@@ -10,7 +10,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName
-from handcal_gui.pages.wizard.checks import (
+from handcal_gui.pages.wizard.preconditions import (
     hand_check,
     is_placed,
     is_steady,

@@ -8,7 +8,7 @@ from handcal.register.verdict import Advice
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Alignment, Eye, EyePlan
-from handcal_gui.pages.wizard.checks import (
+from handcal_gui.pages.wizard.preconditions import (
     hand_check,
     is_placed,
     is_steady,
