@@ -115,7 +115,7 @@ class WizardView:
     step: Step
     sentence: str
     """The instruction to the wearer or the technician."""
-    checks: tuple[Precondition, ...]
+    preconditions: tuple[Precondition, ...]
     main: ButtonSpec
     """The button that the space bar presses."""
     others: tuple[ButtonSpec, ...] = ()
