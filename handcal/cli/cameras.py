@@ -37,9 +37,7 @@ REALSENSE_OPTIONS = (
         "--exposure-us", _POSITIVE, "US", "exposure time of the depth camera (default: automatic)"
     ),
     value("--laser-power-mw", _POSITIVE, "MW", "power of the projector (default: unchanged)"),
-    flag(
-        "--expose-whole-image", "measure the exposure of colour on the whole image, not on the hand"
-    ),
+    flag("--expose-whole-image", "set the exposure of colour by the whole image, not by the hand"),
     flag("--spatial-filter", "apply the SDK's spatial filter to depth"),
     flag("--temporal-filter", "apply the SDK's temporal filter to depth"),
     flag("--hole-filling", "apply the SDK's hole filling to depth"),

@@ -127,7 +127,7 @@ def check(arguments: argparse.Namespace) -> None:
     file_option("--rig", "rig file, if the session's own is damaged"),
 )
 def repair(arguments: argparse.Namespace) -> None:
-    """Copy what is sound of a damaged session into a new one."""
+    """Copy the sound parts of a damaged session into a new one."""
     from handcal.rig.rig_file import read_rig
     from handcal.session.repair import repair_session
 
@@ -168,7 +168,7 @@ def inspect(arguments: argparse.Namespace) -> None:
     json=True,
 )
 def prior(arguments: argparse.Namespace) -> None:
-    """Show where wearers' eyes are, as learned from the finished sessions with one rig."""
+    """Show the prior of the eyes' positions learned from the finished sessions with one rig."""
     from dataclasses import asdict
 
     import numpy as np

@@ -49,7 +49,7 @@ _LINK = (
         choices=("paper", "recommended"),
         default="paper",
         help="the paper's alignments, or the recommended plan: cursors placed by the program, then "
-        "each eye verified",
+        "a verification of each eye",
     ),
     flag("--no-verify", "end the recommended plan without verifying the eyes"),
     arg(
@@ -67,7 +67,7 @@ _LINK = (
     arg(
         "--fault",
         choices=FAULTS,
-        help="a fault that must not be accepted; depth-bias is seen if the rig has a depth check",
+        help="a fault that must not be accepted; depth-bias needs a rig with a depth check",
     ),
     arg(
         "--eye-distance",
