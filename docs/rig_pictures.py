@@ -1,4 +1,4 @@
-"""Makes the pictures of rig-guide.md: the rig wizard, with rendered photographs, by itself."""
+"""Makes the pictures of rig-guide.md: the rig wizard, run automatically with rendered photographs."""
 
 from __future__ import annotations
 

@@ -181,14 +181,9 @@ def to_openxr(rig: Rig, results: Solved) -> dict[Eye, tuple[Pose, Fov]]:
 def opengl_transform(T: Float64) -> Float64:
     """Convert a (4, 4) transform between OpenCV's and OpenGL's (or OpenXR's) axes, either way.
 
-    ``F T F`` with F = diag(1, -1, -1, 1): for poses, view matrices (``T_V_W``) and UQ alike.
+    ``F T F`` with F = diag(1, -1, -1, 1): for poses, view matrices (``T_V_W``) and UQ.
     """
     return _OPENGL_FROM_OPENCV @ T @ _OPENGL_FROM_OPENCV
-
-
-def winrt_transform(T: Float64) -> Float64:
-    """Convert a (4, 4) transform to WinRT's Matrix4x4: OpenGL's axes, row vectors."""
-    return opengl_transform(T).T
 
 
 def unity_transform(T: Float64) -> Float64:
@@ -207,7 +202,7 @@ def unity_world_to_camera(T_V_W: Float64) -> Float64:
 def slicer_transform(T: Float64) -> Float64:
     """Convert a rigid (4, 4) transform to 3D Slicer's: mm, axes right, anterior, superior.
 
-    Both frames turn alike: right stays, forward is anterior, up is superior.
+    Both of its frames are converted: right stays, forward is anterior, up is superior.
     """
     turn = rigid(_SLICER_FROM_OPENCV)
     turned = turn @ T @ turn.T

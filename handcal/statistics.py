@@ -80,10 +80,10 @@ def mean_interval(
 ) -> MeanInterval:
     """Return the mean over clusters, such as wearers, with a confidence interval.
 
-    The errors of one wearer are alike, so only wearers are independent: the interval is that of the
-    mean of the clusters' means, each cluster counting once. With equally many values in each, the
-    mean is that of all values, and Student's interval that of a mixed-effects model with a random
-    intercept for each cluster.
+    The errors of one wearer are correlated, so only wearers are independent: the interval is that
+    of the mean of the clusters' means, each cluster counting once. With equally many values in
+    each, the mean is that of all values, and Student's interval that of a mixed-effects model with
+    a random intercept for each cluster.
 
     A bootstrap of few clusters is too narrow. From ten clusters on, Student's interval is
     corrected for skewness by Hall's monotone cubic transformation of the t statistic (Hall 1992,

@@ -56,9 +56,9 @@ class Preferences:
     """Bridges to other programs that every calibration runs."""
     theme: Theme = "system"
     arrangement: Literal["panels", "station"] = "panels"
-    """Panels around the guide, or the guide alone."""
+    """Panels around the guide, or only the guide."""
     runs_itself: bool = True
-    """True if steps run by themselves, False if each waits for a person."""
+    """True if steps run automatically, False if each waits for a person."""
     geometry: str = ""
     live_layout: str = ""
     review_layout: str = ""

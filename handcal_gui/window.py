@@ -79,7 +79,7 @@ class MainWindow(QMainWindow):
     closing : Signal()
         The window is about to close.
     arrangement_changed : Signal(str)
-        The user has chosen panels around the guide, or the guide alone.
+        The user has chosen panels around the guide, or only the guide.
     """
 
     closing = Signal()
@@ -138,7 +138,7 @@ class MainWindow(QMainWindow):
         return self._page
 
     def use_arrangement(self, arrangement: Arrangement) -> None:
-        """Arrange calibrations as panels around the guide, or as the guide alone."""
+        """Arrange calibrations as panels around the guide, or as the guide only."""
         self._keep_layout()
         self._arrangement = arrangement
         self._station.setChecked(arrangement == "station")
@@ -273,7 +273,7 @@ class MainWindow(QMainWindow):
         for number, (name, title) in enumerate(TITLES.items(), 1):
             go_to.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
         self._station = view.addAction(
-            tr("&Station: the guide alone"), QKeySequence("F11"), self._swap
+            tr("&Station: only the guide"), QKeySequence("F11"), self._swap
         )
         self._station.setCheckable(True)
         self._dock_actions_start = view.addSeparator()

@@ -12,7 +12,6 @@ from handcal.conventions import (
     pose,
     unity_transform,
     unity_world_to_camera,
-    winrt_transform,
 )
 from handcal.display import projection_matrix, update_matrix
 from handcal.geometry import invert, project, rigid, transform
@@ -137,8 +136,6 @@ def test_poses_by_hand() -> None:
     openxr = pose(opengl_transform(T))
     np.testing.assert_allclose(openxr.position_m, [1, -2, -3])
     np.testing.assert_allclose(openxr.quaternion_xyzw, [0, -HALF, 0, HALF], atol=1e-15)
-    # WinRT: the translation stands in the last row.
-    np.testing.assert_allclose(winrt_transform(T)[3], [1, -2, -3, 1])
 
 
 def test_roll_by_hand() -> None:
@@ -153,10 +150,6 @@ def test_conversions_keep_products_and_undo_themselves(A: Float64, B: Float64) -
     for convert in (opengl_transform, unity_transform):
         np.testing.assert_allclose(convert(A) @ convert(B), convert(A @ B), atol=1e-12)
         np.testing.assert_array_equal(convert(convert(A)), A)
-    # Row vectors multiply in the opposite order.
-    np.testing.assert_allclose(
-        winrt_transform(A) @ winrt_transform(B), winrt_transform(B @ A), atol=1e-12
-    )
 
 
 @given(POSES)

@@ -24,7 +24,7 @@ class Output(Protocol[Item]):
     """Number of items that may wait; the oldest is lost when another comes."""
 
     def take(self, snapshot: Snapshot) -> Item | None:
-        """Return what is to be sent of a snapshot, in the engine's thread: within microseconds."""
+        """Return what to send of a snapshot, in the engine's thread: within microseconds."""
         ...
 
     def send(self, item: Item) -> None:

@@ -80,7 +80,7 @@ class HoloLens2RealSense(Closable):
 
     def __init__(self, settings: HoloLens2Settings) -> None:
         if not settings.realsense_rig:
-            raise CameraError("say which rig file has its lens: hololens2:ADDRESS,realsense=RIG")
+            raise CameraError("name the rig file with its lens: hololens2:ADDRESS,realsense=RIG")
         try:
             self.depth_intrinsics = read_rig(settings.realsense_rig).depth_intrinsics
         except FileError as error:

@@ -26,7 +26,7 @@ class DepthSettings:
     every_s: float = 0.1
     """Interval between two frames examined, in camera time."""
     choose: ChooseSettings = field(default_factory=lambda: ChooseSettings(apart_share=0.03))
-    """Views may be more alike than for intrinsics: their distances matter, not their places."""
+    """Views may be more similar than for intrinsics: their distances matter, not their places."""
 
 
 STILLS = DepthSettings(

@@ -102,7 +102,7 @@ class RecordingCamera(PlayedCamera):
         self._depth = self._color = None
         if not playing:
             return
-        # A reading thread that has met the end stops by itself, and librealsense aborts the program
+        # A reading thread that has reached the end stops, and librealsense aborts the program
         # if it is stopped at that moment. One that has not runs on after the stop, and must not
         # outlive its objects. (Pausing it takes 10 s where nobody takes its frames.)
         time.sleep(_SETTLE_S)
@@ -159,7 +159,7 @@ class _Playback:
         self.profile = self._active.get_stream(stream)
 
     def identity(self) -> CameraIdentity:
-        """Return the recorded device's identity, as far as the recording contains it."""
+        """Return the recorded device's identity, with empty texts for what is missing."""
         return describe_device(self._device).identity
 
     def recorded_profile(self, stream: Any) -> Any | None:

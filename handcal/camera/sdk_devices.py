@@ -144,7 +144,7 @@ def devices_by_child() -> list[Device]:
 
 
 def describe_device(device: Any) -> Device:
-    """Return the description of a device, as far as the device answers."""
+    """Return the description of a device; empty texts for what it does not answer."""
     rs = librealsense()
     info = rs.camera_info
 

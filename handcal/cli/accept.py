@@ -7,7 +7,7 @@ from pathlib import Path
 
 from handcal.cli.boards import BOARD_OPTIONS, GRID_OPTION, board_of
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.terminal import arg, command, number, seed
+from handcal.cli.terminal import arg, command, file_option, folder_option, number, seed, value
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.types import EYES
@@ -20,34 +20,25 @@ from handcal.types import EYES
         help="images: EYE/grid.png, EYE/viewpoint, EYE/depth; camera.json; EYE/tracked.json if the "
         "headset tracks the board",
     ),
-    arg("--rig", type=Path, metavar="FILE", required=True, help="rig file to accept"),
+    file_option("--rig", "rig file to accept", required=True),
     arg("--eyes", choices=("both", *EYES), default="both", help="eyes to check"),
-    arg(
-        "--camera-intrinsics",
-        type=Path,
-        metavar="FILE",
-        help="intrinsics of the viewpoint camera (default: FOLDER/camera.json)",
+    file_option(
+        "--camera-intrinsics", "intrinsics of the viewpoint camera (default: FOLDER/camera.json)"
     ),
-    arg(
+    file_option(
         "--depth-intrinsics",
-        type=Path,
-        metavar="FILE",
-        help="intrinsics of the depth camera's images (default: FOLDER/depth.json if it exists, "
+        "intrinsics of the depth camera's images (default: FOLDER/depth.json if it exists, "
         "else the rig's)",
     ),
-    arg(
+    value(
         "--limit-arcmin",
-        type=number(float, 0.1, 60.0),
-        metavar="ARCMIN",
+        number(float, 0.1, 60.0),
+        "ARCMIN",
+        "largest accepted mean error at any distance",
         default=5.0,
-        help="largest accepted mean error at any distance",
     ),
-    arg(
-        "--output",
-        type=Path,
-        metavar="FOLDER",
-        default=Path("results/acceptance"),
-        help="folder for the page with the result",
+    folder_option(
+        "--output", "folder for the page with the result", default=Path("results/acceptance")
     ),
     *BOARD_OPTIONS,
     GRID_OPTION,
@@ -95,14 +86,8 @@ def accept(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("folder", type=Path, help="new folder for the images"),
-    arg("--rig", type=Path, metavar="FILE", help="the true rig (default: the shipped example)"),
-    arg(
-        "--views",
-        type=number(int, 3, 100),
-        metavar="N",
-        default=20,
-        help="images of the board for each camera",
-    ),
+    file_option("--rig", "the true rig (default: the shipped example)"),
+    value("--views", number(int, 3, 100), "N", "images of the board for each camera", default=20),
     seed(),
 )
 def simulate(arguments: argparse.Namespace) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from handcal.cli.output import console, show_progress, table
-from handcal.cli.terminal import arg, number
+from handcal.cli.terminal import arg, flag, number, value
 from handcal.errors import HandcalError
 from handcal.rig.board import Board, BoardKind
 
@@ -30,29 +30,13 @@ BOARD_OPTIONS = (
         default=_BOARD.squares,
         help="number of squares, not of inner corners",
     ),
-    arg(
-        "--square-mm",
-        type=_SIDE,
-        metavar="MM",
-        default=1e3 * _BOARD.square_m,
-        help="measured side of a square",
-    ),
-    arg(
-        "--marker-mm",
-        type=_SIDE,
-        metavar="MM",
-        default=1e3 * _BOARD.marker_m,
-        help="measured side of a marker",
-    ),
+    value("--square-mm", _SIDE, "MM", "measured side of a square", default=1e3 * _BOARD.square_m),
+    value("--marker-mm", _SIDE, "MM", "measured side of a marker", default=1e3 * _BOARD.marker_m),
     arg("--dictionary", default=_BOARD.dictionary, help="ArUco dictionary of the markers"),
-    arg("--legacy", action="store_true", help="the board was made by OpenCV before 4.6"),
+    flag("--legacy", "the board was made by OpenCV before 4.6"),
 )
-GRID_OPTION = arg(
-    "--square-px",
-    type=number(int, 20, 2000),
-    metavar="PX",
-    default=80,
-    help="side of the grid's squares",
+GRID_OPTION = value(
+    "--square-px", number(int, 20, 2000), "PX", "side of the grid's squares", default=80
 )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import arg, command, number, seed
+from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
 from handcal.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder
@@ -33,26 +33,14 @@ REALSENSE_OPTIONS = (
         choices=get_args(Preset),
         help="visual preset of the SDK (default: unchanged)",
     ),
-    arg(
-        "--exposure-us",
-        type=_POSITIVE,
-        metavar="US",
-        help="exposure time of the depth camera (default: automatic)",
+    value(
+        "--exposure-us", _POSITIVE, "US", "exposure time of the depth camera (default: automatic)"
     ),
-    arg(
-        "--laser-power-mw",
-        type=_POSITIVE,
-        metavar="MW",
-        help="power of the projector (default: unchanged)",
-    ),
-    arg(
-        "--expose-whole-image",
-        action="store_true",
-        help="measure the exposure of colour on the whole image, not on the hand",
-    ),
-    arg("--spatial-filter", action="store_true", help="apply the SDK's spatial filter to depth"),
-    arg("--temporal-filter", action="store_true", help="apply the SDK's temporal filter to depth"),
-    arg("--hole-filling", action="store_true", help="apply the SDK's hole filling to depth"),
+    value("--laser-power-mw", _POSITIVE, "MW", "power of the projector (default: unchanged)"),
+    flag("--expose-whole-image", "set the exposure of colour by the whole image, not by the hand"),
+    flag("--spatial-filter", "apply the SDK's spatial filter to depth"),
+    flag("--temporal-filter", "apply the SDK's temporal filter to depth"),
+    flag("--hole-filling", "apply the SDK's hole filling to depth"),
 )
 """One for every field of `RealSenseSettings`."""
 _ROI = arg(
@@ -72,20 +60,8 @@ _ROI = arg(
         default="realsense",
         help="realsense, hololens2:HOST, oak, orbbec, simulator, or a recording to convert",
     ),
-    arg(
-        "--seconds",
-        type=number(float, 0.01, 86_400.0),
-        metavar="S",
-        default=60.0,
-        help="stop after this time",
-    ),
-    arg(
-        "--frames",
-        type=number(int, 1, 100_000),
-        metavar="N",
-        default=100_000,
-        help="stop after this many frames",
-    ),
+    value("--seconds", number(float, 0.01, 86_400.0), "S", "stop after this time", default=60.0),
+    value("--frames", number(int, 1, 100_000), "N", "stop after this many frames", default=100_000),
     seed("the simulated hand and room"),
     *REALSENSE_OPTIONS,
     json=True,
@@ -116,9 +92,7 @@ def record(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("recording", type=Path, help=".db3 or .bag file, or a recorded folder"),
-    arg(
-        "--real-time", action="store_true", help="play at the recorded frame rate, dropping frames"
-    ),
+    flag("--real-time", "play at the recorded frame rate, dropping frames"),
     _ROI,
     json=True,
 )
@@ -147,22 +121,14 @@ def replay(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    arg("--color", type=Path, metavar="FILE", required=True, help="colour image"),
-    arg(
-        "--depth",
-        type=Path,
-        metavar="FILE",
-        required=True,
-        help="16-bit PNG, aligned to the colour image",
-    ),
-    arg(
+    file_option("--color", "colour image", required=True),
+    file_option("--depth", "16-bit PNG, aligned to the colour image", required=True),
+    file_option(
         "--intrinsics",
-        type=Path,
-        metavar="FILE",
+        "JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit",
         required=True,
-        help="JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit",
     ),
-    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the results"),
+    folder_option("--output", "folder for the results", required=True),
     _ROI,
 )
 def segment(arguments: argparse.Namespace) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, fail, patience
+from handcal.cli.terminal import arg, command, fail, file_option, flag, folder_option, patience
 from handcal.errors import HandcalError
 
 if TYPE_CHECKING:
@@ -22,13 +22,9 @@ if TYPE_CHECKING:
 
 
 @command(
-    arg("--quick", action="store_true", help="few repetitions: a smoke test"),
+    flag("--quick", "few repetitions: a smoke test"),
     arg("--only", metavar="PART", default="", help="run one part, such as offline (default: all)"),
-    arg(
-        "--gui",
-        action="store_true",
-        help="measure the desktop program instead: needs a display and 12 minutes at 30 Hz",
-    ),
+    flag("--gui", "measure the desktop program instead: needs a display and 12 minutes at 30 Hz"),
     arg(
         "--rate",
         type=int,
@@ -61,8 +57,8 @@ def bench(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    arg("--rig", type=Path, metavar="FILE", help="rig file to compare the connected devices with"),
-    arg("--headset", action="store_true", help="wait for a paired headset, and report on it"),
+    file_option("--rig", "rig file to compare the connected devices with"),
+    flag("--headset", "wait for a paired headset, and report on it"),
     arg(
         "--stamps",
         metavar="SOURCE",
@@ -92,19 +88,11 @@ def doctor(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    arg(
-        "--output",
-        type=Path,
-        metavar="FILE",
-        default=Path("handcal-support.zip"),
-        help="ZIP file to write",
-    ),
-    arg(
+    file_option("--output", "ZIP file to write", default=Path("handcal-support.zip")),
+    folder_option(
         "--sessions",
-        type=Path,
-        metavar="FOLDER",
+        "further folder of sessions whose wearers' names are taken out; may be repeated",
         action="append",
-        help="further folder of sessions whose wearers' names are taken out; may be repeated",
     ),
     arg("--frames", type=Path, metavar="RECORDING", help="recording to add: a file or a folder"),
 )

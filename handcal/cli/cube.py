@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from handcal.cli.boards import GRID_OPTION
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, number, seed
+from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
 from handcal.errors import CameraError, HandcalError
 from handcal.io.files import make_folder
 from handcal.lab.evaluate.cube_folder import CapturePlan
@@ -33,48 +33,25 @@ _SHOWN = (
 _USUAL, _PLAN = Cube(), CapturePlan()
 _SIDE = number(float, 1.0, 1000.0)
 _COUNT = number(int, 1, 100)
-_POSES = arg(
-    "--poses",
-    type=_COUNT,
-    metavar="N",
-    default=_PLAN.poses,
-    help="poses of the cube at each position",
-)
+_POSES = value("--poses", _COUNT, "N", "poses of the cube at each position", default=_PLAN.poses)
 _RIG_AND_EYE = (
-    arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)"),
+    file_option("--rig", "rig file (default: the shipped example)"),
     arg("--eye", choices=EYES, default="left", help="eye whose display is tested"),
 )
 _CAPTURES = (
     arg("folder", type=Path, help="folder of the captures: POSITION/POSE/real.png, virtual.png"),
-    arg(
-        "--cube",
-        type=Path,
-        metavar="FILE",
-        help="description of the cube (default: FOLDER/cube.json)",
-    ),
+    file_option("--cube", "description of the cube (default: FOLDER/cube.json)"),
     *_RIG_AND_EYE,
     GRID_OPTION,
 )
 
 
 @command(
-    arg("--pdf", type=Path, metavar="FILE", required=True, help="net at true size"),
+    file_option("--pdf", "net at true size", required=True),
     arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
-    arg("--cube", type=Path, metavar="FILE", help="description of the cube (default: not written)"),
-    arg(
-        "--side-mm",
-        type=_SIDE,
-        metavar="MM",
-        default=1e3 * _USUAL.side_m,
-        help="side of the cube",
-    ),
-    arg(
-        "--marker-mm",
-        type=_SIDE,
-        metavar="MM",
-        default=1e3 * _USUAL.marker_m,
-        help="side of a marker",
-    ),
+    file_option("--cube", "description of the cube (default: not written)"),
+    value("--side-mm", _SIDE, "MM", "side of the cube", default=1e3 * _USUAL.side_m),
+    value("--marker-mm", _SIDE, "MM", "side of a marker", default=1e3 * _USUAL.marker_m),
     arg("--dictionary", default=_USUAL.dictionary, help="ArUco dictionary of the markers"),
     arg(
         "--ids",
@@ -110,12 +87,7 @@ def net(arguments: argparse.Namespace) -> None:
 
 @command(
     *_CAPTURES,
-    arg(
-        "--camera",
-        type=number(int, 0, 99),
-        metavar="N",
-        help="number of the camera (default: the only one)",
-    ),
+    value("--camera", number(int, 0, 99), "N", "number of the camera (default: the only one)"),
     arg(
         "--size",
         type=number(int, 1, 8192),
@@ -138,11 +110,10 @@ def net(arguments: argparse.Namespace) -> None:
         metavar="NAME",
         help="names of the drawing methods to compare (default: a single one, unnamed)",
     ),
-    arg("--no-grid", action="store_true", help="do not capture the display's grid"),
-    arg(
+    flag("--no-grid", "do not capture the display's grid"),
+    flag(
         "--automatic",
-        action="store_true",
-        help="take each image once the cube or the grid is at rest, without Enter; between two "
+        "take each image once the cube or the grid is at rest, without Enter; between two "
         "images of the cube, cover it",
     ),
 )
@@ -181,12 +152,12 @@ def capture(arguments: argparse.Namespace) -> None:
     arg("folder", type=Path, help="new folder for the captures"),
     seed(),
     _POSES,
-    arg(
+    value(
         "--alignments",
-        type=number(int, 1, 20),
-        metavar="K",
+        number(int, 1, 20),
+        "K",
+        "alignments of the hand at each position",
         default=1,
-        help="alignments of the hand at each position",
     ),
     arg(
         "--prior",
@@ -216,19 +187,11 @@ def simulate(arguments: argparse.Namespace) -> None:
 
 @command(
     *_CAPTURES,
-    arg(
+    file_option(
         "--camera-intrinsics",
-        type=Path,
-        metavar="FILE",
-        help="intrinsics of the camera in the eye's place (default: FOLDER/camera.json)",
+        "intrinsics of the camera in the eye's place (default: FOLDER/camera.json)",
     ),
-    arg(
-        "--output",
-        type=Path,
-        metavar="FOLDER",
-        default=Path("results/cube"),
-        help="folder for the report",
-    ),
+    folder_option("--output", "folder for the report", default=Path("results/cube")),
     json=True,
 )
 def report(arguments: argparse.Namespace) -> None:

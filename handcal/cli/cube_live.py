@@ -11,7 +11,7 @@ from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.display_check import network_server
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN
-from handcal.cli.terminal import arg, command, number, patience
+from handcal.cli.terminal import arg, command, file_option, flag, number, patience, value
 from handcal.errors import HandcalError
 from handcal.types import EYES
 
@@ -30,11 +30,8 @@ _KEYS: Mapping[str, tuple[int, float]] = {
     "b": (2, -1.0),
 }
 _CUBE = (
-    arg(
-        "--cube",
-        type=Path,
-        metavar="FILE",
-        help="description of the cube, with the measured sides (default: a 60 mm cube)",
+    file_option(
+        "--cube", "description of the cube, with the measured sides (default: a 60 mm cube)"
     ),
     arg(
         "--camera",
@@ -49,19 +46,9 @@ _CUBE = (
 
 
 @command(
-    arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)"),
-    arg(
-        "--no-headset",
-        action="store_true",
-        help="only track, for a camera that does not move; nothing is drawn",
-    ),
-    arg(
-        "--seconds",
-        type=number(float, 0.1, 86_400.0),
-        metavar="S",
-        default=30.0,
-        help="stop after this time",
-    ),
+    file_option("--rig", "rig file (default: the shipped example)"),
+    flag("--no-headset", "only track, for a camera that does not move; nothing is drawn"),
+    value("--seconds", number(float, 0.1, 86_400.0), "S", "stop after this time", default=30.0),
     *_CUBE,
     *REALSENSE_OPTIONS,
     json=True,

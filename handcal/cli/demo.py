@@ -54,7 +54,7 @@ class DemoSettings:
     plan: PlanName = "paper"
     alignments: int = 1
     """Number of alignments of the paper's plan; of each eye, if `eyes` is ``"each"``. The
-    recommended plan decides by itself."""
+    recommended plan makes its own choice."""
     eyes: EyePlan = "both"
     """Only one for a wearer who sees with one eye."""
     verify: bool = True
@@ -205,12 +205,6 @@ def _slip_m(settings: DemoSettings) -> tuple[float, float, float]:
     return float(x_m), float(y_m), float(z_m)
 
 
-def _draw_eyes(settings: DemoSettings) -> dict[Eye, Float64]:
-    """Draw the wearer's φ as the virtual headset does."""
-    wearer = WearerSettings(slip_m=_slip_m(settings))
-    return draw_eyes(np.random.default_rng(settings.seed), wearer)
-
-
 def _true_eye_distance_m(seed: int, worn_rig: Rig) -> float:
     left_m, right_m = (
         eye_position_m(worn_rig.eyes[eye], shift_m)
@@ -233,7 +227,7 @@ def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
 
 
 def _is_automatic(settings: DemoSettings) -> bool:
-    """Return whether the station follows the plan by itself; else the script does."""
+    """Return whether the station follows the plan automatically; otherwise the script does."""
     return settings.plan == "recommended" or bool(settings.former)
 
 
@@ -279,7 +273,9 @@ def _judge(
     """Compare the result with the wearer's true eyes."""
     assert calibration.results is not None
     results, rig, worn_rig = calibration.results, station.rig, station.worn_rig
-    eyes_m = _draw_eyes(settings)
+    # Drawn as by the virtual headset.
+    wearer = WearerSettings(slip_m=_slip_m(settings))
+    eyes_m = draw_eyes(np.random.default_rng(settings.seed), wearer)
     measured = results.measured_eye_distance
     # Relative to the rig's C0, which differs from the true one.
     truth_m = {

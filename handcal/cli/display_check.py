@@ -6,12 +6,11 @@ import argparse
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handcal.cli.output import console
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
-from handcal.cli.terminal import arg, command, patience
+from handcal.cli.terminal import arg, command, file_option, patience
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 
@@ -26,8 +25,8 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
 
 
 @command(
-    arg("--rig", type=Path, metavar="FILE", required=True, help="rig file of this headset"),
-    arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+    file_option("--rig", "rig file of this headset", required=True),
+    file_option("--output", "rig file to write", required=True),
     arg(
         "--headset",
         choices=("network", "virtual"),
@@ -37,8 +36,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
     arg(
         "--viewpoint",
         metavar="SOURCE",
-        help="number of the viewpoint camera in the system (default: ask who looks through the "
-        "display)",
+        help="number of the viewpoint camera (default: ask the person at the display)",
     ),
     arg(
         "--eyes",

@@ -10,7 +10,7 @@ from typing import get_args
 from rich.markup import escape
 
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, number
+from handcal.cli.terminal import arg, command, file_option, folder_option, number, value
 from handcal.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder, require_suffix
@@ -23,12 +23,10 @@ from handcal.io.files import make_folder, require_suffix
         nargs="?",
         help="folder of photographs with annotations.json; otherwise --images and --annotations",
     ),
-    arg("--images", type=Path, metavar="FOLDER", help="folder of photographs"),
-    arg(
+    folder_option("--images", "folder of photographs"),
+    file_option(
         "--annotations",
-        type=Path,
-        metavar="FILE",
-        help="JSON with the hands in the photographs (default: annotations.json in the folder)",
+        "JSON with the hands in the photographs (default: annotations.json in the folder)",
     ),
     arg(
         "--brightness",
@@ -36,19 +34,19 @@ from handcal.io.files import make_folder, require_suffix
         default=1.0,
         help="factor on the pixels' values",
     ),
-    arg(
+    value(
         "--hand-height",
-        type=number(float, 0.05, 1.0),
-        metavar="SHARE",
-        help="show each photograph in a grey 640x480 image, with its first hand of this height",
+        number(float, 0.05, 1.0),
+        "SHARE",
+        "show each photograph in a grey 640x480 image, with its first hand of this height",
     ),
     arg(
         "--glove",
         choices=("blue", "black"),
         help="recolour the hands of photographs on a white background",
     ),
-    arg("--sheet", type=Path, metavar="FILE", help="PNG with the worst failures"),
-    arg("--model", type=Path, metavar="FILE", help="ONNX model (default: the shipped one)"),
+    file_option("--sheet", "PNG with the worst failures"),
+    file_option("--model", "ONNX model (default: the shipped one)"),
     json=True,
 )
 def detector(arguments: argparse.Namespace) -> None:
@@ -106,8 +104,8 @@ def detector(arguments: argparse.Namespace) -> None:
         default="detector",
         help="hand to segment: where the detector sees one, or the nearest object by depth alone",
     ),
-    arg("--sheet", type=Path, metavar="FILE", help="PNG with all frames, masks and numbers"),
-    arg("--output", type=Path, metavar="FOLDER", help="folder for a report (default: none)"),
+    file_option("--sheet", "PNG with all frames, masks and numbers"),
+    folder_option("--output", "folder for a report (default: none)"),
     json=True,
 )
 def segmentation(arguments: argparse.Namespace) -> None:
@@ -157,13 +155,7 @@ def _cell(value: float | None, scale: float, digits: int) -> str:
 
 @command(
     arg("folder", type=Path, nargs="+", help="session folder, or a folder of sessions"),
-    arg(
-        "--output",
-        type=Path,
-        metavar="FOLDER",
-        default=Path("results/users"),
-        help="folder for the report",
-    ),
+    folder_option("--output", "folder for the report", default=Path("results/users")),
     json=True,
 )
 def users(arguments: argparse.Namespace) -> None:

@@ -135,7 +135,7 @@ _SESSION: Mapping[str, Entry] = {
         "Check every part of a session; exit code 1 if any is damaged, 2 if it is not a session.",
         "sessions",
     ),
-    "repair": Entry("Copy what is sound of a damaged session into a new one.", "sessions"),
+    "repair": Entry("Copy the sound parts of a damaged session into a new one.", "sessions"),
 }
 
 COMMANDS: Mapping[str, Entry] = {
@@ -159,7 +159,7 @@ COMMANDS: Mapping[str, Entry] = {
     ),
     "solve": Entry("Solve a stored session again; the session itself is not changed.", "sessions"),
     "prior": Entry(
-        "Show where wearers' eyes are, as learned from the finished sessions with one rig.",
+        "Show the prior of the eyes' positions learned from the finished sessions with one rig.",
         "sessions",
     ),
     "export": Entry(

@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from rich.markup import escape
 
 from handcal.cli.output import console, show_progress, table, until_interrupted
 from handcal.cli.run import LISTEN
-from handcal.cli.terminal import arg, command, fail, number
+from handcal.cli.terminal import arg, command, fail, file_option, number, value
 
-_KEYS = arg(
-    "--keys",
-    type=Path,
-    metavar="FILE",
-    help="file of the paired headsets (default: that of the desktop program)",
-)
+_KEYS = file_option("--keys", "file of the paired headsets (default: that of the desktop program)")
 
 
 @command(
     _KEYS,
     *LISTEN,
-    arg(
-        "--minutes",
-        type=number(float, 0.01, 10.0),
-        metavar="M",
-        default=10.0,
-        help="give up after this time",
-    ),
+    value("--minutes", number(float, 0.01, 10.0), "M", "give up after this time", default=10.0),
 )
 def pair(arguments: argparse.Namespace) -> None:
     """Pair a headset: show a QR code and a short code, and wait for the headset."""

@@ -24,7 +24,7 @@ from handcal.cli.boards import (
 )
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, show_progress, until_interrupted
-from handcal.cli.terminal import arg, command, fail, number
+from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
 from handcal.rig.camera import LENS_CHOICES
@@ -48,7 +48,7 @@ _CALIBRATION_OPTIONS = (
         help="lens model; auto: the one that best fits images not used to solve it",
     ),
     arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),
-    arg("--output", type=Path, metavar="FILE", help="file for the result (default: only print it)"),
+    file_option("--output", "file for the result (default: only print it)"),
     arg(
         "--format",
         choices=CALIBRATION_FORMATS,
@@ -60,16 +60,10 @@ _CALIBRATION_OPTIONS = (
 
 @command(
     *BOARD_OPTIONS,
-    arg("--pdf", type=Path, metavar="FILE", help="PDF at true size, with a ruler to check it"),
+    file_option("--pdf", "PDF at true size, with a ruler to check it"),
     arg("--paper", choices=tuple(PAPERS), default="a4", help="paper size of the PDF"),
-    arg("--png", type=Path, metavar="FILE", help="PNG for a screen"),
-    arg(
-        "--square-px",
-        type=number(int, 4, 2000),
-        metavar="PX",
-        default=100,
-        help="side of a square in the PNG",
-    ),
+    file_option("--png", "PNG for a screen"),
+    value("--square-px", number(int, 4, 2000), "PX", "side of a square in the PNG", default=100),
 )
 def board(arguments: argparse.Namespace) -> None:
     """Make a calibration board: a PDF at true size, or a PNG for a screen."""
@@ -101,19 +95,19 @@ def board(arguments: argparse.Namespace) -> None:
         metavar="SOURCE",
         help="the headset's camera, to capture pairs of images (default: single images)",
     ),
-    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the images"),
-    arg(
+    folder_option("--output", "folder for the images", required=True),
+    value(
         "--seconds",
-        type=number(float, 0.1, 3600.0),
-        metavar="S",
+        number(float, 0.1, 3600.0),
+        "S",
+        "stop after this time on the camera's clock",
         default=60.0,
-        help="stop after this time on the camera's clock",
     ),
-    arg(
+    value(
         "--most",
-        type=number(int, 1, MAX_VIEWS),
-        metavar="N",
-        help="stop after this many images (default: 25; with --grid, 5)",
+        number(int, 1, MAX_VIEWS),
+        "N",
+        "stop after this many images (default: 25; with --grid, 5)",
     ),
     arg(
         "--grid",
@@ -210,11 +204,9 @@ def camera(arguments: argparse.Namespace) -> None:
         required=True,
         help="images from the depth camera, or folders of images",
     ),
-    arg(
+    file_option(
         "--depth-intrinsics",
-        type=Path,
-        metavar="FILE",
-        help="known intrinsics, such as the camera's own (default: solved from the images)",
+        "known intrinsics, such as the camera's own (default: solved from the images)",
     ),
     arg(
         "--headset",
@@ -224,11 +216,9 @@ def camera(arguments: argparse.Namespace) -> None:
         required=True,
         help="images from the headset's camera, or folders of images",
     ),
-    arg(
+    file_option(
         "--headset-intrinsics",
-        type=Path,
-        metavar="FILE",
-        help="known intrinsics, such as the camera's own (default: solved from the images)",
+        "known intrinsics, such as the camera's own (default: solved from the images)",
     ),
     *_CALIBRATION_OPTIONS,
 )

@@ -18,7 +18,16 @@ from handcal.cli.boards import (
 )
 from handcal.cli.output import console
 from handcal.cli.rig_files import RIG_AND_OUTPUT, rig_or_example, write_rig_file
-from handcal.cli.terminal import arg, command, number, one_of
+from handcal.cli.terminal import (
+    arg,
+    command,
+    file_option,
+    flag,
+    folder_option,
+    number,
+    one_of,
+    value,
+)
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.types import EYES
@@ -40,7 +49,7 @@ _DISPLAY = arg(
 
 @command(
     _DISPLAY,
-    arg("--png", type=Path, metavar="FILE", required=True, help="image to write"),
+    file_option("--png", "image to write", required=True),
     GRID_OPTION,
 )
 def grid(arguments: argparse.Namespace) -> None:
@@ -59,7 +68,7 @@ def grid(arguments: argparse.Namespace) -> None:
 
 @command(
     _DISPLAY,
-    arg("--output", type=Path, metavar="FOLDER", required=True, help="folder for the patterns"),
+    folder_option("--output", "folder for the patterns", required=True),
 )
 def gray(arguments: argparse.Namespace) -> None:
     """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
@@ -71,41 +80,29 @@ def gray(arguments: argparse.Namespace) -> None:
     for name, pattern in made.items():
         write_png(arguments.output / f"{name}.png", pattern)
     console.print(
-        f"{arguments.output}: {len(made)} patterns; show each unscaled, and name the camera's "
-        "image of it alike",
+        f"{arguments.output}: {len(made)} patterns; show each unscaled, and give the camera's "
+        "image of it the same name",
         markup=False,
     )
 
 
 @command(
     arg("images", type=Path, nargs="+", help="images of the grid, or folders of images"),
-    arg(
+    flag(
         "--gray-code",
-        action="store_true",
-        help="the images are one folder with those of the Gray-code patterns, named alike (handcal "
-        "rig gray)",
+        "the images are one folder with those of the Gray-code patterns, with the same "
+        "names (handcal rig gray)",
     ),
     arg("--eye", choices=EYES, required=True, help="eye whose display is calibrated"),
-    arg(
-        "--camera-intrinsics",
-        type=Path,
-        metavar="FILE",
-        required=True,
-        help="intrinsics of the viewpoint camera",
-    ),
+    file_option("--camera-intrinsics", "intrinsics of the viewpoint camera", required=True),
     one_of(
-        arg(
+        file_option(
             "--stereo",
-            type=Path,
-            metavar="FILE",
-            help="pose of the viewpoint camera: JSON from 'handcal rig stereo' with the viewpoint "
+            "pose of the viewpoint camera: JSON from 'handcal rig stereo' with the viewpoint "
             "camera as its depth camera",
         ),
-        arg(
-            "--tracked",
-            type=Path,
-            metavar="FILE",
-            help="poses of the board in --board-images, as tracked by the headset: JSON",
+        file_option(
+            "--tracked", "poses of the board in --board-images, as tracked by the headset: JSON"
         ),
     ),
     arg(
@@ -117,32 +114,20 @@ def gray(arguments: argparse.Namespace) -> None:
         help="images of the tracked board, or folders of images",
     ),
     one_of(
-        arg(
-            "--distance-m",
-            type=_METRES,
-            metavar="M",
-            help="measured distance z(C0→S) of the virtual image",
-        ),
-        arg(
+        value("--distance-m", _METRES, "M", "measured distance z(C0→S) of the virtual image"),
+        value(
             "--square-arcmin",
-            type=number(float, 1.0, 10_000.0),
-            metavar="ARCMIN",
-            help="angle that a square of the grid subtends at --nominal-distance-m, to solve "
-            "z(C0→S)",
+            number(float, 1.0, 10_000.0),
+            "ARCMIN",
+            "angle that a square of the grid subtends at --nominal-distance-m, to solve z(C0→S)",
         ),
     ),
-    arg(
-        "--nominal-distance-m",
-        type=_METRES,
-        metavar="M",
-        default=2.0,
-        help="nominal distance of the virtual image",
+    value(
+        "--nominal-distance-m", _METRES, "M", "nominal distance of the virtual image", default=2.0
     ),
-    arg(
+    file_option(
         "--view",
-        type=Path,
-        metavar="FILE",
-        help="T_V_H, from the headset rig to this eye's rendering camera as the headset reports "
+        "T_V_H, from the headset rig to this eye's rendering camera as the headset reports "
         "it: 4 rows of 4 numbers, metres, x right, y down, z forward (default: as in --rig)",
     ),
     arg("--drop", nargs="+", default=(), metavar="NAME", help="images to leave out"),

@@ -12,7 +12,7 @@ from handcal.cli.boards import BOARD_OPTIONS, board_of, show_verdict
 from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN
-from handcal.cli.terminal import arg, command, patience
+from handcal.cli.terminal import arg, command, file_option, flag, patience
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
 
@@ -21,50 +21,32 @@ if TYPE_CHECKING:
     from handcal.rig_types import Rig
 
 RIG_AND_OUTPUT = (
-    arg(
-        "--rig",
-        type=Path,
-        metavar="FILE",
-        help="rig file to start from (default: the shipped example)",
-    ),
-    arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+    file_option("--rig", "rig file to start from (default: the shipped example)"),
+    file_option("--output", "rig file to write", required=True),
 )
 
 
 @command(
-    arg(
-        "--stereo",
-        type=Path,
-        metavar="FILE",
-        help="JSON from 'handcal rig stereo'",
-    ),
+    file_option("--stereo", "JSON from 'handcal rig stereo'"),
     arg(
         "--factory",
         metavar="SOURCE",
         help="in place of --stereo: hololens2:HOST, a headset that knows its own depth camera",
     ),
-    arg(
+    flag(
         "--headset",
-        action="store_true",
-        help="with --factory: the app's poses are not of the headset's rig node; wait for the app, "
+        "with --factory: the app's poses are not of the headset's rig node; wait for the app, "
         "and measure the camera's pose against them while the wearer looks around",
     ),
     *LISTEN,
     KEYS,
     patience("until the headset connects"),
-    arg(
+    file_option(
         "--depth-intrinsics",
-        type=Path,
-        metavar="FILE",
-        help="intrinsics of the depth imager, if the stereo images are the colour imager's; "
+        "intrinsics of the depth imager, if the stereo images are the colour imager's; "
         "depth-imager.json of 'handcal rig take' also holds the camera's serial number",
     ),
-    arg(
-        "--depth-to-color",
-        type=Path,
-        metavar="FILE",
-        help="pose from the depth to the colour imager, in the same case",
-    ),
+    file_option("--depth-to-color", "pose from the depth to the colour imager, in the same case"),
     arg("--name", help="name of the rig (default: unchanged)"),
     *RIG_AND_OUTPUT,
 )
@@ -120,11 +102,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
         "source",
         help="a recording of the board with depth and colour, realsense, or hololens2:HOST",
     ),
-    arg(
-        "--stills",
-        action="store_true",
-        help="every frame of the recording is a still image: use all that show the board",
-    ),
+    flag("--stills", "every frame of the recording is a still image: use all that show the board"),
     *RIG_AND_OUTPUT,
     *BOARD_OPTIONS,
     *REALSENSE_OPTIONS,
@@ -201,7 +179,7 @@ def compare(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("input", type=Path, help="rig file"),
-    arg("--output", type=Path, metavar="FILE", required=True, help="rig file to write"),
+    file_option("--output", "rig file to write", required=True),
     arg(
         "--camera",
         metavar="SOURCE",

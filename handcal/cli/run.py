@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING
 
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
-from handcal.cli.terminal import arg, command, fail, number, patience, seed
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    flag,
+    folder_option,
+    number,
+    patience,
+    seed,
+    value,
+)
 from handcal.errors import LinkError
 from handcal.io.files import make_folder
 
@@ -20,22 +31,20 @@ if TYPE_CHECKING:
 
 LISTEN = (
     arg("--host", default="0.0.0.0", metavar="ADDRESS", help="address to listen on"),  # noqa: S104
-    arg("--port", type=number(int, 1, 65535), metavar="N", default=47800, help="UDP port"),
+    value("--port", number(int, 1, 65535), "N", "UDP port", default=47800),
 )
-KEYS = arg(
+KEYS = file_option(
     "--keys",
-    type=Path,
-    metavar="FILE",
-    help="file of the paired headsets (default: the key in the environment variable "
+    "file of the paired headsets (default: the key in the environment variable "
     "HANDCAL_PAIRING_KEY, else the file of the desktop program)",
 )
 ALIGNMENT_OPTIONS = (
-    arg(
+    value(
         "--alignments",
-        type=number(int, 1, 20),
+        number(int, 1, 20),
+        "K",
+        "number of alignments; with --eyes each, of each eye",
         default=1,
-        metavar="K",
-        help="number of alignments; with --eyes each, of each eye",
     ),
     arg(
         "--eyes",
@@ -63,7 +72,7 @@ _SHARE = number(float, 0.0, 1.0)
         ":SERIAL; simulator, with the virtual headset; or the path of a recording, which is played "
         "in a loop",
     ),
-    arg("--rig", type=Path, metavar="FILE", required=True, help="rig file of this headset"),
+    file_option("--rig", "rig file of this headset", required=True),
     arg(
         "--plan",
         choices=("paper", "recommended"),
@@ -73,31 +82,13 @@ _SHARE = number(float, 0.0, 1.0)
     ),
     *ALIGNMENT_OPTIONS,
     arg("--wearer", default="", metavar="NAME", help="name or code of the wearer"),
-    arg(
-        "--output",
-        type=Path,
-        metavar="FOLDER",
-        default=Path("sessions"),
-        help="folder in which the session is created",
-    ),
+    folder_option("--output", "folder in which the session is created", default=Path("sessions")),
     *LISTEN,
     KEYS,
     patience("for the wearer and the headset to do one step"),
     seed("the simulated wearer"),
-    arg(
-        "--loss",
-        type=_SHARE,
-        metavar="P",
-        default=0.0,
-        help="virtual headset: share of datagrams lost",
-    ),
-    arg(
-        "--reorder",
-        type=_SHARE,
-        metavar="P",
-        default=0.0,
-        help="virtual headset: share of datagrams reordered",
-    ),
+    value("--loss", _SHARE, "P", "virtual headset: share of datagrams lost", default=0.0),
+    value("--reorder", _SHARE, "P", "virtual headset: share of datagrams reordered", default=0.0),
     arg(
         "--slicer",
         nargs="?",
@@ -105,7 +96,7 @@ _SHARE = number(float, 0.0, 1.0)
         metavar="HOST:PORT",
         help="serve OpenIGTLink for 3D Slicer (default address: 127.0.0.1:18944)",
     ),
-    arg("--lsl", action="store_true", help="send the events to the Lab Streaming Layer"),
+    flag("--lsl", "send the events to the Lab Streaming Layer"),
     *REALSENSE_OPTIONS,
     json=True,
 )

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.terminal import arg, command, fail, number
+from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
 from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
 from handcal.types import METHODS
@@ -19,18 +19,18 @@ _METRES = number(float, 1e-3, 1e6)
 @command(
     arg("session", type=Path, help="session folder"),
     arg("--method", choices=METHODS, help="solver (default: the session's own)"),
-    arg(
+    value(
         "--eye-distance-mm",
-        type=number(float, 45.0, 85.0),
-        metavar="MM",
-        help="the wearer's eye distance (default: the session's own)",
+        number(float, 45.0, 85.0),
+        "MM",
+        "the wearer's eye distance (default: the session's own)",
     ),
-    arg(
+    value(
         "--eye-distance-sigma-mm",
-        type=number(float, 0.01, 20.0),
-        metavar="MM",
+        number(float, 0.01, 20.0),
+        "MM",
+        "its standard deviation",
         default=1.0,
-        help="its standard deviation",
     ),
     json=True,
 )
@@ -73,12 +73,7 @@ def solve(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("session", type=Path, help="session folder"),
-    arg(
-        "--output",
-        type=Path,
-        metavar="FOLDER",
-        help="folder for the files (default: results/export/NAME)",
-    ),
+    folder_option("--output", "folder for the files (default: results/export/NAME)"),
     arg(
         "--format",
         action="append",
@@ -86,20 +81,8 @@ def solve(arguments: argparse.Namespace) -> None:
         help="format to write; may be repeated (default: all but unity, openxr, northstar and "
         "slicer)",
     ),
-    arg(
-        "--near-m",
-        type=_METRES,
-        metavar="M",
-        default=0.1,
-        help="near clipping plane for OpenGL, metres",
-    ),
-    arg(
-        "--far-m",
-        type=_METRES,
-        metavar="M",
-        default=100.0,
-        help="far clipping plane for OpenGL, metres",
-    ),
+    value("--near-m", _METRES, "M", "near clipping plane for OpenGL, metres", default=0.1),
+    value("--far-m", _METRES, "M", "far clipping plane for OpenGL, metres", default=100.0),
 )
 def export(arguments: argparse.Namespace) -> None:
     """Export a session: report, tables, calibration, clouds, and the session as one file."""
@@ -140,11 +123,11 @@ def check(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("session", type=Path, help="session folder; it is not changed"),
-    arg("--output", type=Path, metavar="FOLDER", required=True, help="new folder for the copy"),
-    arg("--rig", type=Path, metavar="FILE", help="rig file, if the session's own is damaged"),
+    folder_option("--output", "new folder for the copy", required=True),
+    file_option("--rig", "rig file, if the session's own is damaged"),
 )
 def repair(arguments: argparse.Namespace) -> None:
-    """Copy what is sound of a damaged session into a new one."""
+    """Copy the sound parts of a damaged session into a new one."""
     from handcal.rig.rig_file import read_rig
     from handcal.session.repair import repair_session
 
@@ -164,18 +147,10 @@ def _say_what_is_left_out(record: SessionRecord) -> None:
 
 @command(
     arg("session", type=Path, help="session folder"),
-    arg(
-        "--alignment",
-        type=number(int, 1, 1000),
-        metavar="N",
-        help="the alignment shown first (default: the last)",
+    value(
+        "--alignment", number(int, 1, 1000), "N", "the alignment shown first (default: the last)"
     ),
-    arg(
-        "--picture",
-        type=Path,
-        metavar="FILE",
-        help="write a .png file instead of opening a window; needs no display",
-    ),
+    file_option("--picture", "write a .png file instead of opening a window; needs no display"),
 )
 def inspect(arguments: argparse.Namespace) -> None:
     """Show a session's clouds, residuals, eyes and displays in a 3D window."""
@@ -189,11 +164,11 @@ def inspect(arguments: argparse.Namespace) -> None:
 
 @command(
     arg("folder", type=Path, help="folder of sessions"),
-    arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)"),
+    file_option("--rig", "rig file (default: the shipped example)"),
     json=True,
 )
 def prior(arguments: argparse.Namespace) -> None:
-    """Show where wearers' eyes are, as learned from the finished sessions with one rig."""
+    """Show the prior of the eyes' positions learned from the finished sessions with one rig."""
     from dataclasses import asdict
 
     import numpy as np

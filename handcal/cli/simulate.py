@@ -9,7 +9,17 @@ from typing import Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.run import ALIGNMENT_OPTIONS
-from handcal.cli.terminal import arg, command, fail, number, seed
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    flag,
+    folder_option,
+    number,
+    seed,
+    value,
+)
 from handcal.io.files import make_folder
 from handcal.station.faults import Fault
 
@@ -18,23 +28,19 @@ _CONTRADICTED = 3
 _MAX_CODE = 1000
 _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
-_RIG = arg("--rig", type=Path, metavar="FILE", help="rig file (default: the shipped example)")
+_RIG = file_option("--rig", "rig file (default: the shipped example)")
 _HAND = arg(
     "--hand", choices=("left", "right"), help="the raised hand (default: drawn from the seed)"
 )
 _LINK = (
-    arg("--loss", type=_SHARE, metavar="P", default=0.0, help="share of datagrams lost"),
-    arg("--reorder", type=_SHARE, metavar="P", default=0.0, help="share of datagrams reordered"),
+    value("--loss", _SHARE, "P", "share of datagrams lost", default=0.0),
+    value("--reorder", _SHARE, "P", "share of datagrams reordered", default=0.0),
 )
 
 
 @command(
-    arg(
-        "--output",
-        type=Path,
-        metavar="FOLDER",
-        default=Path("results/demo"),
-        help="folder in which the session is created",
+    folder_option(
+        "--output", "folder in which the session is created", default=Path("results/demo")
     ),
     seed("the wearer, hand, room and noise"),
     *ALIGNMENT_OPTIONS,
@@ -43,13 +49,9 @@ _LINK = (
         choices=("paper", "recommended"),
         default="paper",
         help="the paper's alignments, or the recommended plan: cursors placed by the program, then "
-        "each eye verified",
+        "a verification of each eye",
     ),
-    arg(
-        "--no-verify",
-        action="store_true",
-        help="end the recommended plan without verifying the eyes",
-    ),
+    flag("--no-verify", "end the recommended plan without verifying the eyes"),
     arg(
         "--from",
         dest="former",
@@ -57,24 +59,15 @@ _LINK = (
         metavar="SESSION",
         help="start from a stored session of the same seed: verify it, and align again if needed",
     ),
-    arg(
-        "--slipped",
-        action="store_true",
-        help="with --from: the headset has slipped since that session",
-    ),
+    flag("--slipped", "with --from: the headset has slipped since that session"),
     _HAND,
     *_LINK,
     _RIG,
-    arg(
-        "--worn-rig",
-        type=Path,
-        metavar="FILE",
-        help="true rig of the simulated headset (default: the same as --rig)",
-    ),
+    file_option("--worn-rig", "true rig of the simulated headset (default: the same as --rig)"),
     arg(
         "--fault",
         choices=FAULTS,
-        help="a fault that must not be accepted; depth-bias is seen if the rig has a depth check",
+        help="a fault that must not be accepted; depth-bias needs a rig with a depth check",
     ),
     arg(
         "--eye-distance",
@@ -148,70 +141,44 @@ def _say_contradictions(result: dict[str, Any]) -> None:
 
 
 @command(
-    arg("--port", type=_PORT, metavar="N", help="port on which the PC listens"),
-    arg(
-        "--pair",
-        action="store_true",
-        help="pair first: type the text below the QR code, or with --port the 8 digits",
-    ),
-    arg(
+    value("--port", _PORT, "N", "port on which the PC listens"),
+    flag("--pair", "pair first: type the text below the QR code, or with --port the 8 digits"),
+    value(
         "--scene-port",
-        type=_PORT,
-        metavar="N",
-        help="port of a simulated camera on this computer (default: no camera sees the wearer)",
+        _PORT,
+        "N",
+        "port of a simulated camera on this computer (default: no camera sees the wearer)",
     ),
     arg("--host", default="127.0.0.1", help="address of the PC"),
-    arg(
-        "--key-file",
-        type=Path,
-        metavar="FILE",
-        help="pairing key (default: the environment variable HANDCAL_PAIRING_KEY)",
+    file_option(
+        "--key-file", "pairing key (default: the environment variable HANDCAL_PAIRING_KEY)"
     ),
     _RIG,
-    arg(
-        "--worn-rig",
-        type=Path,
-        metavar="FILE",
-        help="true rig of the headset (default: the same as --rig)",
-    ),
+    file_option("--worn-rig", "true rig of the headset (default: the same as --rig)"),
     seed("the wearer"),
     *_LINK,
-    arg("--duplicate", type=_SHARE, metavar="P", default=0.0, help="share of datagrams duplicated"),
-    arg(
-        "--delay-ms",
-        type=number(float, 0.0, 10_000.0),
-        metavar="MS",
-        default=0.0,
-        help="delay of every datagram",
-    ),
-    arg(
+    value("--duplicate", _SHARE, "P", "share of datagrams duplicated", default=0.0),
+    value("--delay-ms", number(float, 0.0, 10_000.0), "MS", "delay of every datagram", default=0.0),
+    value(
         "--clock-offset-ms",
-        type=number(float, -1e9, 1e9),
-        metavar="MS",
+        number(float, -1e9, 1e9),
+        "MS",
+        "headset's clock minus the PC's",
         default=12345.0,
-        help="headset's clock minus the PC's",
     ),
-    arg(
+    value(
         "--duration-s",
-        type=number(float, 0.0, 1e6),
-        metavar="S",
-        help="stop after this time (default: run until terminated)",
+        number(float, 0.0, 1e6),
+        "S",
+        "stop after this time (default: run until terminated)",
     ),
-    arg(
-        "--lose-start",
-        action="store_true",
-        help="fault: the first projections never arrive",
-    ),
-    arg(
-        "--stale",
-        action="store_true",
-        help="fault: keep drawing with the projections of the wearer before",
-    ),
-    arg(
+    flag("--lose-start", "fault: the first projections never arrive"),
+    flag("--stale", "fault: keep drawing with the projections of the wearer before"),
+    value(
         "--eye-distance-mm",
-        type=number(float, 45.0, 85.0),
-        metavar="MM",
-        help="the wearer's eye distance, as the headset reports it (default: not measured)",
+        number(float, 45.0, 85.0),
+        "MM",
+        "the wearer's eye distance, as the headset reports it (default: not measured)",
     ),
     arg(
         "--slip-mm",
@@ -222,11 +189,7 @@ def _say_contradictions(result: dict[str, Any]) -> None:
         help="movement of the headset on the head, from the seed's position",
     ),
     _HAND,
-    arg(
-        "--as-device",
-        action="store_true",
-        help="no simulated wearer: print what is shown, confirm on Enter",
-    ),
+    flag("--as-device", "no simulated wearer: print what is shown, confirm on Enter"),
 )
 def headset(arguments: argparse.Namespace) -> None:
     """Run a virtual headset with a simulated wearer, connected by the real protocol."""

@@ -41,14 +41,35 @@ class Command(NamedTuple):
 def command(*options: Option, json: bool = False) -> Callable[[Run], Command]:
     """Make a function a command with these options; with `json`, also ``--json``."""
     if json:
-        save = arg("--json", type=Path, metavar="FILE", help="also write the results as JSON")
-        options = (*options, save)
+        options = (*options, file_option("--json", "also write the results as JSON"))
     return lambda run: Command(run, options)
 
 
 def arg(*names: str, **settings: Any) -> Option:
     """Return an argument of a command; takes the arguments of argparse's ``add_argument``."""
     return lambda parser: parser.add_argument(*names, **settings)
+
+
+def file_option(name: str, purpose: str, **settings: Any) -> Option:
+    """Return an option that takes a file; the settings are those of `arg`."""
+    return arg(name, type=Path, metavar="FILE", help=purpose, **settings)
+
+
+def folder_option(name: str, purpose: str, **settings: Any) -> Option:
+    """Return an option that takes a folder; the settings are those of `arg`."""
+    return arg(name, type=Path, metavar="FOLDER", help=purpose, **settings)
+
+
+def flag(name: str, purpose: str) -> Option:
+    """Return an option that is either given or not."""
+    return arg(name, action="store_true", help=purpose)
+
+
+def value(
+    name: str, convert: Callable[[str], Any], metavar: str, purpose: str, **settings: Any
+) -> Option:
+    """Return an option with a value to convert from text; the settings are those of `arg`."""
+    return arg(name, type=convert, metavar=metavar, help=purpose, **settings)
 
 
 def one_of(*options: Option) -> Option:
@@ -162,11 +183,10 @@ def seed(of: str = "") -> Option:
     """Return the option ``--seed``; `of` names what is random, if not everything."""
     help_text = f"random seed of {of}" if of else "random seed"
     limits = number(int, 0, 2**32 - 1)
-    return arg("--seed", type=limits, metavar="N", default=1, help=help_text)
+    return value("--seed", limits, "N", help_text, default=1)
 
 
 def patience(until: str, default_s: float = 120.0) -> Option:
     """Return the option ``--patience-s``; `until` continues "longest time"."""
     limits = number(float, 1.0, 86_400.0)
-    help_text = f"longest time {until}"
-    return arg("--patience-s", type=limits, metavar="S", default=default_s, help=help_text)
+    return value("--patience-s", limits, "S", f"longest time {until}", default=default_s)

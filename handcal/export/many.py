@@ -14,7 +14,7 @@ from handcal.session.session import Session
 def export_sessions(
     paths: Sequence[Path], folder: Path, settings: ExportSettings, progress: Progress = Progress()
 ) -> tuple[Path, ...]:
-    """Export sessions into folders of their names, and return the files.
+    """Export sessions, each into a folder of its name, and return the files.
 
     A session that cannot be exported does not keep the others from it.
 

@@ -17,7 +17,7 @@ def outline_marks(outline_m: Float64, is_cut: Bool) -> Float64:
     """Return points that thicken an outline at the finger tips and at the ends of the wrist.
 
     They tell the wearer where the hand is to match its cursor, so that a turned hand is balanced
-    between its ends. They lie on both sides of the outline alike, so they do not displace it.
+    between its ends. They extend equally to both sides of the outline, so they do not displace it.
 
     Parameters
     ----------

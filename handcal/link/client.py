@@ -180,7 +180,7 @@ class HeadsetClient(Endpoint):
     def send_pose(self, T_W_H: Float64, t_headset_ns: int) -> None:
         """Send the headset's pose at a time of its own clock.
 
-        The time is the one that the pose is for: of a pose predicted for display, that of display.
+        The time is the one that the pose is for; for a predicted pose, the time of display.
 
         Raises
         ------

@@ -36,8 +36,8 @@ class ClockEstimator:
     delay beyond the shortest.
     """
 
-    def __init__(self, samples: int = 300) -> None:
-        self._samples: deque[tuple[int, int, int]] = deque(maxlen=samples)
+    def __init__(self) -> None:
+        self._samples: deque[tuple[int, int, int]] = deque(maxlen=300)
         self.fit: ClockFit | None = None
 
     def add(

@@ -66,23 +66,6 @@ def qr_matrix(text: str) -> tuple[tuple[bool, ...], ...]:
     return tuple(tuple(bool(module) for module in row) for row in rows)
 
 
-def qr_svg(text: str) -> str:
-    """Return the QR code of a text as SVG, black on white, one unit for each module."""
-    rows = qr_matrix(text)
-    dark = "".join(
-        f"M{x} {y}h1v1h-1z"
-        for y, row in enumerate(rows)
-        for x, is_dark in enumerate(row)
-        if is_dark
-    )
-    size = len(rows)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size} {size}" '
-        f'shape-rendering="crispEdges"><path fill="#fff" d="M0 0h{size}v{size}H0z"/>'
-        f'<path d="{dark}"/></svg>'
-    )
-
-
 def qr_lines(text: str) -> list[str]:
     """Return the QR code of a text as lines of half blocks, to print black on white."""
     rows = [*qr_matrix(text)]

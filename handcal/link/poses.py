@@ -14,6 +14,8 @@ from handcal.types import Float64
 SLOW_M = 0.005
 SLOW_RAD = 0.01
 """A head that has moved and rotated less than this across a gap is slow."""
+_MAX_GAP_NS, _MAX_SLOW_GAP_NS = 50_000_000, 250_000_000
+"""Longest gap between two poses that is interpolated, and longest of a slow head."""
 
 
 class PoseBuffer:
@@ -23,16 +25,10 @@ class PoseBuffer:
     ----------
     capacity : int
         Number of poses stored.
-    max_gap_s, max_slow_gap_s : float
-        Longest gap between two poses that is interpolated, and longest of a slow head.
     """
 
-    def __init__(
-        self, capacity: int = 1000, max_gap_s: float = 0.05, max_slow_gap_s: float = 0.25
-    ) -> None:
+    def __init__(self, capacity: int = 1000) -> None:
         self._capacity = capacity
-        self._max_gap_ns = round(max_gap_s * 1e9)
-        self._max_slow_gap_ns = round(max_slow_gap_s * 1e9)
         self._times_ns: list[int] = []
         self._poses: list[Float64] = []
 
@@ -71,9 +67,9 @@ class PoseBuffer:
             raise PoseError(f"the time lies {late_ms:.0f} ms before the oldest pose kept")
         before, after = self._poses[index - 1 : index + 1]
         gap_ns = times[index] - times[index - 1]
-        limit_ns = self._max_gap_ns
+        limit_ns = _MAX_GAP_NS
         if gap_ns > limit_ns and _is_slow(before, after):
-            limit_ns = self._max_slow_gap_ns
+            limit_ns = _MAX_SLOW_GAP_NS
         if gap_ns > limit_ns:
             raise PoseError(
                 f"the headset's poses have a gap of {gap_ns / 1e6:.0f} ms at this time; "

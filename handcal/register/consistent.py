@@ -36,7 +36,7 @@ from handcal.types import Bool, EyeShift, Float64
 _POINTS = 1000
 # Number of points at which the distance between neighbours of a whole cloud is measured.
 _SPACING_POINTS = 200
-# First a coarse registration, to cut both clouds alike, then a fine one.
+# First a coarse registration, to cut both clouds at the same place, then a fine one.
 _COARSE = RigidSettings(tolerance_m=1e-3)
 _FINE = RigidSettings()
 # Standard deviation of the hand's apparent change of size between cursor and alignment.
@@ -168,7 +168,7 @@ def fit_match(
     gap_m, index, kept = match.pairs
     history = [float(np.mean(gap_m[kept] ** 2))]
     inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
-    # All points of clouds that hold different points were moved alike: fewer say as much.
+    # All points of clouds that hold different points were moved by one motion: fewer say as much.
     hand_m = match.hand_m[kept] if match.same_points else match.thinned_m
     paired = transform(T_E, hand_m)
     R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))

@@ -1,4 +1,4 @@
-"""The prior on where a wearer's eyes are, as default and as learned from earlier sessions.
+"""The prior of a wearer's eye positions: the default, or one learned from earlier sessions.
 
 [φ_left; φ_right] is Gaussian. By default its mean is zero, each φ lies in the eye box, and the two
 eyes differ little. A lab's finished sessions with one rig show more: how far its headset sits from

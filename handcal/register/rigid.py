@@ -28,7 +28,7 @@ _PATCH_M = 0.022
 # Unknown place of a patch of outline, in distances between the points of both clouds: the outline
 # is known no better than it is sampled, and edges grow fat.
 _OUTLINE_GAPS = 0.1
-# After this many steps they become shorter, so that pairs that change to and fro come to rest.
+# After this many steps they become shorter, so that pairs that alternate come to rest.
 _FULL_STEPS = 12
 # Each step is about a quarter of the one before, as the pairs slide. The last one is made longer by
 # what is left of that geometric series, which saves the steps that would follow.

@@ -3,8 +3,8 @@
 After the rigid registration, what is left is noise, which changes from point to point, and the
 change of shape, which changes from finger to finger. The second is found as a smooth displacement
 of the cursor: one vector at each of some 50 nodes, 18 mm apart, with a prior that neighbours move
-alike (as in embedded deformation, Sumner, Schmid & Pauly 2007, without rotations). A further rigid
-motion of the nodes is no change of shape and is taken out.
+together (as in embedded deformation, Sumner, Schmid & Pauly 2007, without rotations). A further
+rigid motion of the nodes is no change of shape and is removed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _NODE_SPACING_M = 0.018
 _NODE_CUBE_M = 0.030
 # Each point moves with the mean of this many nodes, weighted by their distance.
 _NODES_PER_POINT = 4
-# Weight of the prior that neighbouring nodes move alike, against the pairs of one node.
+# Weight of the prior that neighbouring nodes move together, against the pairs of one node.
 _STIFFNESS = 0.1
 _STEPS = 2
 # Variance of the nodes over that of independent rows. Fitted to disjoint samples of real frames and
@@ -114,7 +114,7 @@ def measure_shape_change(
     left_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - before_m
     variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
     # The trace of M⁻¹ (M - P) M⁻¹ with the normal matrix M and its part P from the prior, which is
-    # alike for each coordinate.
+    # the same for each coordinate.
     inverse = _inverse(factor)
     of_node = inverse.reshape(count, -1)
     scatter = max(np.trace(inverse) - np.vdot(of_node, prior @ of_node), 0.0)
@@ -196,7 +196,7 @@ def _inverse(factor: Float64) -> Float64:
 def change_text(change: ShapeChange, R_D: Float64) -> str:
     """Say in a few words where the hand's shape differs most, without a full stop.
 
-    Parts of the hand are told by their place in its outline alone, so "fingers" are not numbered,
+    Parts of the hand are told only by their place in its outline, so "fingers" are not numbered,
     and a folded thumb is not told from the palm.
 
     Parameters

@@ -6,7 +6,7 @@ sees, too. The depth camera's picture gives the place of the board and, with the
 the camera's own place φ. The pixels at which the rig draws the board's corners for an eye at φ are
 compared with those at which the camera sees them. Nothing is fitted.
 
-A depth camera that has only shifted moves φ and the board alike. What is drawn then moves by the
+A depth camera that has only shifted moves φ and the board equally. What is drawn then moves by the
 shift divided by the virtual image's distance, 1.7′ for 1 mm at 2 m, at every distance of the board,
 as with a rotated camera. A wearer's calibration compensates most of it. Poses of the board tracked
 by the headset distinguish a shift from a rotation, and measure it to fractions of a millimetre.

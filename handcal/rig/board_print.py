@@ -51,7 +51,8 @@ def write_board_pdf(path: Path, board: Board, paper: Paper = "a4") -> None:
     FileError
         If `path` does not end in ``.pdf``, or cannot be written.
     """
-    write_page(path, _size_m(board), black_rectangles_m(board), _caption(board), paper)
+    size_m = np.array(board.squares) * board.square_m
+    write_page(path, size_m, black_rectangles_m(board), _caption(board), paper)
 
 
 def black_rectangles_m(board: Board) -> Float64:
@@ -99,10 +100,6 @@ def marker_cells_m(
         ends = np.flatnonzero(np.diff(np.concatenate([[255], line, [255]]).astype(int)))
         cells += [[start, row, end, row + 1] for start, end in ends.reshape(-1, 2)]
     return np.tile(corner_m, 2) + np.array(cells) * side_m / across
-
-
-def _size_m(board: Board) -> Float64:
-    return np.array(board.squares) * board.square_m
 
 
 def _caption(board: Board) -> str:

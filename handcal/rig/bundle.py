@@ -128,7 +128,7 @@ def foreseen(
     Returns
     -------
     information : (F, P, P) float64
-        Of each frame by itself, about the shared parameters, with 1 px of noise.
+        Of each frame on its own, about the shared parameters, with 1 px of noise.
     seen_share : (F, C) float64
         Share of the corners that each camera has in its image.
     """

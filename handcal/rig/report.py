@@ -162,7 +162,7 @@ def _seen_by_depth_camera(rig: Rig, display: EyeDisplay) -> float:
 
 
 def depth_finding(check: DepthCheck | None) -> RigFinding:
-    """Return the largest bias of depth where hands are held; it is fine if it is surely small."""
+    """Return the largest bias of depth where hands are held; it is fine if certainly small."""
     what = "Depth check"
     if check is None:
         return _not_told(what)

@@ -1,6 +1,6 @@
 """The depth camera's pose in the headset's, from pairs of views of one board (paper: 0.52 px).
 
-Each pair by itself gives the pose; the one nearest to the others starts a bundle adjustment.
+Each pair alone gives the pose; the one nearest to the others starts a bundle adjustment.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ _MIN_SHARED_CORNERS = 8
 # A single good pair gives the distance of the cameras to a few millimetres.
 _DISAGREE_M = 0.02
 _DISAGREE_RAD = 0.1
-# A pair's residual is more than this, and this times that of its two images each by itself.
+# A pair's residual is more than this, and this times that of its two images solved separately.
 _APART_PX, _APART_TIMES = 0.2, 1.5
 _MAX_SHIFT = 5
 
@@ -38,7 +38,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alone:
-    """The board's pose in each image by itself."""
+    """The board's pose in each image, solved separately."""
 
     T_D_B: Float64
     T_H_B: Float64
@@ -102,7 +102,7 @@ def check_sizes(both: Mapping[str, Pair], depth: Camera | None, headset: Camera 
 def each_alone(
     both: Mapping[str, Pair], depth: Camera, headset: Camera, start: Alone | None = None
 ) -> Alone:
-    """Solve the board's pose in each image by itself.
+    """Solve the board's pose in each image separately.
 
     Parameters
     ----------

@@ -365,7 +365,7 @@ def _reach(seen: BoardView) -> float:
 
 
 def _alike_beside(seen: BoardView, off_px: Float64) -> float:
-    """Return the correlation of residuals between nearest corners: 1 if alike, 0 if by chance."""
+    """Return the correlation of residuals between nearest corners: 1 if equal, 0 if by chance."""
     beside = seen.beside[:, 0]
     square = float(np.sum(off_px**2))
     return float(np.sum(off_px * off_px[beside])) / square if square > 0 else 0.0

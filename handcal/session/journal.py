@@ -231,11 +231,7 @@ class JournalWriter:
 
 
 def _ending(content: bytes) -> bytes:
-    return b', "sha256": "%s"}\n' % _checksum(content).encode()
-
-
-def _checksum(content: bytes) -> str:
-    return _sha256(content)[:_CHECKSUM_DIGITS]
+    return b', "sha256": "%s"}\n' % _sha256(content)[:_CHECKSUM_DIGITS].encode()
 
 
 def _sha256(content: bytes) -> str:

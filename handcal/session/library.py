@@ -68,7 +68,7 @@ class LibraryEntry:
     """Mean error of the trials, each trial counting once."""
     is_finished: bool = False
     damaged: int = 0
-    """Damaged parts of the journal, and alignments or a rig file that are not those it holds."""
+    """Damaged parts of the journal, and alignments or a rig file other than those it records."""
 
 
 def read_library(
@@ -136,7 +136,7 @@ def restore_session(path: Path) -> Path:
 
 
 def deleted_sessions(folder: Path) -> tuple[Path, ...]:
-    """Return the deleted sessions of a folder, the one deleted last at the end."""
+    """Return the deleted sessions of a folder, the most recently deleted one last."""
     found = [journal.parent for journal in (folder / DELETED).glob(f"*/{JOURNAL}")]
     return tuple(sorted(found, key=lambda path: (path.stat().st_ctime_ns, path.name)))
 

@@ -306,7 +306,7 @@ def _sound_trials(
     events: Sequence[Event],
     damaged: list[Damage],
 ) -> Mapping[int, Trial]:
-    """Return those of the trials whose errors are those of their φ."""
+    """Return the trials whose stored errors agree with their φ."""
     known = {*before.trials, *before.deleted_trials} if before else set()
     sound = {}
     for number, trial in trials.items():

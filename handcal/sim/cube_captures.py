@@ -235,7 +235,7 @@ class _Studio:
                 T_D_T = cube_pose(find_cube(image, settings.cube), settings.cube, depth_camera)
                 return T_E_T, self._T_E_D @ T_D_T
         raise CubeError(
-            "the cube is not seen whole on the display and by the cameras: use a smaller one"
+            "part of the cube is off the display or out of a camera's view: use a smaller one"
         )
 
 

@@ -26,7 +26,7 @@ from handcal.types import EYES, Alignment, Eye, Float64
 KEEP_PROMPT = "Keep your hand up."
 """Shown if the next cursor or verification follows at once."""
 # The prompt says what to balance when the hand is turned.
-_MOVE = "Move your hand under the cursor, finger tips and wrist alike, then confirm."
+_MOVE = "Move your hand under the cursor, both finger tips and wrist, then confirm."
 ADVISE_EVERY_NS = 1_000_000_000
 """Least time between two pieces of advice, so that each can be read."""
 # The advice does not come and go at its limit.

@@ -28,7 +28,7 @@ from handcal.link.shapes import Shape
 from handcal.progress import Progress
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_file import read_cube
-from handcal.rig.cube_track import CubeFilter, CubeTrackSettings, TrackedCube, cube_corners_m
+from handcal.rig.cube_track import CubeFilter, TrackedCube, cube_corners_m
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
 from handcal.sim.cube_bench import simulated_wearer
@@ -52,7 +52,6 @@ class CubeTracker:
     T_H_D : (4, 4) float64
     pose_at_host_ns : callable
         Returns T_W_H (4, 4) at a time of the host's clock; raises PosePendingError or PoseError.
-    settings : CubeTrackSettings, optional
 
     Attributes
     ----------
@@ -70,7 +69,6 @@ class CubeTracker:
         cube: Cube,
         T_H_D: Float64,
         pose_at_host_ns: Callable[[int], Float64],
-        settings: CubeTrackSettings | None = None,
     ) -> None:
         self.cube = cube
         self.problem = ""
@@ -79,7 +77,7 @@ class CubeTracker:
         self._camera = camera
         self._T_H_D = T_H_D
         self._pose_at_host_ns = pose_at_host_ns
-        self._filter = CubeFilter(settings)
+        self._filter = CubeFilter()
         self._clock = FrameClock(CalibrationSettings().camera_latency_s)
         self._waiting: deque[tuple[int, int, Float64]] = deque(maxlen=_WAITING)
 

@@ -96,7 +96,7 @@ class DelayMeter:
         """True if the delay has an effect and is not known.
 
         A head that hardly moves is in the same place at all times. Without colour, in which the
-        background is followed, or with a background without texture, the delay stays assumed.
+        background is followed, or with a background without texture, the delay stays an assumption.
         """
         can_measure = (
             self._followed_ns is not None and self._newest_ns - self._followed_ns < _PLAIN_NS

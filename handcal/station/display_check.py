@@ -114,7 +114,7 @@ def by_camera(
     ready : callable
         Returns when the camera is behind the display of this eye.
     settle_s : float
-        Time from the acknowledgement until a picture surely shows what was sent.
+        Time from the acknowledgement until a picture certainly shows what was sent.
     """
 
     def take() -> UInt8:

@@ -70,7 +70,7 @@ def headset_problem(
 
 
 def link_problem(link: LinkStatistics, address: tuple[str, int] | None) -> str:
-    """Return what a calibration lacks of its headset, and what to do; empty if nothing.
+    """Return what a calibration lacks from its headset, and what to do; empty if nothing.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class PoseDelay:
 
     @property
     def is_wrong(self) -> bool:
-        """True if the stamps are surely wrong by more than the camera's latency is uncertain."""
+        """True if the stamps are off by certainly more than the camera's uncertain latency."""
         return abs(self.delay_s) - 2.0 * self.sigma_s > CAMERA_UNCERTAINTY_S
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""The prior on where wearers' eyes are, learned from a lab's finished sessions with one rig."""
+"""The prior of wearers' eye positions, learned from a lab's finished sessions with one rig."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def with_session_prior(
     FileError
         If the session or the rig cannot be read.
     """
-    # A session keeps the prior that it began with, so that it is solved alike when resumed.
+    # A session keeps the prior that it began with, so that resuming does not change its results.
     if resume is not None:
         prior = stored_solve_settings(Session.open(resume)).fuse.prior
     elif begun.prior is not None:

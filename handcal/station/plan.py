@@ -28,7 +28,7 @@ class PlanSettings:
     usable_eyes: tuple[Eye, ...] = EYES
     """Only one for a wearer who sees with one eye."""
     is_automatic: bool = False
-    """True if each step is done by itself once the hand is still."""
+    """True if each step runs automatically once the hand is still."""
     verify: bool = True
     """True if each eye is verified after the alignments."""
     placement: PlacementSettings = field(default_factory=PlacementSettings)

@@ -31,7 +31,7 @@ class RunSettings:
     plan: PlanName = "paper"
     alignments: int = 1
     """Number of alignments of the paper's plan; of each eye, if `eyes` is ``"each"``. The
-    recommended plan decides by itself."""
+    recommended plan makes its own choice."""
     eyes: EyePlan = "both"
     """Only one for a wearer who sees with one eye."""
     patience_s: float = 60.0
@@ -44,7 +44,7 @@ def run_calibration(
     pairings: Pairings | None = None,
     watchers: Iterable[Callable[[Snapshot], object]] = (),
 ) -> dict[str, Any]:
-    """Calibrate one wearer; each step follows by itself as soon as it can.
+    """Calibrate one wearer; each step runs automatically as soon as it can.
 
     The wearer holds the hand still in view of the camera, moves it under the cursor, and confirms.
 

@@ -294,7 +294,7 @@ class Station(Closable):
             self._simulation.require_running()
 
     def restart_headset(self) -> None:
-        """Start the virtual headset again; a network headset connects by itself."""
+        """Start the virtual headset again; a network headset reconnects automatically."""
         if self._simulation is not None:
             self._simulation.restart()
 

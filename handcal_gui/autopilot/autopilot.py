@@ -106,6 +106,6 @@ class Autopilot(QObject):
 
     @staticmethod
     def _complaint(view: WizardView) -> str:
-        missing = [check.text for check in view.checks if not check.holds]
+        missing = [check.text for check in view.preconditions if not check.holds]
         why = f": {'; '.join(missing)}" if missing else ""
         return f"no progress at “{view.step.value}” for {_PATIENCE_S:.0f} s{why}"

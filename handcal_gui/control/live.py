@@ -122,7 +122,7 @@ class CalibrationController(QObject):
         bridges: BridgeSettings = _NO_BRIDGES,
         is_held: bool = True,
     ) -> None:
-        """End the present calibration and open a station; if held, no step runs by itself."""
+        """End the present calibration and open a station; if held, no step runs automatically."""
         self.stop()
         self._is_watching = self._is_broken = False
         self._is_plan_held = True
@@ -273,7 +273,7 @@ class CalibrationController(QObject):
             self._submit("watch", lambda station: setattr(station, "watch_views", wanted))
 
     def _hold_plan(self, wanted: bool) -> None:
-        """Have the station follow its plan by itself, or hold it."""
+        """Let the station follow its plan automatically, or hold it."""
         if wanted != self._is_plan_held:
             self._is_plan_held = wanted
             self._submit("hold", lambda station: setattr(station, "holds_plan", wanted))

@@ -159,7 +159,7 @@ class ConnectDialog(QDialog):
         if self._invitation is None:
             return
         if self._paired() - self._known:
-            self._end_invitation(tr("Paired. The headset connects by itself from now on."))
+            self._end_invitation(tr("Paired. From now on the headset connects automatically."))
         elif time.monotonic() - self._invited_s > OFFER_S:
             self._end_invitation(tr("The code has expired. New code makes another one."))
 

@@ -20,8 +20,8 @@ from handcal_gui.widgets.path_field import PathField
 
 _ABOUT = tr(
     "One file to send with a bug report: the checks of the installation, package versions, and the "
-    "log, in which wearers' names, your user name and the home folder are replaced. It holds "
-    "nothing of any session, and frames of the camera only if you add a recording here."
+    "log, in which wearers' names, your user name and the home folder are replaced. It contains "
+    "nothing from sessions, and camera frames only if you add a recording here."
 )
 
 
@@ -81,7 +81,7 @@ class SupportDialog(QDialog):
 
         def work(progress: Progress) -> str:
             written = run_support(output, settings, progress)
-            return tr("{} is written; it holds {}.").format(output, ", ".join(written[:5]))
+            return tr("{} was written; it contains {}.").format(output, ", ".join(written[:5]))
 
         self._write.setEnabled(False)
         self._job = Job(work)

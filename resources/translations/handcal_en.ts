@@ -272,7 +272,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Paired. The headset connects by itself from now on.</source>
+        <source>Paired. From now on the headset connects automatically.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -575,7 +575,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>One file to send with a bug report: the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced. It holds nothing of any session, and frames of the camera only if you add a recording here.</source>
+        <source>One file to send with a bug report: the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced. It contains nothing from sessions, and camera frames only if you add a recording here.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -599,7 +599,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} is written; it holds {}.</source>
+        <source>{} was written; it contains {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -912,7 +912,7 @@ local network can read them.</source>
     </message>
     <message>
         <source>Recommended: the hand is raised once; the cursors are placed where they are most
-informative, and each eye is verified. The steps run by themselves.
+informative, and each eye is verified. The steps run automatically.
 As in the paper: the cursor is the hand where it is held; you choose the eyes in the guide.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1197,6 +1197,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The headset draws with a different φ from this result&apos;s: an earlier or a fine-tuned one.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Send to the headset</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1238,10 +1242,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Finish</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The headset draws with another φ than this result&apos;s: an earlier or a fine-tuned one.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1677,19 +1677,23 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Hold: no step runs automatically; each waits for you (H)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold the automatic steps, or let them run</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments made; a full ring runs the next step</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Draw with the offline calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Hold</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Hold: no step runs by itself, each waits for you (H)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Hold the steps that run by themselves, or let them run</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1699,10 +1703,6 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
     </message>
     <message>
         <source>E&amp;yes</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Alignments made; the ring fills until a step runs by itself</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3568,7 +3568,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Station: the guide alone</source>
+        <source>&amp;Station: only the guide</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3632,7 +3632,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error that is left after the wearer&apos;s verification, left / right, in arcminutes;
+        <source>Error that remains after the wearer&apos;s verification, left / right, in arcminutes;
 – was not measured</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4997,7 +4997,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Check with a camera in the eye&apos;s place what the displays draw</source>
+        <source>Check what the displays draw, with a camera at the eye position</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -26,7 +26,7 @@ def test_poses_are_interpolated_in_whatever_order_they_came(order: list[int]) ->
 
 
 def test_refusals_say_why() -> None:
-    poses = PoseBuffer(max_gap_s=0.05)
+    poses = PoseBuffer()
     with pytest.raises(PosePendingError, match="not arrived"):
         poses.at(0)
     for t_ms in (100, 110, 200):

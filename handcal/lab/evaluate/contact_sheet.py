@@ -15,12 +15,12 @@ from handcal.lab.evaluate.precision import MATCH_OVERLAP, ImageResult
 from handcal.types import Float64, UInt8
 
 _COLUMNS = 6
-_TILE_PX = 240
+_TILE_PX, _MOST_TILES = 240, 36
 _MISSED, _FALSE, _FOUND = (255, 60, 60), (255, 200, 0), (60, 220, 60)
 
 
 def contact_sheet(
-    photos: Sequence[Photo], results: Sequence[ImageResult], score_min: float, tiles: int = 36
+    photos: Sequence[Photo], results: Sequence[ImageResult], score_min: float
 ) -> UInt8:
     """Draw the photographs with the worst failures; mark missed hands and false detections.
 
@@ -31,8 +31,7 @@ def contact_sheet(
         One for each photograph.
     score_min : float
         Detections with a lower score are ignored.
-    tiles : int
-        Maximum number of photographs.
+
 
     Returns
     -------
@@ -48,7 +47,7 @@ def contact_sheet(
         if len(missed) or len(false):
             failures.append((_area(missed) + _area(false), photo, found, missed, false))
     failures.sort(key=lambda failure: -failure[0])
-    drawn = [_tile(*failure[1:]) for failure in failures[:tiles]]
+    drawn = [_tile(*failure[1:]) for failure in failures[:_MOST_TILES]]
     drawn += [np.zeros((_TILE_PX, _TILE_PX, 3), np.uint8)] * (-len(drawn) % _COLUMNS)
     rows = [np.hstack(drawn[i : i + _COLUMNS]) for i in range(0, len(drawn), _COLUMNS)]
     return np.vstack(rows) if rows else np.zeros((0, 0, 3), np.uint8)

@@ -49,7 +49,7 @@ def compare_cubes(
 ) -> CubeMisalignment:
     """Compare what `find_cube` found in a capture of the real cube and in one of the virtual.
 
-    Only faces seen in both count, so that what is wrong with the print itself cancels.
+    Only faces seen in both count, so that errors of the print cancel.
 
     Parameters
     ----------

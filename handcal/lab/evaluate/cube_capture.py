@@ -127,7 +127,7 @@ class RestWatch:
         return ""
 
     def took(self, image: UInt8, capture: PlannedCapture) -> None:
-        """Note an image, (H, W, 3) uint8, that was taken, by itself or by a person."""
+        """Note an image, (H, W, 3) uint8, that was taken automatically or by a person."""
         self._rest, self._was_away = None, False
         self._taken = capture.kind == GRID, _gray(image)
 
@@ -198,7 +198,7 @@ def take_at_rest(
     say: Callable[[str], None],
     progress: Progress = Progress(),
 ) -> None:
-    """Take the missing captures by themselves, each once its object is at rest.
+    """Take the missing captures automatically, each once its object is at rest.
 
     Parameters
     ----------

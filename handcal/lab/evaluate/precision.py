@@ -82,9 +82,9 @@ def _matches(result: ImageResult, counted: Bool) -> Float64:
     return hit
 
 
-def wilson(hits: int, trials: int, z: float = 1.96) -> tuple[float, float]:
-    """Return the ends of Wilson's score interval of a share (1927); at least one trial."""
-    share = hits / trials
+def wilson(hits: int, trials: int) -> tuple[float, float]:
+    """Return the ends of Wilson's 95 % score interval of a share (1927); at least one trial."""
+    share, z = hits / trials, 1.96
     widened = 1.0 + z**2 / trials
     middle = (share + z**2 / (2 * trials)) / widened
     half = z * math.sqrt(share * (1.0 - share) / trials + z**2 / (4 * trials**2)) / widened

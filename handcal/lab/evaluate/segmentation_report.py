@@ -15,7 +15,7 @@ from handcal.report.provenance import made_with
 from handcal.types import UInt8
 
 _METHOD = (
-    "Each frame is segmented by itself, as the first one of a camera, and compared with its true "
+    "Each frame is segmented on its own, as the first one of a camera, and compared with its true "
     "mask. Kept is the share of the true hand's pixels within the depth gate. The area is that of "
     "the mask: its greatest relative change if 1 to 8 px are cropped off a side, if the image is "
     "scaled by 0.7 to 1.2, or if every second pixel of the depth is used. The wrist is the mean "

@@ -24,7 +24,7 @@ _METHOD = (
     "2021, user test). Each of the four corners, at each distance and for each eye, counts once."
 )
 _INTERVALS = (
-    "Errors of one wearer are alike, so that only wearers count as independent: intervals are of "
+    "Errors of one wearer are correlated, so only wearers count as independent: intervals are of "
     f"the mean of wearers' means, by {INTERVAL_METHOD}. "
     "Those of one wearer take calibrations for independent."
 )

@@ -34,7 +34,7 @@ _COLORS = {
     FLOOR: "#009e73",
 }
 _INTERVALS = (
-    "Intervals are of 95 % confidence. Errors of one person's hand are alike, "
+    "Intervals are of 95 % confidence. Errors of one person's hand are correlated, "
     "so that people count as independent, not alignments: intervals are of the mean of people's "
     f"means, by {INTERVAL_METHOD}."
 )

@@ -15,7 +15,7 @@ from handcal_gui.widgets.fields import choice, fill_row
 _PLANS: dict[PlanName, str] = {"recommended": tr("Recommended"), "paper": tr("As in the paper")}
 _PLAN_HELP = tr(
     "Recommended: the hand is raised once; the cursors are placed where they are most\n"
-    "informative, and each eye is verified. The steps run by themselves.\n"
+    "informative, and each eye is verified. The steps run automatically.\n"
     "As in the paper: the cursor is the hand where it is held; you choose the eyes in the guide."
 )
 _EYES: dict[str, str] = {

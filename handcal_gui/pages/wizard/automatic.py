@@ -1,4 +1,4 @@
-"""The steps that run by themselves: a main button that stays enabled long enough presses itself."""
+"""Automatic steps: a main button that stays enabled long enough is pressed by the program."""
 
 from __future__ import annotations
 

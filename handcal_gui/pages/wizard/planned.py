@@ -8,12 +8,12 @@ from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Eye, EyePlan
-from handcal_gui.pages.wizard.checks import (
-    hand_check,
+from handcal_gui.pages.wizard.preconditions import (
+    eyes_accepted,
+    hand_found,
+    hand_still,
     is_placed,
     is_steady,
-    still_check,
-    verdict_checks,
 )
 from handcal_gui.pages.wizard.step_views import (
     UNUSABLE,
@@ -55,7 +55,7 @@ _VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
 
 
 class PlannedWizard(Wizard):
-    """The current step of a plan that the station follows by itself.
+    """The current step of a plan that the station follows automatically.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class PlannedWizard(Wizard):
             case StepName.CURSOR:
                 return self._cursor(planned, snapshot)
             case StepName.VERIFY:
-                return self._check(planned, snapshot)
+                return self._ask_to_verify(planned, snapshot)
             case StepName.DONE:
                 return self._done(planned, snapshot)
         return self._raise(snapshot)
@@ -138,7 +138,7 @@ class PlannedWizard(Wizard):
             tr(
                 "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
             ).format(DISTANCE),
-            (hand_check(snapshot), still_check(snapshot)),
+            (hand_found(snapshot), hand_still(snapshot)),
             ButtonSpec(Action.TAKE_STEP, _WAITS_FOR_HAND, False),
             others,
         )
@@ -151,7 +151,7 @@ class PlannedWizard(Wizard):
         return WizardView(
             Step.MAKE_CURSOR,
             text,
-            (hand_check(snapshot), still_check(snapshot)),
+            (hand_found(snapshot), hand_still(snapshot)),
             self._take_step(tr("Make cursor"), _WAITS_FOR_HAND, is_placed(snapshot)),
             (ButtonSpec(Action.BACK, tr("&Back")),),
         )
@@ -170,20 +170,20 @@ class PlannedWizard(Wizard):
         return WizardView(
             step,
             text,
-            verdict_checks(snapshot),
+            eyes_accepted(snapshot),
             main,
             (redo,) if snapshot.procedure.alignments else (),
             snapshot.problem,
         )
 
-    def _check(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
+    def _ask_to_verify(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         eye = planned.eyes[0]
         return WizardView(
             Step.VERIFY,
             tr("Keep the hand up and still, to measure the error of the {} eye.").format(
                 EYE_WORDS[eye]
             ),
-            (hand_check(snapshot), still_check(snapshot), *verdict_checks(snapshot)),
+            (hand_found(snapshot), hand_still(snapshot), *eyes_accepted(snapshot)),
             self._take_step(
                 tr("Verify the {} eye").format(EYE_WORDS[eye]),
                 _WAITS_FOR_HAND,
@@ -200,14 +200,14 @@ class PlannedWizard(Wizard):
             text = f"{sentence(planned.text)}."
         main = ButtonSpec(Action.TAKE_STEP, _SENDING, False)
         back = (ButtonSpec(Action.BACK, tr("&Back")),)
-        return WizardView(step, text, verdict_checks(snapshot), main, back, snapshot.problem)
+        return WizardView(step, text, eyes_accepted(snapshot), main, back, snapshot.problem)
 
     def _done(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
-        procedure, checks = snapshot.procedure, verdict_checks(snapshot)
+        procedure, preconditions = snapshot.procedure, eyes_accepted(snapshot)
         main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
-        if any(check.verdict in UNUSABLE for check in checks):
+        if any(one.verdict in UNUSABLE for one in preconditions):
             text = tr("Do not use this result. Follow the advice below, then add alignments.")
-        elif any(check.verdict == "repeat" for check in checks) or not checks:
+        elif any(one.verdict == "repeat" for one in preconditions) or not preconditions:
             text = tr("Not accepted yet: add an alignment, or verify an eye again.")
         elif set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("The wearer has verified the result. Finish, or verify an eye again.")
@@ -216,8 +216,8 @@ class PlannedWizard(Wizard):
             text = tr("Not every eye has been verified. Finish, or verify an eye again.")
         return WizardView(
             Step.VERIFY,
-            text if checks else f"{sentence(planned.text)}.",
-            checks,
+            text if preconditions else f"{sentence(planned.text)}.",
+            preconditions,
             main,
             (
                 ButtonSpec(Action.ANOTHER, tr("&Add alignment")),
@@ -242,7 +242,7 @@ class PlannedWizard(Wizard):
 
 
 def _drawn_otherwise(procedure: Procedure) -> str:
-    """Return a note if the headset draws with another φ than the result's; else empty."""
+    """Return a note if the headset draws with a φ other than that of the result; else empty."""
     results, drawn_m = procedure.results, procedure.applied_shift_m
     if results is None or procedure.state is not State.APPLIED:
         return ""
@@ -250,5 +250,5 @@ def _drawn_otherwise(procedure: Procedure) -> str:
     if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
         return ""
     return tr(
-        "The headset draws with another φ than this result's: an earlier or a fine-tuned one."
+        "The headset draws with a different φ from this result's: an earlier or a fine-tuned one."
     )

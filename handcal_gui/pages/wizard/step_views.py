@@ -10,12 +10,12 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName
-from handcal_gui.pages.wizard.checks import (
-    hand_check,
+from handcal_gui.pages.wizard.preconditions import (
+    eyes_accepted,
+    hand_found,
+    hand_still,
     is_placed,
     is_steady,
-    still_check,
-    verdict_checks,
 )
 from handcal_gui.pages.wizard.view import (
     EYE_WORDS,
@@ -30,7 +30,7 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
-"""Waiting times of steps that run by themselves: for the hand, and to read a text or advice."""
+"""Waiting times of automatic steps: for the hand, and to read a text or advice."""
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _LEAST_ALIGN_NS = 1_500_000_000
 _SENDS_UNUSABLE = tr("Draws with a result that should not be used")
@@ -39,7 +39,7 @@ _SENDS_UNUSABLE = tr("Draws with a result that should not be used")
 def connect_view(snapshot: Snapshot) -> WizardView:
     """Return the view while camera and headset are connected."""
     camera, link = snapshot.camera, snapshot.link
-    checks = (
+    preconditions = (
         Precondition(
             tr("No image from the camera")
             if camera.problem
@@ -54,13 +54,13 @@ def connect_view(snapshot: Snapshot) -> WizardView:
             link.pose_rate_hz > 0,
         ),
     )
-    is_ready = all(check.holds for check in checks)
+    is_ready = all(one.holds for one in preconditions)
     if snapshot.contradiction and not camera.problem:
-        checks = (Precondition(sentence(snapshot.contradiction), False), *checks[1:])
+        preconditions = (Precondition(sentence(snapshot.contradiction), False), *preconditions[1:])
     return WizardView(
         Step.CONNECT,
         tr("Put the headset on the wearer and wait until camera and headset are connected."),
-        checks,
+        preconditions,
         ButtonSpec(Action.NEXT, tr("Begin"), is_ready),
     )
 
@@ -68,7 +68,7 @@ def connect_view(snapshot: Snapshot) -> WizardView:
 def align_view(snapshot: Snapshot) -> WizardView:
     """Return the view while the wearer overlays the cursor."""
     procedure, seen = snapshot.procedure, snapshot.observation
-    hand = hand_check(snapshot)
+    hand = hand_found(snapshot)
     is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
     limit_deg = round(float(np.degrees(procedure.guard_limit_rad)), 1)
     cursor = procedure.cursor
@@ -115,7 +115,7 @@ def solve_view(snapshot: Snapshot) -> WizardView:
             (redo,),
             runs_after_s=SHOWN_S,
         )
-    verdicts = verdict_checks(snapshot)
+    verdicts = eyes_accepted(snapshot)
     if procedure.state is State.APPLYING:
         wait = tr("Waiting for the headset to acknowledge its projections.")
         return WizardView(
@@ -167,7 +167,7 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     return WizardView(
         Step.VERIFY,
         text,
-        (hand_check(snapshot), still_check(snapshot)),
+        (hand_found(snapshot), hand_still(snapshot)),
         ButtonSpec(Action.VERIFIED, tr("It covers the hand"), is_steady(snapshot)),
         (
             ButtonSpec(Action.UNDO_NUDGE, tr("&Undo"), verifying.can_undo),
@@ -188,19 +188,19 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
 
 def save_view(snapshot: Snapshot) -> WizardView:
     """Return the view of a session to finish, or finished."""
-    checks = (
+    preconditions = (
         Precondition(tr("Saved in {}").format(snapshot.session_path), not snapshot.problem),
-        *verdict_checks(snapshot),
+        *eyes_accepted(snapshot),
     )
     others = (ButtonSpec(Action.EXPORT, tr("E&xport…")), ButtonSpec(Action.BACK, tr("&Back")))
-    is_accepted = len(checks) > 1 and all(check.holds for check in checks[1:])
-    is_verified = is_accepted and len(snapshot.procedure.verifications) == len(checks) - 1
+    is_accepted = len(preconditions) > 1 and all(one.holds for one in preconditions[1:])
+    is_verified = is_accepted and len(snapshot.procedure.verifications) == len(preconditions) - 1
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
     if snapshot.record.is_finished:
         return WizardView(
             Step.SAVE,
             tr("The session is complete. Take the headset off, or continue with the next wearer."),
-            checks,
+            preconditions,
             ButtonSpec(Action.NEXT_WEARER, tr("Next wearer")),
             others,
             unearned=unearned,
@@ -208,7 +208,7 @@ def save_view(snapshot: Snapshot) -> WizardView:
     return WizardView(
         Step.SAVE,
         tr("Everything is already saved. Finish the session when you are done."),
-        checks,
+        preconditions,
         ButtonSpec(Action.FINISH, tr("Finish session")),
         others,
         snapshot.problem,

@@ -8,12 +8,12 @@ from handcal.register.verdict import Advice
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Alignment, Eye, EyePlan
-from handcal_gui.pages.wizard.checks import (
-    hand_check,
+from handcal_gui.pages.wizard.preconditions import (
+    eyes_accepted,
+    hand_found,
+    hand_still,
     is_placed,
     is_steady,
-    still_check,
-    verdict_checks,
 )
 from handcal_gui.pages.wizard.step_views import (
     ADVICE_S,
@@ -168,7 +168,7 @@ class Wizard:
             tr("Raise one bare hand {}, palm toward you and fingers a little apart.").format(
                 DISTANCE
             ),
-            (hand_check(snapshot),),
+            (hand_found(snapshot),),
             ButtonSpec(Action.NEXT, tr("Next"), is_placed(snapshot)),
             (back,),
             runs_after_s=SHOWN_S,
@@ -180,25 +180,25 @@ class Wizard:
             tr("Hold the hand still: it becomes the cursor for {}.").format(
                 eye_names(self.eyes(snapshot))
             ),
-            (hand_check(snapshot), still_check(snapshot)),
+            (hand_found(snapshot), hand_still(snapshot)),
             ButtonSpec(Action.MAKE_CURSOR, tr("Make cursor"), is_steady(snapshot)),
             (ButtonSpec(Action.BACK, tr("&Back")),),
             runs_after_s=STILL_S,
         )
 
     def _verify(self, snapshot: Snapshot) -> WizardView:
-        checks = verdict_checks(snapshot)
+        preconditions = eyes_accepted(snapshot)
         if snapshot.procedure.state is State.APPLYING:
             wait = tr("Waiting for the headset to acknowledge its projections.")
             sending = ButtonSpec(Action.APPLY, tr("Sending…"), False)
-            return WizardView(Step.VERIFY, wait, checks, sending)
+            return WizardView(Step.VERIFY, wait, preconditions, sending)
         if snapshot.procedure.verifying is not None:
             return verification_view(snapshot, snapshot.procedure.verifying)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             return WizardView(
                 Step.VERIFY,
                 tr("The alignments have changed. Solve again."),
-                checks,
+                preconditions,
                 ButtonSpec(Action.SOLVE, tr("Solve")),
                 (ButtonSpec(Action.ANOTHER, tr("&Add alignment")),),
             )
@@ -207,7 +207,7 @@ class Wizard:
             return WizardView(
                 Step.VERIFY,
                 tr("Now repeat this with {}.").format(eyes),
-                checks,
+                preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
                 (ButtonSpec(Action.NEXT, tr("Finish with &one eye")),),
                 runs_after_s=READ_S,
@@ -216,7 +216,7 @@ class Wizard:
             ButtonSpec(Action.REPEAT_LEFT, tr("Add l&eft eye")),
             ButtonSpec(Action.REPEAT_RIGHT, tr("Add &right eye")),
         )
-        is_usable = not any(check.verdict in UNUSABLE for check in checks)
+        is_usable = not any(one.verdict in UNUSABLE for one in preconditions)
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
             return WizardView(
@@ -224,7 +224,7 @@ class Wizard:
                 tr("Raise the hand and hold it still, to measure the error of the {} eye.").format(
                     EYE_WORDS[eye]
                 ),
-                (hand_check(snapshot), still_check(snapshot), *checks),
+                (hand_found(snapshot), hand_still(snapshot), *preconditions),
                 ButtonSpec(
                     Action.VERIFY,
                     tr("Verify the {} eye").format(EYE_WORDS[eye]),
@@ -239,7 +239,7 @@ class Wizard:
             return WizardView(
                 Step.VERIFY,
                 tr("Not accepted yet: align {} again, or keep the result as it is.").format(eyes),
-                checks,
+                preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add {}").format(eyes)),
                 (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
                 runs_after_s=ADVICE_S if few else None,
@@ -248,7 +248,7 @@ class Wizard:
             return WizardView(
                 Step.VERIFY,
                 tr("Do not use this result. Follow the advice below, then add alignments."),
-                checks,
+                preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add alignment")),
                 (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
             )
@@ -256,7 +256,7 @@ class Wizard:
             return WizardView(
                 Step.VERIFY,
                 tr("The wearer has verified the result. Finish, or add an alignment."),
-                checks,
+                preconditions,
                 ButtonSpec(Action.NEXT, tr("Finish")),
                 (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *each),
             )
@@ -267,7 +267,7 @@ class Wizard:
                 "does not, "
                 "add an alignment or fine-tune φ."
             ),
-            checks,
+            preconditions,
             ButtonSpec(Action.NEXT, tr("It fits")),
             (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *each),
         )
@@ -280,7 +280,7 @@ _REPEATS: dict[Action, tuple[Eye, ...]] = {
 
 
 def _advice(snapshot: Snapshot) -> Advice | None:
-    """Return the advice for the eye with the largest expected error; None if none is to repeat."""
+    """Return the advice for the eye with the largest expected error; None if no eye is to be repeated."""
     results = snapshot.procedure.results
     if results is None:
         return None

@@ -32,9 +32,9 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 
-_MOST_CHECKS = 3
+_MOST_PRECONDITIONS = 3
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
-_SENTENCE_SCALE, _CHECK_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
+_SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
 _LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
 """Width and height from which the guide has larger texts, and their scale."""
@@ -71,7 +71,7 @@ class WizardPanel(QWidget):
         The view shown; None before the first snapshot.
     picture : GuidePicture
     asked : Signal(Action)
-        A button was pressed, by a person or by itself.
+        A button was pressed, by a person or automatically.
     plan_changed : Signal(str)
     hold_changed : Signal(bool)
         A person has chosen whether every step waits for a person.
@@ -112,7 +112,7 @@ class WizardPanel(QWidget):
         self._rail = _Rail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True)
-        self._checks = [_CheckRow() for _ in range(_MOST_CHECKS)]
+        self._rows = [_PreconditionRow() for _ in range(_MOST_PRECONDITIONS)]
         self._fact = QLabel(wordWrap=True)
         self._fact.setObjectName("wizardFact")
         self._note = QLabel(wordWrap=True)
@@ -145,7 +145,7 @@ class WizardPanel(QWidget):
         self._run(view, snapshot)
 
     def hold(self, is_held: bool) -> None:
-        """Let every step wait for a person, or let steps run by themselves."""
+        """Let every step wait for a person, or let steps run automatically."""
         self._automatic.is_held = self.wizard.is_held = is_held
         self._hold.setChecked(is_held)
         self._refresh()
@@ -168,7 +168,7 @@ class WizardPanel(QWidget):
         larger = _LARGE_SCALE if self._is_large else 1.0
         for texts, scale in (
             ([self._sentence], _SENTENCE_SCALE[self._is_alone]),
-            ([*self._checks, self._fact, self._note], _CHECK_SCALE[self._is_alone]),
+            ([*self._rows, self._fact, self._note], _ROW_SCALE[self._is_alone]),
             ([self.picture.result], 1.0),
         ):
             font = self.font()
@@ -187,10 +187,10 @@ class WizardPanel(QWidget):
             self,
             tr("Hold"),
             "H",
-            tooltip=tr("Hold: no step runs by itself, each waits for you (H)"),
+            tooltip=tr("Hold: no step runs automatically; each waits for you (H)"),
         )
         hold.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
-        hold.setWhatsThis(tr("Hold the steps that run by themselves, or let them run"))
+        hold.setWhatsThis(tr("Hold the automatic steps, or let them run"))
         hold.setCheckable(True)
         hold.triggered.connect(self._choose_hold)
         return hold
@@ -229,7 +229,7 @@ class WizardPanel(QWidget):
         self.asked.emit(action)
 
     def _run(self, view: WizardView, snapshot: Snapshot) -> None:
-        """Press the main button once a step that runs by itself has waited long enough."""
+        """Press the main button once an automatic step has waited long enough."""
         now_s = 1e-9 * snapshot.t_host_ns
         share = self._automatic.share(view, now_s)
         done = len(snapshot.procedure.alignments)
@@ -264,9 +264,9 @@ class WizardPanel(QWidget):
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addSpacing(SPACING_PX)
         layout.addLayout(head)
-        self._ring.setToolTip(tr("Alignments made; the ring fills until a step runs by itself"))
+        self._ring.setToolTip(tr("Alignments made; a full ring runs the next step"))
         texts = vbox(
-            self._sentence, *self._checks, self._fact, self._note, 0, spacing=SPACING_PX // 2
+            self._sentence, *self._rows, self._fact, self._note, 0, spacing=SPACING_PX // 2
         )
         ring = vbox(self._ring, 0)
         layout.addLayout(hbox((texts, 1), ring, spacing=2 * SPACING_PX))
@@ -281,13 +281,13 @@ class WizardPanel(QWidget):
         self._sentence.setText(view.sentence)
         # The result card gives the verdicts, with their reasons.
         has_card = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
-        # The station's plan chooses the eyes by itself.
+        # The station's plan chooses the eyes.
         is_planned = isinstance(self.wizard, PlannedWizard)
         self._choice.setVisible(view.step not in OF_THE_RESULT and not is_planned)
         self.picture.result.buttons.setVisible(has_card)
-        checks = [check for check in view.checks if not (has_card and check.verdict)]
-        for i, row in enumerate(self._checks):
-            row.show_check(checks[i] if i < len(checks) else None)
+        preconditions = [one for one in view.preconditions if not (has_card and one.verdict)]
+        for i, row in enumerate(self._rows):
+            row.show_precondition(preconditions[i] if i < len(preconditions) else None)
         self._note.setText(view.note)
         self._note.setStyleSheet(f"color: {colors().red}")
         self._fact.setText(view.fact)
@@ -342,7 +342,7 @@ class _Rail(QWidget):
             label.setStyleSheet(f"color: {color}; font-weight: {weight}")
 
 
-class _CheckRow(QWidget):
+class _PreconditionRow(QWidget):
     """One precondition: an icon, and a text."""
 
     def __init__(self) -> None:
@@ -352,15 +352,15 @@ class _CheckRow(QWidget):
         hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
         self.setMinimumHeight(3 * SPACING_PX)
 
-    def show_check(self, check: Precondition | None) -> None:
-        self.setVisible(check is not None)
-        if check is None:
+    def show_precondition(self, shown: Precondition | None) -> None:
+        self.setVisible(shown is not None)
+        if shown is None:
             return
-        name, word = ("check", tr("Yes")) if check.holds else ("wait", tr("Not yet"))
-        shade = colors().good if check.holds else colors().muted
-        if check.verdict is not None:
-            name, word = VERDICT_ICONS[check.verdict], check.verdict.capitalize()
-            shade = getattr(colors(), VERDICT_COLORS[check.verdict])
+        name, word = ("check", tr("Yes")) if shown.holds else ("wait", tr("Not yet"))
+        shade = colors().good if shown.holds else colors().muted
+        if shown.verdict is not None:
+            name, word = VERDICT_ICONS[shown.verdict], shown.verdict.capitalize()
+            shade = getattr(colors(), VERDICT_COLORS[shown.verdict])
         self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
         self._icon.setAccessibleName(word)
-        self._text.setText(check.text)
+        self._text.setText(shown.text)

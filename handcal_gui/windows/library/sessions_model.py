@@ -134,7 +134,7 @@ COLUMNS = (
     _Column(
         tr("Measured ′"),
         tr(
-            "Error that is left after the wearer's verification, left / right, in arcminutes;\n"
+            "Error that remains after the wearer's verification, left / right, in arcminutes;\n"
             "– was not measured"
         ),
         _errors("measured"),

@@ -65,7 +65,7 @@ class ResultPage(QWidget):
         self._accept = button(
             "acceptRig",
             tr("Accept…"),
-            help_text=tr("Check with a camera in the eye's place what the displays draw"),
+            help_text=tr("Check what the displays draw, with a camera at the eye position"),
         )
         self._use = button("useRig", tr("Use for the next calibration"))
         self._lay_out()

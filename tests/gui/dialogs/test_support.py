@@ -22,6 +22,6 @@ def test_the_dialog_writes_a_bundle(
     qtbot.addWidget(dialog)
     dialog.show()
     child(dialog, QPushButton, "writeBundle").click()
-    qtbot.waitUntil(lambda: "is written" in text(dialog, "supportSaid"), timeout=10_000)
+    qtbot.waitUntil(lambda: "was written" in text(dialog, "supportSaid"), timeout=10_000)
     assert len(list(tmp_path.glob("handcal-support-*.zip"))) == 1
     dialog.stop()

@@ -104,7 +104,7 @@ def solve_and_apply(technician: Technician) -> None:
     technician.wait_for_state(State.APPLIED)
 
 
-def shown_checks(technician: Technician) -> list[str]:
+def shown_preconditions(technician: Technician) -> list[str]:
     """Return what the wizard says that there is, and is not."""
     shown = technician.program.wizard_panel.shown
-    return [check.text for check in shown.checks] if shown else []
+    return [check.text for check in shown.preconditions] if shown else []

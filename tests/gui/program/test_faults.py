@@ -21,7 +21,7 @@ from tests.gui.program.technician import (
     can_start,
     is_turned,
     make_cursor,
-    shown_checks,
+    shown_preconditions,
 )
 
 
@@ -35,8 +35,8 @@ def test_a_hand_lost_is_said_and_nothing_can_be_made_of_it(live: Technician, stu
     shown = live.program.wizard_panel.shown
     assert shown is not None
     assert shown.step is Step.MAKE_CURSOR
-    assert "hand" in shown.checks[0].text
-    assert not shown.checks[0].holds
+    assert "hand" in shown.preconditions[0].text
+    assert not shown.preconditions[0].holds
     assert not live.child(QPushButton, "wizardMain").isEnabled()
     QTest.keyClick(live.program.window, Qt.Key.Key_Space)
     live.qtbot.wait(200)
@@ -115,7 +115,7 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     live.press_space_for(Action.SOLVE)
     live.wait_for_state(State.SOLVED)
     assert live.snapshot.record.alignments == {}
-    live.wait(lambda: "1 alignment confirmed" in shown_checks(live))
+    live.wait(lambda: "1 alignment confirmed" in shown_preconditions(live))
     away.rename(path)
     live.wait(lambda: live.banner == "")
     live.wait(lambda: live.snapshot.record.is_solved)

@@ -15,7 +15,7 @@ from handcal.station.settings import StationSettings
 from handcal.station.states import State
 from handcal_gui.pages.wizard.view import Action
 from tests.gui.helpers import button
-from tests.gui.program.technician import Technician, is_turned, shown_checks
+from tests.gui.program.technician import Technician, is_turned, shown_preconditions
 
 
 def with_plan(settings: StationSettings) -> StationSettings:
@@ -52,7 +52,7 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     program.wizard_panel.hold(False)
     technician.wait_for_page("live")
     studio.camera.shows = "cursor"
-    technician.wait(lambda: "Camera" in " ".join(shown_checks(technician)))
+    technician.wait(lambda: "Camera" in " ".join(shown_preconditions(technician)))
     technician.wait(
         lambda: (
             technician.snapshot.observation is not None
@@ -73,7 +73,7 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     fact = technician.child(QLabel, "wizardFact")
     QTest.keyClick(program.window, Qt.Key.Key_G, Qt.KeyboardModifier.ShiftModifier)
     technician.wait(lambda: not technician.snapshot.procedure.applied_shift_m["left"].any())
-    technician.wait(lambda: "another φ" in fact.text())
+    technician.wait(lambda: "different φ" in fact.text())
     assert program.wizard_panel.wizard.is_held
     QTest.keyClick(program.window, Qt.Key.Key_G)
     technician.wait(

@@ -14,7 +14,13 @@ from handcal.station.states import State
 from handcal_gui.pages.wizard import step_views, steps
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.preferences import PreferencesFile
-from tests.gui.program.technician import Technician, align, is_turned, shown_checks, solve_and_apply
+from tests.gui.program.technician import (
+    Technician,
+    align,
+    is_turned,
+    shown_preconditions,
+    solve_and_apply,
+)
 
 
 def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
@@ -115,7 +121,7 @@ def test_back_and_a_key_hold_the_steps_that_run_by_themselves(
     live.wait(lambda: live.can(Action.NEXT))
     studio.camera.shows = "cursor"
     live.press_space_for(Action.NEXT)
-    live.wait(lambda: "Hand found" in shown_checks(live))
+    live.wait(lambda: "Hand found" in shown_preconditions(live))
     live.qtbot.wait(1000)
     assert live.program.wizard_panel.shown is not None
     assert live.program.wizard_panel.shown.step is Step.SHOW_HAND

@@ -261,8 +261,8 @@ def test_nothing_moves_the_main_button(
         panel.show_snapshot(now)
     look()
     for view in all_views(snapshot, record):
-        checks = tuple(replace(check, text=LONG) for check in view.checks)
-        for shown in (view, replace(view, sentence=LONG, note=LONG, checks=checks)):
+        long = tuple(replace(one, text=LONG) for one in view.preconditions)
+        for shown in (view, replace(view, sentence=LONG, note=LONG, preconditions=long)):
             say(program, now, shown)
             look()
     window.banner.show_message(LONG)

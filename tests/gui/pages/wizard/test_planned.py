@@ -136,7 +136,7 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
     assert wizard.view(as_solved).fact == ""
     back = {eye: np.array([0.009, 0.0, 0.0]) for eye in EYES}
     gone_back = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=back)
-    assert "another φ" in wizard.view(gone_back).fact
+    assert "different φ" in wizard.view(gone_back).fact
 
 
 def test_changed_alignments_can_be_solved_again(snapshot: Maker) -> None:

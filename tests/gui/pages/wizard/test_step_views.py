@@ -30,12 +30,12 @@ def test_connect_waits_for_camera_headset_and_poses(
 ) -> None:
     view = Wizard().view(snapshot(State.SHOW_HAND, **changes))
     assert not view.main.is_enabled
-    assert [check for check in view.checks if complaint in check.text and not check.holds]
+    assert [check for check in view.preconditions if complaint in check.text and not check.holds]
 
 
 def test_a_camera_against_which_there_is_evidence_is_not_ticked(snapshot: Maker) -> None:
     seen = replace(snapshot(State.SHOW_HAND), contradiction="the camera is not the rig's")
-    camera = Wizard().view(seen).checks[0]
+    camera = Wizard().view(seen).preconditions[0]
     assert (camera.text, camera.holds) == ("The camera is not the rig's", False)
 
 
@@ -47,8 +47,8 @@ def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) 
     )
     assert view.sentence.startswith("Close the right eye.")
     assert view.note == refusal
-    assert not view.checks[1].holds
-    assert Wizard().view(snapshot()).checks[1].holds
+    assert not view.preconditions[1].holds
+    assert Wizard().view(snapshot()).preconditions[1].holds
 
 
 def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot: Maker) -> None:
@@ -60,7 +60,10 @@ def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot:
 
 def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> None:
     view = Wizard().view(snapshot(State.SOLVED, problem="the disk is full; free some space"))
-    assert [check.text.split(":")[0] for check in view.checks[1:]] == ["Left eye", "Right eye"]
+    assert [check.text.split(":")[0] for check in view.preconditions[1:]] == [
+        "Left eye",
+        "Right eye",
+    ]
     assert view.note == "the disk is full; free some space"
     assert actions(view) == [Action.REDO]
     assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
@@ -68,7 +71,7 @@ def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> No
 
 def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
     for name in get_args(VerdictName):
-        checks = Wizard().view(judged(snapshot, name, "accept", State.SOLVED)).checks
+        checks = Wizard().view(judged(snapshot, name, "accept", State.SOLVED)).preconditions
         assert [(c.verdict, c.holds) for c in checks[1:]] == [
             (name, name == "accept"),
             ("accept", True),
@@ -132,7 +135,7 @@ def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:
     assert not wizard.view(accepted).unearned
     view = wizard.view(repeat)
     assert view.unearned == {Step.VERIFY}
-    assert [check.holds for check in view.checks[1:]] == [False, True]
+    assert [check.holds for check in view.preconditions[1:]] == [False, True]
 
 
 def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
@@ -141,5 +144,5 @@ def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
     full = snapshot(State.APPLIED, problem=str(FileError("the disk is full")))
     wizard.move(Action.NEXT, full)
     view = wizard.view(full)
-    assert not view.checks[0].holds
+    assert not view.preconditions[0].holds
     assert view.note == "the disk is full"

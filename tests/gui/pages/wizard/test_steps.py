@@ -101,7 +101,7 @@ def test_a_hand_is_needed_and_the_engine_s_reason_is_given(start: Snapshot) -> N
     lost = replace(start.observation, hand=None, problem="hand cut by the image border")
     view = wizard.view(replace(start, observation=lost))
     assert not view.main.is_enabled
-    assert view.checks[0].text == "Hand cut by the image border"
+    assert view.preconditions[0].text == "Hand cut by the image border"
     assert not wizard.view(replace(start, observation=None)).main.is_enabled
 
 
@@ -110,7 +110,7 @@ def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
     reach(wizard, start, Step.MAKE_CURSOR)
     assert start.observation is not None
     waiting = replace(start.observation, is_steady=False, needs_delay=True)
-    asked = wizard.view(replace(start, observation=waiting)).checks[-1]
+    asked = wizard.view(replace(start, observation=waiting)).preconditions[-1]
     assert "looked" in asked.text
     assert not asked.holds
     restless = replace(start, observation=replace(start.observation, is_steady=False))

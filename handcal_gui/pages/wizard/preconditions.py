@@ -13,7 +13,7 @@ def is_steady(snapshot: Snapshot) -> bool:
     return snapshot.observation is not None and snapshot.observation.is_steady
 
 
-def still_check(snapshot: Snapshot) -> Precondition:
+def hand_still(snapshot: Snapshot) -> Precondition:
     """Return whether the hand is held still and can be placed in time, as a precondition."""
     seen = snapshot.observation
     if seen is not None and seen.needs_delay:
@@ -26,7 +26,7 @@ def is_placed(snapshot: Snapshot) -> bool:
     return snapshot.observation is not None and snapshot.observation.hand is not None
 
 
-def hand_check(snapshot: Snapshot) -> Precondition:
+def hand_found(snapshot: Snapshot) -> Precondition:
     """Return whether a hand is found, as a precondition, with the reason if there is none."""
     seen = snapshot.observation
     # A hand that is seen without a problem is placed with one of the next frames.
@@ -36,7 +36,7 @@ def hand_check(snapshot: Snapshot) -> Precondition:
     return Precondition(sentence(problem or tr("no hand in view")), False)
 
 
-def verdict_checks(snapshot: Snapshot) -> tuple[Precondition, ...]:
+def eyes_accepted(snapshot: Snapshot) -> tuple[Precondition, ...]:
     """Return the verdict on each solved eye as a precondition."""
     results = snapshot.procedure.results
     if results is None:
