@@ -94,7 +94,6 @@ def _write(
                 import_module(heavy)
                 progress.check()
             from handcal.export.report import session_report
-            from handcal.report.figures import write_figures
             from handcal.report.html import write_html
             from handcal.report.pdf import write_pdf
 
@@ -102,9 +101,7 @@ def _write(
             if name == "report":
                 write_pdf(place / "report.pdf", report, progress)
             else:
-                write_html(place / "report.html", report, progress.part(0.0, 0.5))
-                figures = place / "figures"
-                write_figures(figures, report, progress.part(0.5, 1.0))
+                write_html(place / "report.html", report, progress)
         case "csv":
             write_parameters(place / "parameters.csv", outcome)
             write_trials(place / "trials.csv", outcome)

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.patches import Ellipse, Polygon, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -189,7 +189,8 @@ def overlay_outlines(
 def draw_overlay(ax: Axes, display: EyeDisplay, outlines: Mapping[str, Sequence[Float64]]) -> None:
     """Draw the outlines of `overlay_outlines` within the display's frame."""
     for outline in outlines["hand"]:
-        ax.fill(*outline.T, facecolor=_HAND, alpha=0.25, linewidth=0.0)
+        # As an artist only: add_patch would look through all curves for limits, which are set here.
+        ax.add_artist(Polygon(outline, facecolor=_HAND, alpha=0.25, linewidth=0.0))
         ax.plot(*outline.T, color=_HAND, linewidth=0.6)
     for outline in outlines["cursor"]:
         ax.plot(*outline.T, color=_CURSOR, linewidth=1.0, linestyle=(0, (4, 1.5)))
@@ -206,23 +207,30 @@ def draw_trial_errors(axes: Sequence[Axes], trials: Collection[Trial]) -> None:
     for ax, name, unit in zip(axes, ("error_px", "error_arcmin"), ("px", "arcmin"), strict=True):
         for eye in EYES:
             offset = -0.18 if eye == "left" else 0.18
-            for place, depth_m in enumerate(depths_m):
-                errors = [
-                    getattr(trial, name)
-                    for trial in trials
-                    if (trial.eye, trial.target_depth_m) == (eye, depth_m)
-                ]
-                if errors:
-                    ax.boxplot(
-                        np.concatenate(errors),
-                        positions=[place + offset],
-                        widths=0.28,
-                        boxprops={"color": COLORS[eye], "linestyle": _LINES[eye]},
-                        medianprops={"color": COLORS[eye], "linewidth": 1.6},
-                        whiskerprops={"color": COLORS[eye]},
-                        capprops={"color": COLORS[eye]},
-                        flierprops={"marker": MARKERS[eye], "markersize": 2.5},
-                    )
+            errors = {
+                place + offset: np.concatenate(found)
+                for place, depth_m in enumerate(depths_m)
+                if (
+                    found := [
+                        getattr(trial, name)
+                        for trial in trials
+                        if (trial.eye, trial.target_depth_m) == (eye, depth_m)
+                    ]
+                )
+            }
+            if not errors:
+                continue
+            ax.boxplot(
+                list(errors.values()),
+                positions=list(errors),
+                widths=0.28,
+                manage_ticks=False,
+                boxprops={"color": COLORS[eye], "linestyle": _LINES[eye]},
+                medianprops={"color": COLORS[eye], "linewidth": 1.6},
+                whiskerprops={"color": COLORS[eye]},
+                capprops={"color": COLORS[eye]},
+                flierprops={"marker": MARKERS[eye], "markersize": 2.5},
+            )
         for eye in EYES:
             ax.plot([], [], _LINES[eye], color=COLORS[eye], label=f"{eye} eye")
         ax.set_xticks(range(len(depths_m)), [f"{depth_m:g}" for depth_m in depths_m])
@@ -253,7 +261,8 @@ def draw_running_mean(ax: Axes, trials: Mapping[int, Trial]) -> None:
 
 def name_axes(ax: Axes, title: str, x: str, y: str) -> None:
     """Set the title and the axis labels, with units."""
-    ax.set_title(title, fontsize=_TITLE_PT, loc="left")
+    # At the default height: where none is given, every drawing looks for labels in its way.
+    ax.set_title(title, fontsize=_TITLE_PT, loc="left", y=1.0)
     ax.set_xlabel(x, fontsize=_LABEL_PT)
     ax.set_ylabel(y, fontsize=_LABEL_PT)
 

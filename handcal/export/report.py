@@ -273,7 +273,7 @@ def _residuals(outcome: SessionOutcome, results: Results) -> Section:
         for ax, eye in zip(axes, EYES, strict=True):
             if eye in cells:
                 figures.draw_residuals(ax, cells[eye], most_mm)
-                ax.set_title(f"alignment {number}, {eye} eye", fontsize=8.5, loc="left")
+                ax.set_title(f"alignment {number}, {eye} eye", fontsize=8.5, loc="left", y=1.0)
             else:
                 ax.remove()
 
@@ -321,7 +321,7 @@ def _overlay(outcome: SessionOutcome, eye: Eye, number: int, alignment: Alignmen
     def draw(axes: Sequence[Axes]) -> None:
         for ax, (when, found) in zip(axes, outlines.items(), strict=True):
             figures.draw_overlay(ax, display, found)
-            ax.set_title(f"alignment {number}, {eye} eye, {when}", fontsize=8.5, loc="left")
+            ax.set_title(f"alignment {number}, {eye} eye, {when}", fontsize=8.5, loc="left", y=1.0)
 
     rows = list(overlay_rows(number, eye, outlines))
     return Figure(f"overlay-{eye}", "", draw, rows, height_mm=58.0, columns=2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from handcal.types import Bool, Float64
 
@@ -37,8 +36,7 @@ def outline_marks(outline_m: Float64, is_cut: Bool) -> Float64:
     outline_m = np.roll(outline_m, -start, axis=0)
     image_m = outline_m[:, :2]
     reach_m = np.linalg.norm(image_m[length:] - image_m[:length].mean(axis=0), axis=1)
-    tips, _ = find_peaks(reach_m, prominence=_LEAST_FINGER_M)
-    marked = [0, length - 1, *(length + tips)]
+    marked = [0, length - 1, *(length + tip for tip in _tips(reach_m))]
     step_m = np.linalg.norm(np.roll(image_m, -1, axis=0) - image_m, axis=1)
     along_m = np.cumsum(step_m)
     apart_m = np.abs(along_m[:, None] - along_m[marked])
@@ -49,6 +47,26 @@ def outline_marks(outline_m: Float64, is_cut: Bool) -> Float64:
     across = np.column_stack([tangent[:, 1], -tangent[:, 0], np.zeros(len(tangent))])
     across *= _HALF_WIDTH_M / np.maximum(np.linalg.norm(across, axis=1), 1e-9)[:, None]
     return np.vstack([outline_m[near] + across, outline_m[near] - across])
+
+
+def _tips(reach_m: Float64) -> list[int]:
+    """Return the peaks whose prominence is at least `_LEAST_FINGER_M`, the first of equal ones.
+
+    As `scipy.signal.find_peaks`, whose import would nearly double that of a station.
+    """
+    tips = []
+    last, lowest_m, is_rising = 0, float(reach_m[0]), False
+    for index, value_m in enumerate(reach_m.tolist()):
+        if is_rising and value_m > reach_m[last]:
+            last = index
+        elif is_rising and reach_m[last] - value_m >= _LEAST_FINGER_M:
+            tips.append(last)
+            lowest_m, is_rising = value_m, False
+        elif not is_rising:
+            lowest_m = min(lowest_m, value_m)
+            is_rising = value_m - lowest_m >= _LEAST_FINGER_M
+            last = index
+    return tips
 
 
 def _longest_run(is_cut: Bool) -> tuple[int, int]:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
+from scipy.special import ndtri
 
 from handcal.display import (
     TARGET_DEPTHS_M,
@@ -32,8 +33,23 @@ from handcal.types import EyeShift, Float64
 WORKING_DISTANCE_M = TARGET_DEPTHS_M[1]
 """Distance at which the error in depth is expected."""
 
-_SAMPLES_LOG2 = 9
 _STEP_M = 1e-5
+
+# Direction numbers (9, 3) and shift (3,) of a scrambled Sobol sequence, in units of 2^-30.
+_DIRECTIONS = np.array(
+    [
+        (673096586, 917181856, 620559025),
+        (531968120, 778357951, 986714182),
+        (144802939, 1036247871, 346770696),
+        (106393622, 572734319, 556359821),
+        (60247633, 876853389, 855782661),
+        (18685518, 758528844, 421130711),
+        (13502531, 1071340902, 650831322),
+        (7096701, 568060893, 992322302),
+        (2254756, 915708970, 399225896),
+    ]
+)
+_SHIFT = np.array([440180019, 1035216202, 920899910])
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,13 +176,20 @@ def _samples(mean_m: Float64, covariance_m2: Float64) -> Float64:
 
 @cache
 def _standard_normal() -> Float64:
-    from scipy.stats import qmc  # takes half a second, and not every user of this module samples
+    """Return samples (N, 3): a scrambled Sobol sequence and its mirror image.
 
-    draw = qmc.MultivariateNormalQMC(np.zeros(3), rng=np.random.default_rng(0))
-    half = draw.random(2**_SAMPLES_LOG2)
+    The sequence is that of ``MultivariateNormalQMC(np.zeros(3), rng=np.random.default_rng(0))`` of
+    `scipy.stats.qmc`, whose import would keep the first solution waiting.
+    """
+    bits = len(_DIRECTIONS)
+    index = np.arange(2**bits)
+    gray = index ^ (index >> 1)
+    chosen = (gray[:, None] >> np.arange(bits)) & 1
+    sobol = _SHIFT ^ np.bitwise_xor.reduce(chosen[..., None] * _DIRECTIONS, axis=1)
+    half = ndtri(0.5 + (1.0 - 1e-10) * (sobol / 2.0**30 - 0.5))
     samples = np.concatenate([half, -half])
     samples.flags.writeable = False
-    return np.asarray(samples)
+    return samples
 
 
 def _errors_arcmin(display: EyeDisplay, difference_m: Float64) -> Float64:

@@ -49,7 +49,7 @@ class Figure:
     """Name of its files: lower-case letters, digits and hyphens, unique in a report."""
     caption: str
     draw: Callable[[Sequence[Axes]], None]
-    """Draws into the given axes; called once for each file that contains the figure."""
+    """Draws into the given axes; called once for the PDF, and once for all images."""
     rows: Sequence[FigureRow]
     """Its data: the rows of its CSV file."""
     height_mm: float = 60.0

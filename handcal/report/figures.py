@@ -1,10 +1,9 @@
-"""A report's figures as files: images, and their data as CSV."""
+"""A report's figures as images, with their data as CSV."""
 
 from __future__ import annotations
 
 import io
-from pathlib import Path
-from typing import Any, Literal
+from dataclasses import dataclass
 
 from matplotlib import rc_context
 
@@ -12,39 +11,30 @@ from matplotlib import rc_context
 from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
 from matplotlib.figure import Figure as Canvas
 
-from handcal.io.files import make_folder, write_atomic
-from handcal.progress import Progress
-from handcal.report.document import Figure, Report
+from handcal.report.document import Figure
 from handcal.report.page import CONTENT_MM, MM_PER_INCH, add_strip
 from handcal.report.rows import rows_csv
 
 _DPI = 200
 
 
-def write_figures(folder: Path, report: Report, progress: Progress) -> None:
-    """Write NAME.png and NAME.csv for each of a report's figures.
+@dataclass(frozen=True, slots=True)
+class FigureFiles:
+    """The contents of a figure's files."""
 
-    Parameters
-    ----------
-    folder : Path
-        Created if there is any figure.
-    report : Report
-    progress : Progress
-        Told the share done before each figure.
-    """
-    for done, figure in enumerate(report.figures):
-        progress.at(done / len(report.figures))
-        make_folder(folder)
-        write_atomic(folder / f"{figure.name}.png", picture(figure, "png"))
-        write_atomic(folder / f"{figure.name}.csv", rows_csv(figure.rows))
+    png: bytes
+    svg: bytes
+    """Images, as wide as the text of a page."""
+    csv: bytes
+    """Its data."""
 
 
-def picture(figure: Figure, kind: Literal["png", "svg"]) -> bytes:
-    """Return a figure as an image, as wide as the text of a page."""
+def draw_figure(figure: Figure) -> FigureFiles:
+    """Draw a figure once, and return it in each format."""
     canvas = Canvas(figsize=(CONTENT_MM / MM_PER_INCH, figure.height_mm / MM_PER_INCH))
     figure.draw(add_strip(canvas, (0.0, 0.0), figure))
-    stream = io.BytesIO()
-    metadata: dict[str, Any] = {"Date": None} if kind == "svg" else {}
+    png, svg = io.BytesIO(), io.BytesIO()
+    canvas.savefig(png, format="png", dpi=_DPI)
     with rc_context({"svg.hashsalt": "handcal", "svg.fonttype": "path"}):  # reproducible bytes
-        canvas.savefig(stream, format=kind, dpi=_DPI, metadata=metadata)
-    return stream.getvalue()
+        canvas.savefig(svg, format="svg", dpi=_DPI, metadata={"Date": None})
+    return FigureFiles(png.getvalue(), svg.getvalue(), rows_csv(figure.rows))

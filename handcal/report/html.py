@@ -1,4 +1,4 @@
-"""A report as a self-contained HTML file."""
+"""A report as a self-contained HTML file, with its figures beside it."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from handcal.io.files import write_atomic
+from handcal.io.files import make_folder, write_atomic
 from handcal.io.resources import resource_path
 from handcal.progress import Progress
 from handcal.report.document import Figure, Report, Table
-from handcal.report.figures import picture
-from handcal.report.rows import rows_csv
+from handcal.report.figures import draw_figure
 
 _NO_BREAK = "\u00a0"
 
 
 def write_html(path: Path, report: Report, progress: Progress) -> None:
     """Write a report as HTML with embedded figures and data.
+
+    The figures are also written beside it, as figures/NAME.png and figures/NAME.csv.
 
     Parameters
     ----------
@@ -28,6 +29,10 @@ def write_html(path: Path, report: Report, progress: Progress) -> None:
     progress : Progress
         Told the share done before each figure.
     """
+    drawn = {}
+    for done, figure in enumerate(report.figures):
+        progress.at(done / len(report.figures))
+        drawn[figure.name] = draw_figure(figure)
     template = resource_path("report.html.jinja")
     environment = Environment(
         loader=FileSystemLoader(template.parent),
@@ -41,21 +46,17 @@ def write_html(path: Path, report: Report, progress: Progress) -> None:
         "table": lambda item: isinstance(item, Table),
         "figure": lambda item: isinstance(item, Figure),
     }
-    done = 0
-
-    def drawn(figure: Figure) -> str:
-        nonlocal done
-        progress.at(done / len(report.figures))
-        done += 1
-        return _data_url("image/svg+xml", picture(figure, "svg"))
-
     text = environment.get_template(template.name).render(
         report=report,
-        drawn=drawn,
-        raw=lambda figure: _data_url("text/csv", rows_csv(figure.rows)),
+        drawn=lambda figure: _data_url("image/svg+xml", drawn[figure.name].svg),
+        raw=lambda figure: _data_url("text/csv", drawn[figure.name].csv),
         version=version("handcal"),
     )
     write_atomic(path, text.encode())
+    for name, files in drawn.items():
+        folder = make_folder(path.parent / "figures")
+        write_atomic(folder / f"{name}.png", files.png)
+        write_atomic(folder / f"{name}.csv", files.csv)
 
 
 def _data_url(kind: str, content: bytes) -> str:

@@ -7,7 +7,6 @@ from pathlib import Path
 from handcal.io.files import make_folder
 from handcal.progress import Progress
 from handcal.report.document import Report
-from handcal.report.figures import write_figures
 from handcal.report.html import write_html
 from handcal.report.pdf import write_pdf
 
@@ -38,7 +37,6 @@ def write_report(
     """
     pdf, html = make_folder(folder) / "report.pdf", folder / "report.html"
     write_pdf(pdf, report, progress.part(0.0, 0.4))
-    write_html(html, report, progress.part(0.4, 0.7))
-    write_figures(folder / "figures", report, progress.part(0.7, 1.0))
+    write_html(html, report, progress.part(0.4, 1.0))
     progress.at(1.0)
     return pdf, html

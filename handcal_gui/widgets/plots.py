@@ -45,11 +45,10 @@ class Plot(QWidget):
         self.setAccessibleName(label)
         self._lines: list[tuple[pg.PlotDataItem, str, bool]] = []
         self._texts: list[pg.TextItem] = []
-        self._view = pg.PlotWidget()
+        self._view = pg.PlotWidget(enableMenu=False)
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._view.setMinimumSize(100, 44)
         self.item = self._view.getPlotItem()
-        self.item.setMenuEnabled(False)
         self.item.hideButtons()
         self.item.setContentsMargins(*4 * (SPACING_PX // 2,))
         self.item.setMouseEnabled(x=False, y=False)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handcal.hand import marks
 from handcal.hand.marks import outline_marks
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.types import Float64
@@ -71,3 +72,17 @@ def test_points_may_be_repeated() -> None:
     outline_m, is_cut = comb()
     marks_m = outline_marks(outline_m.repeat(3, axis=0), is_cut.repeat(3))
     assert np.isfinite(marks_m).all()
+
+
+@given(st.lists(st.integers(0, 30), min_size=1, max_size=40, unique=True))
+def test_tips_are_the_prominent_peaks(heights: list[int]) -> None:
+    reach_m = 0.005 * np.array(heights)  # no difference is near the limit
+
+    def prominence_m(index: int) -> float:
+        sides = reach_m[index::-1], reach_m[index:]
+        ends = ([*np.flatnonzero(side > reach_m[index]), len(side)][0] for side in sides)
+        lowest_m = (side[:end].min() for side, end in zip(sides, ends, strict=True))
+        return float(reach_m[index] - max(lowest_m))
+
+    prominent = [i for i in range(len(reach_m)) if prominence_m(i) >= marks._LEAST_FINGER_M]
+    assert marks._tips(reach_m) == prominent

@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import ndtr
 
 from handcal.display import eye_projection, reprojection_arcmin, target_corners_m
 from handcal.geometry import project
+from handcal.register import benefit as benefits
 from handcal.register.benefit import (
     WORKING_DISTANCE_M,
     benefit,
@@ -24,6 +26,15 @@ PRIOR_M2 = 0.004**2 * np.eye(3)
 def _covariance(rng: np.random.Generator, size_m: float) -> Float64:
     root = size_m * rng.normal(size=(3, 3))
     return np.asarray(root @ root.T)
+
+
+def test_the_samples_are_those_of_a_standard_normal() -> None:
+    samples = benefits._standard_normal()
+    half = samples[: len(samples) // 2]
+    assert (samples[len(half) :] == -half).all()
+    cells = np.floor(len(half) * ndtr(half)).astype(int)  # each of equal probability
+    assert (np.sort(cells, axis=0) == np.arange(len(half))[:, None]).all()
+    np.testing.assert_allclose(np.cov(samples.T), np.eye(3), atol=0.02)
 
 
 def test_without_uncertainty_it_is_the_reprojection_error() -> None:

@@ -10,7 +10,7 @@ import pytest
 from handcal.errors import CancelledError, FileError
 from handcal.progress import Progress
 from handcal.report.document import Report
-from handcal.report.figures import write_figures
+from handcal.report.html import write_html
 from handcal.report.write import write_report
 
 
@@ -32,12 +32,12 @@ def test_a_report_is_all_its_files(tmp_path: Path, report: Report) -> None:
 
 
 def test_a_figure_is_as_wide_as_a_page_and_has_its_numbers(tmp_path: Path, report: Report) -> None:
-    write_figures(tmp_path, report, Progress())
-    picture = cv2.imread(str(tmp_path / "one.png"))
+    write_html(tmp_path / "report.html", report, Progress())
+    picture = cv2.imread(str(tmp_path / "figures" / "one.png"))
     assert picture is not None
     assert picture.shape[:2] == (int(50.0 / 25.4 * 200), int(174.0 / 25.4 * 200))
     assert picture.min() < 100 < picture.max()
-    lines = (tmp_path / "one.csv").read_text().splitlines()
+    lines = (tmp_path / "figures" / "one.csv").read_text().splitlines()
     assert lines == ["angle_deg,error_mm,method", "0,1.5,paper", "9,,"]
 
 

@@ -5,7 +5,7 @@ from handcal.lab.evaluate.cube_report import cube_report
 from handcal.lab.evaluate.cube_summary import cube_summary
 from handcal.lab.evaluate.cube_test import CubeTest, cube_row
 from handcal.report.document import Table
-from handcal.report.figures import picture
+from handcal.report.figures import draw_figure
 from handcal.rig.cube import Cube
 from handcal.types import Intrinsics
 
@@ -46,4 +46,4 @@ def test_the_report_holds_what_the_summary_says() -> None:
         tuple(row) for table in tables for row in table.rows
     ]
     assert all(figure.rows == test.rows for figure in report.figures)
-    assert [picture(figure, "svg")[:5] for figure in report.figures] == 2 * [b"<?xml"]
+    assert [draw_figure(figure).svg[:5] for figure in report.figures] == 2 * [b"<?xml"]
