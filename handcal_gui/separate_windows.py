@@ -213,6 +213,7 @@ class SeparateWindows(QObject):
 
     def edit_preferences(self) -> None:
         """Let the user change the preferences."""
+        self._current.change(station=self._start.new.settings)  # or it would show older ones
         dialog = PreferencesDialog(self._current.now, self._window)
         keep_on_screen(dialog)
         if dialog.exec():
