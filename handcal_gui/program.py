@@ -222,9 +222,8 @@ class Program(QObject):
     def _restore(self) -> None:
         preferences = self.preferences
         self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
-        if preferences.geometry:
-            self.window.restoreGeometry(QByteArray.fromBase64(preferences.geometry.encode()))
-        else:
+        geometry = QByteArray.fromBase64(preferences.geometry.encode())
+        if not self.window.restoreGeometry(geometry):  # none, or that of a far larger screen
             screen = QGuiApplication.primaryScreen().availableSize()
             self.window.resize(screen.boundedTo(QSize(*FIRST_SIZE_PX)))
         layouts: dict[Page, str] = {

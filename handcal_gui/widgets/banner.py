@@ -11,7 +11,6 @@ from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.sentence import sentence
 
-
 _NOTICE_MS = 6000
 
 

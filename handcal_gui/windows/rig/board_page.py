@@ -197,8 +197,9 @@ class BoardPage(QWidget):
         return answer == QMessageBox.StandardButton.Yes
 
     def _show_rig(self) -> None:
-        parts = ", ".join(self._project.rig.origins) or tr("nothing")
-        self._rig.setText(tr("{} (calibrated: {})").format(self._project.rig.name, parts))
+        rig = self._project.rig
+        parts = tr("calibrated: {}").format(", ".join(rig.origins))
+        self._rig.setText(f"{rig.name} ({parts if rig.origins else tr('not calibrated yet')})")
 
     def _lay_out(self) -> None:
         squares, paper, rig = QWidget(), QWidget(), QWidget()
