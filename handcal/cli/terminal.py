@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias
 
-from handcal.errors import HandcalError
+from handcal.errors import CancelledError, HandcalError
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -105,6 +105,8 @@ def errors_in_one_line() -> Iterator[None]:
     try:
         with _flushed():
             yield
+    except CancelledError as error:
+        fail(str(error), 130)
     except HandcalError as error:
         fail(str(error), 1)
     except KeyboardInterrupt:
