@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import Option, arg, command, fail, number, seed
-from handcal.errors import CancelledError
+from handcal.cli.terminal import Option, arg, command, number, seed
 
 if TYPE_CHECKING:
     from handcal.lab.study.studies import StudyResult
@@ -245,8 +244,5 @@ def _run(arguments: argparse.Namespace, order: Callable[[Progress], StudyResult]
 
 def _unless_interrupted(order: Callable[[Progress], Result]) -> Result:
     """Run a study; exit with code 130 after Ctrl+C."""
-    try:
-        with until_interrupted() as is_cancelled, show_progress(is_cancelled) as progress:
-            return order(progress)
-    except CancelledError as error:
-        fail(str(error), 130)
+    with until_interrupted() as is_cancelled, show_progress(is_cancelled) as progress:
+        return order(progress)
