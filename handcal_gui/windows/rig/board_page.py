@@ -198,8 +198,9 @@ class BoardPage(QWidget):
 
     def _show_rig(self) -> None:
         rig = self._project.rig
-        parts = tr("calibrated: {}").format(", ".join(rig.origins))
-        self._rig.setText(f"{rig.name} ({parts if rig.origins else tr('not calibrated yet')})")
+        calibrated = tr("calibrated: {}").format(", ".join(rig.origins))
+        state = calibrated if rig.origins else tr("not calibrated yet")
+        self._rig.setText(f"{rig.name} ({state})")
 
     def _lay_out(self) -> None:
         squares, paper, rig = QWidget(), QWidget(), QWidget()
