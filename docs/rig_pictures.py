@@ -1,4 +1,4 @@
-"""Makes the pictures of rig-guide.md: the rig wizard, run automatically with rendered photographs."""
+"""Makes the pictures of rig-guide.md: the rig wizard, run with rendered photographs."""
 
 from __future__ import annotations
 

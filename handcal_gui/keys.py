@@ -65,7 +65,7 @@ def keys_by_group(window: QMainWindow) -> dict[str, list[tuple[str, str]]]:
     groups: dict[str, list[tuple[str, str]]] = {}
     for action in window.findChildren(QAction):
         keys = ", ".join(_native(shortcut) for shortcut in action.shortcuts())
-        if keys:
+        if keys and not _is_of_another_window(action, window):
             meaning = action.whatsThis() or action.text().replace("&", "").rstrip("…")
             row = keys, meaning
             rows = groups.setdefault(_group(action), [])
@@ -85,6 +85,16 @@ def keys_html(window: QMainWindow) -> str:
         for group, keys_of_group in keys_by_group(window).items()
     )
     return f"<table width='640'>{''.join(rows)}</table>"
+
+
+def _is_of_another_window(action: QAction, window: QMainWindow) -> bool:
+    """Return whether an action belongs to a dialog or another window, such as the manual."""
+    owner = action.parent()
+    while isinstance(owner, QWidget) and owner is not window:
+        if owner.isWindow() and not isinstance(owner, QMenu | QDockWidget):
+            return True
+        owner = owner.parent()
+    return False
 
 
 def _group(action: QAction) -> str:

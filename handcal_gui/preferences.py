@@ -26,7 +26,8 @@ from handcal_gui.translation import tr
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
 PREFERENCES_VERSION = 3
 """Version 1 had no number; version 2 had the verifications of a plan as checks."""
-_MOST_SESSIONS = 8
+MOST_RECENT = 8
+"""Number of sessions that are remembered, and listed on the start page."""
 _OLD_ERROR_MAX_ARCMIN = 15.0
 """Default of version 1, which nobody chose."""
 
@@ -68,7 +69,7 @@ class Preferences:
         """Return a copy with a session as the newest."""
         newest = str(path.absolute())
         others = (other for other in self.sessions if other != newest)
-        return replace(self, sessions=(newest, *others)[:_MOST_SESSIONS])
+        return replace(self, sessions=(newest, *others)[:MOST_RECENT])
 
 
 class PreferencesFile:

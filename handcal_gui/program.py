@@ -105,7 +105,8 @@ class Program(QObject):
         self._run(lambda: Station(settings, wearer, pairings=self._current.pairings))
 
     def resume_session(self, path: Path) -> None:
-        """Resume a session, at the station that was used last."""
+        """Resume a session, at the station that was used last or chosen since."""
+        self._keep_entries()
         settings = self.preferences.station
         self._run(lambda: Station(settings, resume=path, pairings=self._current.pairings))
 
@@ -123,6 +124,7 @@ class Program(QObject):
 
     def open_session(self, path: Path) -> None:
         """Open a stored session for review."""
+        self._keep_entries()
         self.live.stop()
         self.window.banner.clear()
         self.review.open(path)
@@ -136,6 +138,7 @@ class Program(QObject):
 
     def show_start(self) -> None:
         """End the calibration or review, and show the start page."""
+        self._keep_entries()
         self.live.stop()
         self.review.close()
         self.start.set_opening(False)
@@ -145,6 +148,7 @@ class Program(QObject):
     def close(self) -> None:
         """Save the window's layout and end all running work; safe to call twice."""
         layouts = self.window.layouts()
+        self._keep_entries()
         self._current.change(
             geometry=self.window.saveGeometry().toBase64().toStdString(),
             live_layout=layouts.get("live", ""),
@@ -155,6 +159,11 @@ class Program(QObject):
         self.live.stop()
         self.review.close()
         self.start.stop()
+
+    def _keep_entries(self) -> None:
+        """Remember the start page's entries, also those with which nothing was started."""
+        if self.window.page == "start":
+            self._current.change(station=self.start.new.settings)
 
     def _connect(self, review_page: ReviewPage) -> None:
         self.start.start_requested.connect(self.start_calibration)
@@ -213,9 +222,8 @@ class Program(QObject):
     def _restore(self) -> None:
         preferences = self.preferences
         self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
-        if preferences.geometry:
-            self.window.restoreGeometry(QByteArray.fromBase64(preferences.geometry.encode()))
-        else:
+        geometry = QByteArray.fromBase64(preferences.geometry.encode())
+        if not self.window.restoreGeometry(geometry):  # none, or that of a far larger screen
             screen = QGuiApplication.primaryScreen().availableSize()
             self.window.resize(screen.boundedTo(QSize(*FIRST_SIZE_PX)))
         layouts: dict[Page, str] = {

@@ -147,7 +147,7 @@ class SeparateWindows(QObject):
         if record is None or not record.alignments:
             self._window.banner.show_message(tr("There is no alignment to inspect yet."))
             return
-        self._window.banner.show_message(tr("The 3D window opens in a few seconds."))
+        self._window.banner.show_notice(tr("The 3D window opens in a few seconds."))
         self._inspection.start(record)
 
     def connect_headset(self) -> ConnectDialog | None:
@@ -213,6 +213,7 @@ class SeparateWindows(QObject):
 
     def edit_preferences(self) -> None:
         """Let the user change the preferences."""
+        self._current.change(station=self._start.new.settings)  # or it would show older ones
         dialog = PreferencesDialog(self._current.now, self._window)
         keep_on_screen(dialog)
         if dialog.exec():

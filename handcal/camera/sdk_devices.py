@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -15,10 +16,11 @@ from typing import Any
 
 from handcal.camera.usb import explain_absence
 from handcal.errors import CameraError
+from handcal.progress import Progress
 from handcal.types import CameraIdentity
 
 _MOST_CHARACTERS = 100
-_LONGEST_LISTING_S = 30.0
+_LONGEST_LISTING_S, _POLL_S = 30.0, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,40 +104,48 @@ def connected_devices() -> list[Device]:
     return [describe_device(device) for device in sdk_devices()]
 
 
-def devices_by_child() -> list[Device]:
+def devices_by_child(progress: Progress = Progress()) -> list[Device]:
     """Return the connected devices as listed by another process, which the SDK may crash.
 
     Raises
     ------
     CameraError
         If the SDK is missing, cannot list devices, crashes, or does not answer.
+    CancelledError
+        If it was cancelled.
     """
     advice = (
         "unplug the camera and plug it in again; if it still fails, reinstall pyrealsense2 "
         "(the simulator, recordings and other cameras work without)"
     )
     command = [sys.executable, "-m", "handcal.camera.sdk_devices"]
-    try:
-        child = subprocess.run(  # noqa: S603
-            command,
-            capture_output=True,
-            stdin=subprocess.DEVNULL,
-            text=True,
-            errors="replace",
-            timeout=_LONGEST_LISTING_S,
-            check=False,
-            # On Windows a console would appear each time that the start page looks.
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-        )
-    except subprocess.TimeoutExpired as error:
-        raise CameraError(
-            f"librealsense lists no devices within {_LONGEST_LISTING_S:g} s: {advice}"
-        ) from error
-    answer = child.stdout.rpartition("\n")[2]  # a library may print before
+    end_s = time.monotonic() + _LONGEST_LISTING_S
+    with subprocess.Popen(  # noqa: S603
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        # On Windows a console would appear each time that the start page looks.
+        creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+    ) as child:
+        while True:
+            try:
+                printed, complaint = child.communicate(timeout=_POLL_S)
+                break
+            except subprocess.TimeoutExpired as error:
+                if progress.is_cancelled() or time.monotonic() > end_s:
+                    child.kill()
+                    progress.check()
+                    raise CameraError(
+                        f"librealsense lists no devices within {_LONGEST_LISTING_S:g} s: {advice}"
+                    ) from error
+    answer = printed.rpartition("\n")[2]  # a library may print before
     try:
         listed = json.loads(answer)
     except ValueError as error:
-        last = child.stderr.strip().rpartition("\n")[2][:_MOST_CHARACTERS]
+        last = complaint.strip().rpartition("\n")[2][:_MOST_CHARACTERS]
         why = ", ".join(filter(None, (f"status {child.returncode}", last)))
         raise CameraError(f"librealsense crashed ({why}): {advice}") from error
     if isinstance(listed, str):

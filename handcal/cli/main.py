@@ -13,7 +13,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import NamedTuple
 
-from handcal.cli.terminal import Command, Parser, errors_in_one_line
+from handcal.cli.terminal import Command, Parser, errors_in_one_line, require_writable
 
 
 class Entry(NamedTuple):
@@ -195,6 +195,8 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     with errors_in_one_line():
         arguments = parse(sys.argv[1:])
+        if results := getattr(arguments, "json", None):
+            require_writable(results)  # before a long task, not after it
         # Imported late: --help needs nothing of it.
         from handcal.io.configuration import keep_font_list_in_configuration
 

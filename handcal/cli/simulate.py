@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any, get_args
 
-from handcal.cli.output import console, save, show_progress, table, triple
+from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
 from handcal.cli.run import ALIGNMENT_OPTIONS
 from handcal.cli.terminal import (
     arg,
@@ -98,7 +98,7 @@ def demo(arguments: argparse.Namespace) -> None:
         fault=arguments.fault or "",
         eye_distance=arguments.eye_distance,
     )
-    with show_progress() as progress:
+    with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         rig = _rig_path(arguments.rig)
         result = run_demo(settings, rig, make_folder(arguments.output), progress)
     save(arguments.json, result)

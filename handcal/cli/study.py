@@ -14,14 +14,12 @@ from handcal.cli.terminal import (
     Option,
     arg,
     command,
-    fail,
     flag,
     folder_option,
     number,
     seed,
     value,
 )
-from handcal.errors import CancelledError
 
 if TYPE_CHECKING:
     from handcal.lab.study.studies import StudyResult
@@ -245,8 +243,5 @@ def _run(arguments: argparse.Namespace, order: Callable[[Progress], StudyResult]
 
 def _unless_interrupted(order: Callable[[Progress], Result]) -> Result:
     """Run a study; exit with code 130 after Ctrl+C."""
-    try:
-        with until_interrupted() as is_cancelled, show_progress(is_cancelled) as progress:
-            return order(progress)
-    except CancelledError as error:
-        fail(str(error), 130)
+    with until_interrupted() as is_cancelled, show_progress(is_cancelled) as progress:
+        return order(progress)

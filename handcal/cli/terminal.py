@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias
 
-from handcal.errors import HandcalError
+from handcal.errors import CancelledError, HandcalError
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -120,12 +120,22 @@ def fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
+def require_writable(path: Path) -> None:
+    """Exit with code 1 if a file cannot be written, as far as that can be known before."""
+    folder = next(one for one in path.absolute().parents if one.exists())
+    if path.is_dir() or not (folder.is_dir() and os.access(folder, os.W_OK)):
+        why = "is a folder" if path.is_dir() else f"{folder} is not a folder that can be written to"
+        fail(f"cannot write {path}: {why}; choose another file", 1)
+
+
 @contextmanager
 def errors_in_one_line() -> Iterator[None]:
     """Turn every expected error inside the block into one line and an exit code."""
     try:
         with _flushed():
             yield
+    except CancelledError as error:
+        fail(str(error), 130)
     except HandcalError as error:
         fail(str(error), 1)
     except KeyboardInterrupt:

@@ -24,7 +24,7 @@ from handcal.session.record import (
     replay,
     sha256,
 )
-from handcal.session.state import SessionState
+from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import Trial
 from handcal.types import EYES, Eye
 
@@ -67,6 +67,8 @@ class LibraryEntry:
     trials_arcmin: float | None = None
     """Mean error of the trials, each trial counting once."""
     is_finished: bool = False
+    is_repaired: bool = False
+    """True for the sound parts of a session, copied by a repair."""
     damaged: int = 0
     """Damaged parts of the journal, and alignments or a rig file other than those it records."""
 
@@ -170,6 +172,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         trials=len(trials),
         trials_arcmin=_mean_arcmin(trials),
         is_finished=state.is_finished,
+        is_repaired=any(one.name == SessionEvent.REPAIRED for one in replayed.journal.events),
         damaged=len(replayed.damaged) + _damaged_files(path, state),
     )
 

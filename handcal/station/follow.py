@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from handcal.errors import HandcalError
+from handcal.errors import CancelledError, HandcalError
 from handcal.progress import Progress
 from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
@@ -54,14 +54,22 @@ def follow_plan(
         If the headset or the wearer does not do a step in time, or the disk is full. The session
         holds what was done by then.
     CancelledError
-        If it was cancelled.
+        If it was cancelled; the message names the session.
     """
     led = _Led(station, patience, progress)
-    led.wait(0.0, "Waiting for the headset", lambda one: one.link.connected, "no headset connected")
-    if station.plan.settings.is_automatic:
-        led.follow()
-    else:
-        led.align(alignments)
+    try:
+        led.wait(
+            0.0, "Waiting for the headset", lambda one: one.link.connected, "no headset connected"
+        )
+        if station.plan.settings.is_automatic:
+            led.follow()
+        else:
+            led.align(alignments)
+    except HandcalError as error:  # Ctrl+C may also have ended the virtual headset
+        if progress.is_cancelled():
+            kept = f"cancelled; what was recorded is in {station.session.path}"
+            raise CancelledError(kept) from error
+        raise
 
 
 def deliver(station: Station) -> Snapshot:
@@ -86,13 +94,13 @@ class _Led:
         reached: tuple[object, ...] = ()
         while step is None or step.name is not StepName.DONE:
             doing = "to begin" if step is None else step.text
-            what = "Following the plan" if step is None else f"{' and '.join(step.eyes)} {doing}"
+            what = "Following the plan" if step is None else f"{_named(step.eyes)}: {doing}"
 
             def is_further(seen: Snapshot, before: tuple[object, ...] = reached) -> bool:
                 new = seen.procedure.next_step
                 return new is not None and new.name not in _PASSING and _place(seen) != before
 
-            seen = self.wait(share, what.strip(), is_further, f"the plan stopped at: {doing}")
+            seen = self.wait(share, what, is_further, f"the plan stopped at: {doing}")
             reached, step = _place(seen), seen.procedure.next_step
             share += 0.15 * (0.95 - share)  # how many steps remain is not known
         if self.station.calibration.results is None:
@@ -102,8 +110,7 @@ class _Led:
         """Make every alignment; solve and apply after each."""
         calibration, count = self.station.calibration, len(alignments)
         for done, eyes in enumerate(alignments):
-            which = "both eyes" if len(eyes) == 2 else f"the {eyes[0]} eye"
-            label = f"Alignment {done + 1} of {count}, {which}"
+            label = f"Alignment {done + 1} of {count}, {_named(eyes)}"
             self.wait(
                 (done + 0.1) / count,
                 f"{label}: waiting for a steady hand",
@@ -153,6 +160,10 @@ class _Led:
         raise HandcalError(
             f"{complaint} within {self.patience.seconds:g} s{f': {why}' if why else ''}"
         )
+
+
+def _named(eyes: Sequence[Eye]) -> str:
+    return f"the {eyes[0]} eye" if len(eyes) == 1 else "both eyes"
 
 
 def _place(snapshot: Snapshot) -> tuple[object, ...]:

@@ -19,6 +19,7 @@ from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
+from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
 from handcal.station.doctor import Finding, Health, examine_camera, examine_disk, with_rig
 from handcal.station.settings import StationSettings
@@ -32,7 +33,9 @@ PARTS: dict[Part, str] = {
 }
 
 
-def check_station(settings: StationSettings, pairing_key: str) -> dict[Part, Finding]:
+def check_station(
+    settings: StationSettings, pairing_key: str, progress: Progress = Progress()
+) -> dict[Part, Finding]:
     """Check each part of a station without opening it; never raises.
 
     Takes a few milliseconds; a RealSense is looked for by another process, which takes longer.
@@ -42,9 +45,11 @@ def check_station(settings: StationSettings, pairing_key: str) -> dict[Part, Fin
     settings : StationSettings
     pairing_key : str
         For a network headset.
+    progress : Progress
+        If it is cancelled, that process ends, and the finding about the camera says so.
     """
     return {
-        "camera": _look("camera", lambda: _camera(settings), "or use the simulator"),
+        "camera": _look("camera", lambda: _camera(settings, progress), "or use the simulator"),
         "headset": _look("headset", lambda: _headset(settings, pairing_key), "choose another port"),
         "rig": _look("rig", lambda: _rig(settings), "choose another rig file"),
         "sessions": _look("sessions", lambda: _sessions(settings), "choose another folder"),
@@ -80,10 +85,10 @@ def _broken(found: str, advice: str) -> Finding:
     return Finding("", Health.BROKEN, found, advice)
 
 
-def _camera(settings: StationSettings) -> Finding:
+def _camera(settings: StationSettings, progress: Progress) -> Finding:
     match settings.source:
         case "realsense":
-            device = choose_device(devices_by_child(), settings.realsense.serial)
+            device = choose_device(devices_by_child(progress), settings.realsense.serial)
             return with_rig(examine_camera(device), _chosen_rig(settings), device.identity)
         case "hololens2":
             return _hololens2(settings)

@@ -3596,6 +3596,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Repaired copy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Unfinished, repaired copy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Finished</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3985,15 +3993,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} is sound: there is nothing to repair.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{}: a copy with {} and {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Deleting {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{} deleted; Restore brings the last one back.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4026,6 +4034,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Delete sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last deleted: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4321,7 +4333,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>60 mm, as printed by default</source>
+        <source>60 mm cube</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4430,6 +4442,18 @@ one turns out.</source>
     </message>
     <message>
         <source>trials stored: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} is not one session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>close this window and choose the wearer&apos;s session under Sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Let the wearer put the headset on, and start.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4649,11 +4673,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>nothing</source>
+        <source>calibrated: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} (calibrated: {})</source>
+        <source>not calibrated yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5013,6 +5037,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>; still as in the initial rig: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Save the rig file</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5317,7 +5345,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The calibration target and the initial rig.</source>
+        <source>Print the board at 100 %, measure a square and enter its size.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

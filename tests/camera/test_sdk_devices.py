@@ -19,7 +19,8 @@ from handcal.camera.sdk_devices import (
     devices_by_child,
     librealsense,
 )
-from handcal.errors import CameraError
+from handcal.errors import CameraError, CancelledError
+from handcal.progress import Progress
 from handcal.types import CameraIdentity
 
 D415 = Device("Intel RealSense D415", "123", "5.16.0.1", "3.2", temperature_c=41.0)
@@ -91,6 +92,16 @@ def test_an_sdk_that_crashes_or_hangs_is_one_clear_line(
     monkeypatch.setattr(sdk_devices, "_LONGEST_LISTING_S", limit_s)
     with pytest.raises(CameraError, match=reason):
         devices_by_child()
+
+
+@pytest.mark.process
+def test_a_listing_that_hangs_ends_when_it_is_cancelled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pyrealsense2.py").write_text("import time; time.sleep(600)\n")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    with pytest.raises(CancelledError):
+        devices_by_child(Progress(is_cancelled=lambda: True))
 
 
 @pytest.mark.parametrize(

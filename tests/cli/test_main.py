@@ -121,6 +121,8 @@ def test_misuse_is_one_line_and_exit_code_2(
     [
         ("segment --color a --depth b --intrinsics c --output d", "cannot read c: No such file"),
         ("solve nowhere", "nowhere is not a session"),
+        ("bench --json one_session", "cannot write one_session: is a folder"),
+        ("bench --json one_session/journal.jsonl/a", "journal.jsonl is not a folder"),
         ("prior one_session", "one_session is one session; choose the folder above"),
         ("replay nowhere.db3", "there is no recording nowhere.db3"),
         ("replay text.txt", "text.txt is not a recording"),
@@ -298,6 +300,7 @@ def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: 
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None
@@ -306,13 +309,14 @@ def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: 
                 assert process.poll() is None, process.stderr.read()
             children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
             assert len(children) == 1
-            process.send_signal(signal.SIGINT)
+            os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the headset gets it, too
             assert process.wait(20.0) == 130
-            assert process.stderr.read() == "handcal: interrupted\n"
+            (path,) = runs.iterdir()
+            said = f"handcal: cancelled; what was recorded is in {path}\n"
+            assert process.stderr.read() == said
         finally:
             process.kill()
     assert not Path("/proc", children[0]).exists()
-    (path,) = runs.iterdir()
     record = Session.open(path)
     assert [event.name for event in record.events] == ["created", "facts_saved", "cursor_made"]
     assert record.torn_bytes == 0

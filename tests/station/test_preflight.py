@@ -78,7 +78,7 @@ def test_a_realsense_is_found_or_missed(
     settings: StationSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     devices: list[Device] = []
-    monkeypatch.setattr(preflight, "devices_by_child", lambda: devices)
+    monkeypatch.setattr(preflight, "devices_by_child", lambda _: devices)
     live = replace(settings, source="realsense", headset="network")
     assert find("camera", live).health is Health.BROKEN
     assert "plug one into a USB 3 port" in find("camera", live).found
@@ -197,7 +197,7 @@ def test_another_camera_than_the_rig_s_is_reported(
 ) -> None:
     rig = replace(example_rig(), depth_camera=D415.identity)
     write_rig(tmp_path / "rig.yaml", rig)
-    monkeypatch.setattr(preflight, "devices_by_child", lambda: [D415])
+    monkeypatch.setattr(preflight, "devices_by_child", lambda _: [D415])
     live = replace(settings, source="realsense", headset="network", rig=str(tmp_path / "rig.yaml"))
     assert find("camera", live).health is Health.GOOD
     write_rig(tmp_path / "rig.yaml", replace(rig, depth_camera=CameraIdentity("", "456")))
@@ -233,7 +233,7 @@ def test_a_real_hand_needs_a_real_headset(settings: StationSettings, tmp_path: P
 def test_a_network_headset_cannot_be_waited_for(
     settings: StationSettings, taken_port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(preflight, "devices_by_child", list)
+    monkeypatch.setattr(preflight, "devices_by_child", lambda _: [])
     assert "simulator" in find("headset", replace(settings, headset="network")).found
     live = replace(settings, source="realsense", headset="network")
     assert "cannot listen" in find("headset", replace(live, port=taken_port)).found

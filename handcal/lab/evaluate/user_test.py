@@ -103,9 +103,9 @@ def read_user_test(folders: Iterable[Path], progress: Progress = Progress()) -> 
             if record.left_out:
                 left_out[str(path)] = record.left_out
     if not kept:
-        reasons = "; ".join(f"{path}: {why}" for path, why in list(left_out.items())[:3])
         raise FileError(
-            f"there is no trial of the user test to evaluate ({reasons or 'no folder'})"
+            "there is no trial of the user test to evaluate; record some first "
+            f"({_reasons(left_out) or 'no folder'})"
         )
     names = Counter(path.name for path in kept)
     sessions = {
@@ -141,6 +141,14 @@ def _sessions(folder: Path) -> Iterator[Path]:
     if (folder / "journal.jsonl").exists() or not inside:
         inside = [folder]
     yield from (path.absolute() for path in inside)
+
+
+def _reasons(left_out: Mapping[str, str]) -> str:
+    """Return why sessions were left out; those with the same reason are counted."""
+    counts = Counter(left_out.values())
+    single = (f"{path}: {why}" for path, why in left_out.items() if counts[why] == 1)
+    common = (f"{count} sessions: {why}" for why, count in counts.items() if count > 1)
+    return "; ".join([*common, *single][:3])
 
 
 def _unfit(record: SessionRecord, kept: Mapping[Path, SessionRecord]) -> str:

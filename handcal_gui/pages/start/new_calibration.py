@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QSizePolicy
 
+from handcal.progress import Progress
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import Part, is_ready
@@ -21,9 +23,13 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, scrollable
 
-Check = Callable[[StationSettings, str], Mapping[Part, Finding]]
+Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
 
 _SETTLE_MS, _AGAIN_MS = 300, 3000
+_AGAIN_BY_PROCESS_MS = 10_000
+"""For a RealSense, which another process looks for: 0.2 s of processor time."""
+_AGAIN_UNSEEN_MS = 60_000
+"""While another program has the keys: a camera plugged in meanwhile is found on return."""
 
 
 class NewCalibration(Card):
@@ -34,7 +40,8 @@ class NewCalibration(Card):
     preferences : Preferences
     pairing_key : str
     check : callable
-        Given settings and pairing key, returns the finding about each part; called in a job.
+        Given settings, pairing key and a progress that may be cancelled, returns the finding about
+        each part; called in a job.
 
     Attributes
     ----------
@@ -80,11 +87,13 @@ class NewCalibration(Card):
         self._cancel.hide()
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._lay_out()
-        self._check = LatestJob(lambda question: check(*question), self)
+        self._has_stopped = threading.Event()
+        progress = Progress(is_cancelled=self._has_stopped.is_set)
+        self._check = LatestJob(lambda question: check(*question, progress), self)
         self._check.answered.connect(self._on_findings)
         self._check.failed.connect(self._show_problem)
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
-        self._again = QTimer(self, interval=_AGAIN_MS)
+        self._again = QTimer(self, singleShot=True)
         self._settle.timeout.connect(self.check)
         self._again.timeout.connect(self.check)
         self._form.changed.connect(self._settle.start)
@@ -134,6 +143,8 @@ class NewCalibration(Card):
         is_covered = QApplication.activeModalWidget() is not None
         if self.isVisible() and not self._is_opening and not is_covered:
             self._check.ask(self._question())
+        if self.isVisible():
+            self._again.start(self._again_ms())
 
     def start(self) -> None:
         """Check the station again, and start if it is ready."""
@@ -160,7 +171,8 @@ class NewCalibration(Card):
             self.check()
 
     def stop(self) -> None:
-        """Wait for background work to end; called before the program ends."""
+        """Cancel background work and wait for its end; called before the program ends."""
+        self._has_stopped.set()
         self._settle.stop()
         self._again.stop()
         self._check.stop()
@@ -179,13 +191,24 @@ class NewCalibration(Card):
         super().showEvent(event)
         self._wearer.setFocus()
         self.check()
-        self._again.start()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Check the station when the window gets the keys again, unless that was just done."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange and self._again.isActive():
+            since_ms = self._again.interval() - self._again.remainingTime()
+            self._again.start(max(self._again_ms() - since_ms, 0))
 
     def hideEvent(self, event: QHideEvent) -> None:
         """Stop checking the station."""
         super().hideEvent(event)
         self._settle.stop()
         self._again.stop()
+
+    def _again_ms(self) -> int:
+        if not self.isActiveWindow():
+            return _AGAIN_UNSEEN_MS
+        return _AGAIN_BY_PROCESS_MS if self.settings.source == "realsense" else _AGAIN_MS
 
     def _question(self) -> tuple[StationSettings, str]:
         return self._form.settings, self._key

@@ -12,11 +12,10 @@ from handcal.session.library import EyeOutcome, eye_outcomes
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
 from handcal.types import Eye
+from handcal_gui.preferences import MOST_RECENT
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.times import local_time
-
-_MOST_RECENT = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +62,7 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
             for session in unfinished
             if session.problem or session.alignments or session.trials
         ),
-        recent=tuple(islice((entry for entry in offered if entry is not None), _MOST_RECENT)),
+        recent=tuple(islice((entry for entry in offered if entry is not None), MOST_RECENT)),
     )
 
 

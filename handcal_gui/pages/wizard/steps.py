@@ -280,7 +280,7 @@ _REPEATS: dict[Action, tuple[Eye, ...]] = {
 
 
 def _advice(snapshot: Snapshot) -> Advice | None:
-    """Return the advice for the eye with the largest expected error; None if no eye is to be repeated."""
+    """Return the advice for the eye with the largest expected error; None without one to repeat."""
     results = snapshot.procedure.results
     if results is None:
         return None

@@ -216,6 +216,7 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
         tr("Number of processes on this computer; more than its cores is not faster."),
     )
     processes.setSpecialValueText(tr("One per core"))
+    processes.setMinimumWidth(processes.sizeHint().width())
     scheduler = with_name(
         QLineEdit(placeholderText=tr("None: this computer"), clearButtonEnabled=True),
         "scheduler",

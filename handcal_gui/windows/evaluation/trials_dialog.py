@@ -13,6 +13,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from handcal.progress import Progress
+from handcal.session.journal import JOURNAL
 from handcal.session.trial import Trial
 from handcal.station.doctor import Finding, Health
 from handcal.station.user_test import StudyLeader, TrialOrder, record_user_trials
@@ -136,6 +137,7 @@ class TrialsDialog(PreparationDialog):
         self._record = record
         self._desk: _Desk | None = None
         self._step: _Step | None = None
+        self._has_session = (Path(entries.sessions).expanduser() / JOURNAL).is_file()
         self.form = EntriesForm(
             {
                 "headset": (
@@ -149,9 +151,7 @@ class TrialsDialog(PreparationDialog):
                 ),
                 "cube": (
                     tr("Cube"),
-                    PathField(
-                        tr("Cube"), "file", tr("Cubes (*.json)"), tr("60 mm, as printed by default")
-                    ),
+                    PathField(tr("Cube"), "file", tr("Cubes (*.json)"), tr("60 mm cube")),
                 ),
             }
         )
@@ -159,7 +159,7 @@ class TrialsDialog(PreparationDialog):
         self._instruction = paragraph("instruction")
         self._found = FindingLine("trials")
         self._bar = JobBar()
-        self._start = button("start", tr("Start"))
+        self._start = main_button("start", tr("Start"))
         self._next = main_button("next", tr("They coincide"))
         self._next.setMinimumWidth(self._next.sizeHint().width())
         self._close = button("close", tr("Close"))
@@ -180,9 +180,7 @@ class TrialsDialog(PreparationDialog):
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
-        self._found.show_finding(
-            Finding("", Health.LIMITED, tr("trials will be stored in {}").format(entries.sessions))
-        )
+        self._found.show_finding(self._place_found())
         self._refresh()
 
     def start(self) -> None:
@@ -241,18 +239,33 @@ class TrialsDialog(PreparationDialog):
         self._found.show_finding(Finding("", Health.BROKEN, why))
         self._refresh()
 
+    def _place_found(self) -> Finding:
+        """Return where the trials will be stored, or why they cannot."""
+        folder = self.entries.sessions
+        if self._has_session:
+            return Finding("", Health.GOOD, tr("trials will be stored in {}").format(folder))
+        return Finding(
+            "",
+            Health.BROKEN,
+            tr("{} is not one session").format(folder),
+            tr("close this window and choose the wearer's session under Sessions"),
+        )
+
     def _keep(self) -> None:
         self.entries = self.form.take(self.entries)
 
     def _refresh(self) -> None:
         step = self._step if self._bar.is_busy else None
         self.form.setEnabled(not self._bar.is_busy)
-        self._start.setEnabled(not self._bar.is_busy)
+        self._start.setVisible(not self._bar.is_busy)
+        self._start.setEnabled(not self._bar.is_busy and self._has_session)
+        self._next.setVisible(self._bar.is_busy)
         self._next.setEnabled(step is not None)
         for move in self._moves.values():
             move.setEnabled(step is not None and step.is_adjusting)
         self._next.setText(tr("They coincide") if step is None else step.button)
-        self._instruction.setText("" if step is None else step.text)
+        first = "" if self._bar.is_busy else tr("Let the wearer put the headset on, and start.")
+        self._instruction.setText(first if step is None else step.text)
 
     def _lay_out(self) -> None:
         scale_font(self._instruction, 1.6, is_bold=True)

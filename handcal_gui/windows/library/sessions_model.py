@@ -69,6 +69,8 @@ def _state(entry: LibraryEntry) -> str:
         return tr("Unreadable")
     if entry.damaged:
         return tr("Damaged: {}").format(pluralize(entry.damaged, tr("part"), tr("parts")))
+    if entry.is_repaired:
+        return tr("Repaired copy") if entry.is_finished else tr("Unfinished, repaired copy")
     return tr("Finished") if entry.is_finished else tr("Unfinished")
 
 

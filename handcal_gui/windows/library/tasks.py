@@ -32,9 +32,11 @@ def check_sessions(paths: Sequence[Path], progress: Progress) -> str:
 
 
 def repair_beside(path: Path, progress: Progress) -> str:
-    """Copy what is sound of a session to a new one beside it; return a message."""
-    output = _free(path.with_name(f"{path.name}-repaired"))
+    """Copy what is sound of a damaged session to a new one beside it; return a message."""
     progress.at(0.0, tr("Repairing {}").format(path.name))
+    if check_session(path).state == "sound":
+        return tr("{} is sound: there is nothing to repair.").format(path.name)
+    output = _free(path.with_name(f"{path.name}-repaired"))
     made = repair_session(path, output)
     kept = pluralize(len(made.alignments), tr("alignment"), tr("alignments"))
     return tr("{}: a copy with {} and {}.").format(
@@ -47,9 +49,7 @@ def delete_sessions(paths: Sequence[Path], progress: Progress) -> str:
     for done, path in enumerate(paths):
         progress.at(done / len(paths), tr("Deleting {}").format(path.name))
         delete_session(path)
-    return tr("{} deleted; Restore brings the last one back.").format(
-        pluralize(len(paths), tr("session"), tr("sessions"))
-    )
+    return tr("{} deleted.").format(pluralize(len(paths), tr("session"), tr("sessions")))
 
 
 def restore_deleted(path: Path, _progress: Progress) -> str:

@@ -65,6 +65,11 @@ class TrendPlot(Plot):
 
 
 def calibrations_of(wearer: str, entries: Sequence[LibraryEntry]) -> list[LibraryEntry]:
-    """Return the solved sessions of a wearer, the oldest first; none of a wearer without a name."""
+    """Return the solved sessions of a wearer, the oldest first; none of a wearer without a name.
+
+    A repaired copy counts instead of the session that it was copied from.
+    """
     found = [entry for entry in entries if wearer and entry.wearer == wearer and entry.eyes]
+    copies = {entry.started: entry for entry in found if entry.is_repaired}
+    found = [entry for entry in found if copies.get(entry.started, entry) is entry]
     return sorted(found, key=lambda entry: (entry.started, entry.path.name))

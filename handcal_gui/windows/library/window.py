@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QItemSelectionModel, Qt, Signal
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QDialog,
@@ -43,8 +43,9 @@ from handcal_gui.windows.library.tasks import (
 )
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
-_MOST_SHOWN_PX = 150
-_LONG_NAMES_PX = {tr("Rig"): 100, tr("Headset"): 100}
+_MOST_SHOWN_PX = 300
+_LONG_NAMES_PX = {tr("Rig"): 60, tr("Headset"): 60, tr("Wearer"): 120}
+"""Widths that remain of columns with long texts, in the order in which they are cut."""
 _TREND_PX = 20 * SPACING_PX
 
 
@@ -126,13 +127,20 @@ class LibraryWindow(QDialog):
         self._begin_search()
         self.reload()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give the columns the room there is."""
+        super().resizeEvent(event)
+        self._fit_columns()
+
     def _read(
         self, known: Sequence[LibraryEntry]
     ) -> tuple[tuple[LibraryEntry, ...], tuple[Path, ...]]:
         return read_library(self._folder, known), deleted_sessions(self._folder)
 
     def _show(self, entries: tuple[LibraryEntry, ...], deleted: tuple[Path, ...]) -> None:
-        chosen = {entry.path for entry in self.chosen}
+        shown = {entry.path for entry in self._sessions.entries}
+        made = {entry.path for entry in entries} - shown if self._is_read else set()
+        chosen = made or {entry.path for entry in self.chosen}  # a copy or what was restored
         self._deleted, self._is_read = deleted, True
         if entries != self._sessions.entries:
             self._sessions.show_entries(entries)
@@ -148,10 +156,22 @@ class LibraryWindow(QDialog):
                 self._table.selectionModel().select(place, flags.Select | flags.Rows)
 
     def _fit_columns(self) -> None:
-        self._table.resizeColumnsToContents()
-        for number, column in enumerate(COLUMNS):
-            most_px = _LONG_NAMES_PX.get(column.title, _MOST_SHOWN_PX)
-            self._table.setColumnWidth(number, min(self._table.columnWidth(number), most_px))
+        """Show every column's contents; long names are cut as far as the room demands."""
+        across = self._table.horizontalHeader()
+        wanted_px = {
+            column.title: min(
+                max(self._table.sizeHintForColumn(number), across.sectionSizeHint(number)),
+                _MOST_SHOWN_PX,
+            )
+            for number, column in enumerate(COLUMNS)
+        }
+        excess_px = sum(wanted_px.values()) - self._table.viewport().width()
+        for title, least_px in _LONG_NAMES_PX.items():
+            cut_px = max(min(excess_px, wanted_px[title] - least_px), 0)
+            wanted_px[title] -= cut_px
+            excess_px -= cut_px
+        for number, width_px in enumerate(wanted_px.values()):
+            self._table.setColumnWidth(number, width_px)
 
     def _begin_search(self) -> None:
         self._search.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -175,7 +195,7 @@ class LibraryWindow(QDialog):
         self._undo.setVisible(bool(self._deleted))
         self._undo.setEnabled(is_free and bool(self._deleted))
         last = self._deleted[-1].name if self._deleted else ""
-        self._deleted_text.setText(tr("{} deleted.").format(last) if last else "")
+        self._deleted_text.setText(tr("Last deleted: {}").format(last) if last else "")
         shown, total = self._filter.rowCount(), self._sessions.rowCount()
         count = (
             pluralize(total, tr("session"), tr("sessions"))
@@ -228,6 +248,7 @@ class LibraryWindow(QDialog):
     def _start(self, work: Work) -> None:
         if self._job is not None:
             return
+        self._table.setFocus()  # or the search gets it from a button that is disabled
         self._job = Job(work)
         self._job.progressed.connect(lambda doing, _: self._say(f"{doing}…"))
         self._job.succeeded.connect(self._end)

@@ -197,8 +197,10 @@ class BoardPage(QWidget):
         return answer == QMessageBox.StandardButton.Yes
 
     def _show_rig(self) -> None:
-        parts = ", ".join(self._project.rig.origins) or tr("nothing")
-        self._rig.setText(tr("{} (calibrated: {})").format(self._project.rig.name, parts))
+        rig = self._project.rig
+        calibrated = tr("calibrated: {}").format(", ".join(rig.origins))
+        state = calibrated if rig.origins else tr("not calibrated yet")
+        self._rig.setText(f"{rig.name} ({state})")
 
     def _lay_out(self) -> None:
         squares, paper, rig = QWidget(), QWidget(), QWidget()

@@ -21,6 +21,7 @@ from handcal.errors import FileError, HandcalError
 from handcal.rig.check import MAX_TEXT
 from handcal.rig.report import report_rig
 from handcal.rig.rig_file import read_rig, write_rig
+from handcal.rig_types import RIG_PARTS
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
@@ -86,10 +87,13 @@ class ResultPage(QWidget):
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         doubtful = sum(not one.is_fine for one in findings)
         text = tr("{} of {} findings are doubtful: see Check").format(doubtful, len(findings))
-        health = Health.LIMITED if doubtful else Health.GOOD
-        self._end.show_finding(
-            Finding("", health, text if doubtful else tr("no doubtful findings"))
-        )
+        missing = [part for part in RIG_PARTS if part not in rig.origins]
+        if not doubtful:
+            text = tr("no doubtful findings")
+        if missing:
+            text += tr("; still as in the initial rig: {}").format(", ".join(missing))
+        health = Health.LIMITED if doubtful or missing else Health.GOOD
+        self._end.show_finding(Finding("", health, text))
         self._saved = None
         self._use.setEnabled(False)
         self._compare()

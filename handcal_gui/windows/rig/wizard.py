@@ -22,7 +22,7 @@ from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, with_name
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
 from handcal_gui.windows.rig.project import RigProject
@@ -36,7 +36,7 @@ _RAIL_PX = 29 * SPACING_PX
 _SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
 _BOARD, _VIEWPOINT = tr("Board"), tr("Viewpoint camera")
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
-    _BOARD: (tr("The calibration target and the initial rig."), None),
+    _BOARD: (tr("Print the board at 100 %, measure a square and enter its size."), None),
     tr("Depth and headset camera"): (
         tr("Pose of the depth camera on the headset: T_H_D."),
         "T_H_D",
@@ -102,7 +102,7 @@ class RigWizard(QDialog):
             DisplayPage(self.project, "right"),
             result,
         ):
-            self._stack.addWidget(page)
+            self._stack.addWidget(scrollable(page))  # or a low screen hides the buttons below
             self._pages.append(page)
         self._back = button("rigBack", tr("Back"))
         self._next = button("rigNext", tr("Next"))
@@ -176,7 +176,7 @@ class RigWizard(QDialog):
         if part is not None:
             return origins[part].verdict if part in origins else ""
         if title == _BOARD:
-            return "good"
+            return "good" if origins or self.project.camera_verdict else ""  # it was found
         if title == _VIEWPOINT:
             return self.project.camera_verdict
         verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}

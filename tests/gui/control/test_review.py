@@ -22,6 +22,7 @@ from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.path_field import PathField
 
 PATIENCE_MS = 20_000
 
@@ -67,10 +68,16 @@ def is_open(program: Program) -> bool:
 def test_the_example_is_opened_from_the_start_page(
     program: Program, qtbot: QtBot, tmp_path: Path
 ) -> None:
+    entered = str(tmp_path / "sessions")
+    (folder,) = (
+        one for one in program.start.findChildren(PathField) if one.name == "Session folder"
+    )
+    folder.set_path(entered)
     program.start.example_requested.emit(tmp_path / "sessions")
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
     program.show_start()
+    assert program.start.new.settings.sessions == entered  # kept for the next wearer
     program.start.example_requested.emit(tmp_path / "preferences.json" / "none")
     assert "preferences.json" in program.window.banner.text
 

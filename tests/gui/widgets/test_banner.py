@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
@@ -31,3 +32,18 @@ def test_the_newest_message_wins(qtbot: QtBot) -> None:
     assert banner.text == "second"
     banner.clear()
     assert banner.isHidden()
+
+
+def test_a_notice_ends_by_itself_and_closes_no_message(qtbot: QtBot) -> None:
+    banner = Banner()
+    qtbot.addWidget(banner)
+    timer = banner.findChild(QTimer)
+    assert isinstance(timer, QTimer)
+    banner.show_notice("opens soon")
+    assert (banner.text, timer.isActive()) == ("opens soon", True)
+    timer.timeout.emit()
+    assert banner.isHidden()
+    banner.show_notice("opens soon")
+    banner.show_message("it failed")
+    timer.timeout.emit()
+    assert banner.text == "it failed"

@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import pytest
+from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from handcal_gui import theme
@@ -81,3 +85,16 @@ def test_a_gap_is_not_bridged(plot: Plot) -> None:
 def test_neither_wheel_nor_menu_changes_a_plot(plot: Plot) -> None:
     assert plot.item.vb.state["mouseEnabled"] == [False, False]
     assert not plot.item.vb.menuEnabled()
+
+
+@pytest.mark.usefixtures("qapp")
+def test_no_menu_of_pyqtgraph_outlives_a_plot() -> None:
+    before = set(QApplication.topLevelWidgets())
+    plot = Plot("errors", "Errors", "x", "y")
+    gc.disable()  # Python would free the menu some time
+    try:
+        plot.deleteLater()
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        assert set(QApplication.topLevelWidgets()) <= before
+    finally:
+        gc.enable()

@@ -122,6 +122,9 @@ def test_a_single_wearers_interval_is_over_calibrations(folder: Path) -> None:
 def test_without_trials_there_is_nothing_to_evaluate(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"no trial of the user test.*no-trial: holds no trial"):
         read_user_test([folder / "no-trial"])
+    second = make_session(tmp_path / "other", "e", np.empty((0, 3)), "second")
+    with pytest.raises(FileError, match=r"\(2 sessions: holds no trial of the user test\)"):
+        read_user_test([folder / "no-trial", second])
     with pytest.raises(FileError, match="is not a session"):
         read_user_test([tmp_path])
 

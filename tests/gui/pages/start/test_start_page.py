@@ -30,6 +30,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
+from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
@@ -50,8 +51,12 @@ class Inspector:
         self.threads: set[threading.Thread] = set()
         self.offers = KnownSessions((), ())
         self.folders: list[Path] = []
+        self.progress = Progress()
 
-    def check(self, settings: StationSettings, pairing_key: str) -> Mapping[Part, Finding]:
+    def check(
+        self, settings: StationSettings, pairing_key: str, progress: Progress
+    ) -> Mapping[Part, Finding]:
+        self.progress = progress
         self.asked.append((settings, pairing_key))
         self.threads.add(threading.current_thread())
         return {
@@ -409,3 +414,22 @@ def test_a_check_that_breaks_down_is_reported_and_starts_nothing(
     with qtbot.assertNotEmitted(page.start_requested, wait=50):
         page.new.check()
         qtbot.waitUntil(button(page, "start").isEnabled)
+
+
+def test_a_realsense_is_looked_for_less_often_and_least_by_an_inactive_window(
+    open_page: Callable[..., StartPage], inspector: Inspector, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = open_page(source="realsense", realsense=RealSenseSettings("42"))
+    intervals_ms = []
+    for is_active in (True, False):
+        monkeypatch.setattr(page.new, "isActiveWindow", lambda found=is_active: found)
+        page.new.check()
+        intervals_ms.append(page.new._again.interval())
+    choose(page, "source", "simulator")
+    monkeypatch.setattr(page.new, "isActiveWindow", lambda: True)
+    page.new.check()
+    simulator_ms = page.new._again.interval()
+    assert simulator_ms < intervals_ms[0] < intervals_ms[1]
+    assert not inspector.progress.is_cancelled()
+    page.stop()
+    assert inspector.progress.is_cancelled()  # a process that hangs is not waited for

@@ -135,3 +135,10 @@ def test_closing_ends_a_running_trial(
     qtbot.waitUntil(lambda: instruction.text() != "", timeout=20_000)
     dialog.reject()
     assert not dialog.isVisible()
+
+
+def test_a_folder_of_sessions_is_refused_at_once(qtbot: QtBot, tmp_path: Path) -> None:
+    dialog = TrialsDialog(UserEntries(sessions=str(tmp_path), headset="virtual"))
+    qtbot.addWidget(dialog)
+    assert "is not one session" in part(dialog, QLabel, "trialsFound").text()
+    assert not part(dialog, QPushButton, "start").isEnabled()

@@ -13,10 +13,12 @@ from PySide6.QtWidgets import QComboBox, QLineEdit, QPushButton, QTableView
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
+from handcal.session.library import read_library
+from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import Alignment
 from handcal_gui.windows.library.sessions_model import FILTERS
-from handcal_gui.windows.library.trend_plot import TrendPlot
+from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.helpers import child, text
 
@@ -169,6 +171,31 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
     qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
     assert (folder / "cid-repaired").is_dir()
     assert not Session.open(folder / "cid-repaired").damaged
+    assert [row[8] for row in rows(window)].count("Unfinished, repaired copy") == 1
+    assert [entry.path.name for entry in window.chosen] == ["cid-repaired"]
+
+
+def test_a_sound_session_is_not_copied(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    choose(window, "Bea")
+    press(window, "repairSession")
+    wait_for(qtbot, window, "bea is sound: there is nothing to repair.")
+    assert not (folder / "bea-repaired").exists()
+
+
+def test_a_repaired_copy_counts_once(folder: Path) -> None:
+    repair_session(folder / "ada-1", folder / "ada-1-repaired")
+    found = calibrations_of("Ada", read_library(folder))
+    assert [entry.path.name for entry in found] == ["ada-1-repaired", "ada-2"]
+
+
+def test_long_names_are_cut_and_nothing_else(window: LibraryWindow) -> None:
+    across = table(window).horizontalHeader()
+    for width_px in (900, 1600):
+        window.resize(width_px, 600)
+        assert across.length() <= table(window).viewport().width()
+        for column in (1, 4, 5, 6, 7):
+            assert across.sectionSize(column) >= table(window).sizeHintForColumn(column)
+    assert across.sectionSize(2) >= table(window).sizeHintForColumn(2)  # the rig: room for all
 
 
 def test_delete_and_restore(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:

@@ -71,7 +71,7 @@ def test_a_rig_is_calibrated_saved_and_used(
     qtbot: QtBot, wizard: RigWizard, choose: Callable[[Path], None], folder: Path, tmp_path: Path
 ) -> None:
     undone = "not done yet"
-    assert marks(wizard) == ["good", *[undone] * 5]
+    assert marks(wizard) == [undone] * 6
     assert "added to the rig" in solve(qtbot, wizard, STEREO)
     assert "displays will be calibrated with it" in solve(qtbot, wizard, VIEWPOINT)
     assert "added to the rig" in solve(qtbot, wizard, LEFT)
@@ -168,6 +168,21 @@ def test_closing_ends_what_runs(wizard: RigWizard) -> None:
     wizard.show_step(STEREO)
     wizard.accept()
     assert not any(bar.is_busy for bar in wizard.findChildren(JobBar))
+
+
+def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
+    assert marks(wizard) == ["not done yet"] * 6
+    wizard.show_step(RESULT)
+    found = child(wizard, QLabel, "savedRigFound").text()
+    assert "still as in the initial rig: left, right, T_H_D" in found
+
+
+def test_a_low_screen_shows_the_buttons_below(wizard: RigWizard) -> None:
+    wizard.show_step(STEREO)
+    wizard.resize(900, 450)
+    assert wizard.height() == 450
+    last = child(wizard, QPushButton, "rigNext")
+    assert wizard.rect().contains(last.geometry())
 
 
 def test_back_and_next_lead_through_the_steps(wizard: RigWizard) -> None:
