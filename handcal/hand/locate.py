@@ -18,6 +18,7 @@ from handcal.errors import HandError
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
 from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
+from handcal.hand.wrist import box_exit_m, find_wrist_m
 from handcal.types import Bool, Float32, Float64
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
@@ -35,17 +36,7 @@ _PALM_SIGMA_M, _PALM_STEPS = 0.04, 2
 # The forearm's axis runs from the palm to the mean of the arm about this distance from it.
 _ARM_M, _ARM_SIGMA_M = 0.11, 0.025
 _AXIS_STEPS = 3
-_LEAST_COS = 0.5  # of the angle between the axis and the image plane
-# Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
-# (same survey), and an inscribed circle of 40 to 45 mm in radius touches its upper end.
-_WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
-# A detector's box ends at the wrist or behind it, with this error.
-_BEYOND_BOX_M = 0.025
-# The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
-# another is e times less likely the wrist.
-_BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
-_PROFILE_M = (-0.02, 0.16)
-_LIMB_WIDTH_M, _ARM_RADIUS_M = 0.03, 0.014  # a narrower limb is no arm; a finger is 24 mm wide
+_ARM_RADIUS_M = 0.014  # a narrower limb is no arm; a finger is 24 mm wide
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
 _GAP_M, _JUMP_M = 0.015, 0.05
 # One no larger than a finger may be as far before or behind as a finger is long.
@@ -58,9 +49,6 @@ PART_M2 = 5e-5
 # sigma; what this share of the pixels near the middle is behind by a hand's thickness is not seen.
 _BOX_SIGMA, _IN_BOX, _NEAREST, _LAYER_M = 0.35, 0.35, 0.1, 0.12
 _ARM_IN_BOX_MAX = 0.25
-
-_SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
-_SMOOTHING /= _SMOOTHING.sum()
 
 Labels: TypeAlias = NDArray[np.int32]
 
@@ -279,8 +267,8 @@ def _locate_on(
     from_palm_m = points_m - palm_m[:, None]
     area_m2 = (np.float32(_pitch(limb.view)) * points_m[2]) ** 2
     axis = _axis(from_palm_m, area_m2, arm_m - palm_m)
-    exit_m = np.inf if box is None else _exit_m(limb.view, box, palm_m, axis)
-    wrist_m = _wrist(from_palm_m, area_m2, palm_m, axis, exit_m)
+    exit_m = np.inf if box is None else box_exit_m(limb.view, box, palm_m, axis)
+    wrist_m = find_wrist_m(from_palm_m, area_m2, palm_m, axis, exit_m)
     limit_m = wrist_m + settings.forearm_m
     is_arm = axis @ from_palm_m > limit_m
     if not (limb.radius_m[is_arm] >= _ARM_RADIUS_M).any():  # too thin for an arm: fingers
@@ -349,47 +337,6 @@ def _axis(from_palm_m: Float32, area_m2: Float32, toward_arm_m: Float32) -> Floa
         center_m = from_palm_m @ weight
         axis = center_m / max(float(np.linalg.norm(center_m)), 1e-12)
     return np.asarray(axis, np.float32)
-
-
-def _exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
-    """Return the distance from the palm along the axis to the side of a box in the image."""
-    camera = view.camera
-    sides = (
-        (0, (box[0] - camera.cx) / camera.fx),
-        (1, (box[1] - camera.cy) / camera.fy),
-        (0, (box[2] - camera.cx) / camera.fx),
-        (1, (box[3] - camera.cy) / camera.fy),
-    )
-    rates = [float(axis[k] - tangent * axis[2]) for k, tangent in sides]
-    gaps_m = [float(tangent * palm_m[2] - palm_m[k]) for k, tangent in sides]
-    exits_m = (gap / rate for gap, rate in zip(gaps_m, rates, strict=True) if abs(rate) > 1e-6)
-    return min((one for one in exits_m if one > 0.0), default=np.inf)
-
-
-def _wrist(
-    from_palm_m: Float32, area_m2: Float32, palm_m: Float32, axis: Float32, exit_m: float
-) -> float:
-    """Return the distance of the wrist along the axis, at most a little beyond the box's side.
-
-    Infinite without an arm.
-    """
-    along_m = axis @ from_palm_m
-    # Seen at an angle, a limb's length is foreshortened, and so is its area.
-    forward = float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
-    cosine = max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - forward**2))))
-    start_m, end_m = _PROFILE_M
-    bins = round((end_m - start_m) / _BIN_M)
-    place = np.floor((along_m - start_m) / _BIN_M).astype(int)
-    kept = (place >= 0) & (place < bins)
-    width_m = np.bincount(place[kept], area_m2[kept], bins) / (_BIN_M * cosine)
-    width_m = np.convolve(width_m, _SMOOTHING, "same")
-    at_m = start_m + _BIN_M * (np.arange(bins) + 0.5)
-    if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
-        return np.inf
-    likely = np.exp(-0.5 * ((at_m - _WRIST_M) / _WRIST_SIGMA_M) ** 2 - width_m / _WIDTH_SCALE_M)
-    likely *= np.exp(-0.5 * (np.maximum(at_m - exit_m, 0.0) / _BEYOND_BOX_M) ** 2)
-    likely *= np.minimum(width_m / _LIMB_WIDTH_M, 1.0) ** 2
-    return float(likely @ at_m / likely.sum())
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:
