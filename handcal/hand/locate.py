@@ -50,6 +50,14 @@ PART_M2 = 5e-5
 _BOX_SIGMA, _IN_BOX, _NEAREST, _LAYER_M = 0.35, 0.35, 0.1, 0.12
 _ARM_IN_BOX_MAX = 0.25
 
+# With a larger standard deviation the wrist is not known well enough for a cut. A palm with a
+# smaller inscribed circle is seen from its edge.
+_LIMIT_SIGMA_MAX_M, _EDGE_RADIUS_M = 0.026, 0.03
+_NO_WRIST = (
+    "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
+    "camera"
+)
+
 Labels: TypeAlias = NDArray[np.int32]
 
 
@@ -69,6 +77,9 @@ class LocatedHand:
     """(3,); direction of the forearm, from hand to elbow."""
     limit_m: float
     """Distance from `palm_m` along `axis` to the start of the arm; infinite if none is seen."""
+    limit_sigma_m: float
+    """Its standard deviation: 0 if no arm is seen, infinite if that points along the line of sight.
+    """
     depth_min_m: float
     """Nearest depth at which it was looked for."""
 
@@ -153,6 +164,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
             f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
         )
+    _check_wrist(found)
     return found
 
 
@@ -167,14 +179,26 @@ def _is_plausible(located: LocatedHand) -> bool:
     return bool(has_palm and area_m2 >= _AREA_MIN_M2)
 
 
+def _check_wrist(located: LocatedHand) -> None:
+    """Raise HandError if it is too uncertain where the wrist is."""
+    if located.limit_sigma_m == np.inf:
+        raise HandError(
+            "the arm points along the camera's line of sight; raise the hand so that its palm or "
+            "its back faces the camera"
+        )
+    if located.limit_sigma_m > _LIMIT_SIGMA_MAX_M:
+        raise HandError(
+            "the hand is seen from its edge; turn its palm or its back to the camera"
+            if located.palm_radius_m < _EDGE_RADIUS_M
+            else _NO_WRIST
+        )
+
+
 def _check_arm(located: LocatedHand, within: Float32) -> None:
     """Raise HandError if much of what is in the middle of a hand's box would be arm."""
     arm, hand = (float(within[part].sum()) for part in (located.arm, located.hand))
     if arm > _ARM_IN_BOX_MAX * (arm + hand):
-        raise HandError(
-            "the wrist cannot be found in the depth image; turn the palm or the back of the hand "
-            "to the camera"
-        )
+        raise HandError(_NO_WRIST)
 
 
 def _within(view: DepthView, box: Box) -> Float32:
@@ -268,7 +292,9 @@ def _locate_on(
     area_m2 = (np.float32(_pitch(limb.view)) * points_m[2]) ** 2
     axis = _axis(from_palm_m, area_m2, arm_m - palm_m)
     exit_m = np.inf if box is None else box_exit_m(limb.view, box, palm_m, axis)
-    wrist_m = find_wrist_m(from_palm_m, area_m2, palm_m, axis, exit_m)
+    wrist_m, wrist_sigma_m = find_wrist_m(
+        from_palm_m, area_m2, limb.at_end, palm_m, palm_radius_m, axis, exit_m
+    )
     limit_m = wrist_m + settings.forearm_m
     is_arm = axis @ from_palm_m > limit_m
     if not (limb.radius_m[is_arm] >= _ARM_RADIUS_M).any():  # too thin for an arm: fingers
@@ -284,6 +310,7 @@ def _locate_on(
         palm_radius_m,
         axis.astype(np.float64),
         limit_m,
+        wrist_sigma_m,
         depth_min_m,
     )
 

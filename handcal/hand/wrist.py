@@ -9,20 +9,34 @@ from __future__ import annotations
 import numpy as np
 
 from handcal.hand.view import Box, DepthView
-from handcal.types import Float32
+from handcal.types import Bool, Float32, Float64
 
 _LEAST_COS = 0.5  # of the angle between the axis and the image plane
 # Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
 # (see the survey in locate.py), and an inscribed circle of 40 to 45 mm in radius touches its upper
 # end.
 _WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
-# A detector's box ends at the wrist or behind it, with this error.
-_BEYOND_BOX_M = 0.025
+# Inscribed radius of a palm seen from its edge, and of one seen from the front. Seen from its edge
+# a hand is about as wide everywhere, so that neither the palm's centre nor the width says much.
+_EDGE_RADIUS_M, _FACING_RADIUS_M = 0.018, 0.034
+_SIGMA_MORE, _WIDTH_SCALE_MORE = 2.0, 2.0
+# A detector's box ends at the wrist or up to _BEHIND_M behind it, with these errors in the image.
+_BEYOND_BOX_M, _BEHIND_M, _BEHIND_SIGMA_M = 0.02, 0.03, 0.03
+# How likely the wrist is where the palm or the box would not have it: both are mistaken sometimes.
+_MISTAKEN = 0.01
 # The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
 # another is e times less likely the wrist.
 _BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
-_PROFILE_M = (-0.02, 0.16)
-_LIMB_WIDTH_M = 0.03  # a narrower limb is no arm; a finger is 24 mm wide
+_PROFILE_M = (-0.035, 0.175)
+# A narrower limb is no arm, as a finger is 24 mm wide; but none reaches to the profile's end.
+_LIMB_WIDTH_M, _NOTHING_M = 0.03, 0.005
+# From the wrist to the elbow an arm widens: a place that is much wider than one behind it is not
+# the wrist. A wrist seen from its edge is 36 mm wide.
+_WIDER_M, _WIDER_SCALE_M, _WIDER_MAX_M, _WRIST_WIDTH_M = 0.01, 0.003, 0.015, 0.036
+_END_M = 0.005  # where the arm leaves the view it is cut off at an angle
+# The surface of a wrist is this far from its middle, toward the camera. The narrowest place is this
+# far behind the wrist.
+_HALF_THICKNESS_M, _NARROWEST_M = 0.017, 0.004
 
 _SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
 _SMOOTHING /= _SMOOTHING.sum()
@@ -44,11 +58,33 @@ def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> flo
 
 
 def find_wrist_m(
-    from_palm_m: Float32, area_m2: Float32, palm_m: Float32, axis: Float32, exit_m: float
-) -> float:
-    """Return the distance of the wrist along the axis, at most a little beyond the box's side.
+    from_palm_m: Float32,
+    area_m2: Float32,
+    at_end: Bool,
+    palm_m: Float32,
+    palm_radius_m: float,
+    axis: Float32,
+    exit_m: float,
+) -> tuple[float, float]:
+    """Return the distance of the wrist from the palm along the axis, and its standard deviation.
 
-    Infinite without an arm.
+    Infinite and zero without an arm. The standard deviation is infinite if the arm points along the
+    line of sight.
+
+    Parameters
+    ----------
+    from_palm_m : (3, N) float32
+        Points of the limb's surface relative to the palm's centre, camera frame.
+    area_m2 : (N,) float32
+        Of the points, across the line of sight.
+    at_end : (N,) bool
+        Where the surface continues out of view.
+    palm_m : (3,) float32
+    palm_radius_m : float
+    axis : (3,) float32
+        From the palm to the elbow.
+    exit_m : float
+        Where the axis leaves the detector's box; infinite without one.
     """
     along_m = axis @ from_palm_m
     # Seen at an angle, a limb's length is foreshortened, and so is its area.
@@ -59,11 +95,37 @@ def find_wrist_m(
     place = np.floor((along_m - start_m) / _BIN_M).astype(int)
     kept = (place >= 0) & (place < bins)
     width_m = np.bincount(place[kept], area_m2[kept], bins) / (_BIN_M * cosine)
-    width_m = np.convolve(width_m, _SMOOTHING, "same")
-    at_m = start_m + _BIN_M * (np.arange(bins) + 0.5)
+    width_m = np.convolve(width_m, _SMOOTHING, "valid")
+    at_m = start_m + _BIN_M * (np.arange(len(width_m)) + 0.5 * len(_SMOOTHING))
     if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
-        return np.inf
-    likely = np.exp(-0.5 * ((at_m - _WRIST_M) / _WRIST_SIGMA_M) ** 2 - width_m / _WIDTH_SCALE_M)
-    likely *= np.exp(-0.5 * (np.maximum(at_m - exit_m, 0.0) / _BEYOND_BOX_M) ** 2)
-    likely *= np.minimum(width_m / _LIMB_WIDTH_M, 1.0) ** 2
-    return float(likely @ at_m / likely.sum())
+        return np.inf, np.inf if width_m[-1] > _NOTHING_M else 0.0
+    edgewise = float(np.interp(palm_radius_m, (_EDGE_RADIUS_M, _FACING_RADIUS_M), (1.0, 0.0)))
+    likely = _gaussian(at_m - _WRIST_M, _WRIST_SIGMA_M * (1.0 + _SIGMA_MORE * edgewise)) + _MISTAKEN
+    likely *= _gaussian(np.maximum(at_m - exit_m, 0.0) * cosine, _BEYOND_BOX_M) + _MISTAKEN
+    if exit_m < np.inf:
+        before_m = np.maximum(exit_m - _BEHIND_M - at_m, 0.0) * cosine
+        likely *= _gaussian(before_m, _BEHIND_SIGMA_M) ** edgewise
+    likely *= np.exp(-width_m / (_WIDTH_SCALE_M * (1.0 + _WIDTH_SCALE_MORE * edgewise)))
+    likely *= np.exp(-_wider_m(width_m, at_m, along_m[at_end]) / _WIDER_SCALE_M)
+    likely *= np.minimum(width_m / _WRIST_WIDTH_M, 1.0) ** 4
+    likely /= max(float(likely.sum()), 1e-300)
+    wrist_m = float(likely @ at_m)
+    sigma_m = float(np.sqrt(likely @ (at_m - wrist_m) ** 2))
+    # The outline shows where the wrist's middle is; on the line of sight to it, the surface is
+    # nearer, and so elsewhere along the axis.
+    return (
+        wrist_m + _HALF_THICKNESS_M * forward / cosine - _NARROWEST_M,
+        sigma_m if cosine > _LEAST_COS else np.inf,
+    )
+
+
+def _wider_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
+    """Return how much wider a limb is at each place than where it is narrowest behind it."""
+    end_m = float(ends_m[ends_m > 0.0].min(initial=np.inf)) - _END_M
+    is_arm = (at_m < end_m) & (width_m > _WRIST_WIDTH_M)
+    narrowest_m = np.minimum.accumulate(np.where(is_arm, width_m, np.inf)[::-1])[::-1]
+    return np.clip(width_m - narrowest_m - _WIDER_M, 0.0, _WIDER_MAX_M)
+
+
+def _gaussian(deviation_m: Float64, sigma_m: float) -> Float64:
+    return np.asarray(np.exp(-0.5 * (deviation_m / sigma_m) ** 2), np.float64)
