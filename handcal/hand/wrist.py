@@ -7,6 +7,7 @@ well they fit, so that it varies continuously with the image.
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from handcal.hand.view import Box, DepthView
 from handcal.types import Bool, Float32, Float64
@@ -30,9 +31,10 @@ _BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
 _PROFILE_M = (-0.035, 0.175)
 # A narrower limb is no arm, as a finger is 24 mm wide; but none reaches to the profile's end.
 _LIMB_WIDTH_M, _NOTHING_M = 0.03, 0.005
-# From the wrist to the elbow an arm widens: a place that is much wider than one behind it is not
-# the wrist. A wrist seen from its edge is 36 mm wide.
-_WIDER_M, _WIDER_SCALE_M, _WIDER_MAX_M, _WRIST_WIDTH_M = 0.01, 0.003, 0.015, 0.036
+# From the wrist to the elbow an arm widens, but slowly: nowhere behind the wrist is it this much
+# narrower, nor this much wider within so many bins. A wrist seen from its edge is 36 mm wide.
+_NARROWER_M, _WIDER_M, _SHORTLY, _WRIST_WIDTH_M = 0.01, 0.025, 16, 0.036
+_MISFIT_SCALE_M, _MISFIT_MAX_M = 0.003, 0.015
 _END_M = 0.005  # where the arm leaves the view it is cut off at an angle
 # The surface of a wrist is this far from its middle, toward the camera. The narrowest place is this
 # far behind the wrist.
@@ -106,7 +108,7 @@ def find_wrist_m(
         before_m = np.maximum(exit_m - _BEHIND_M - at_m, 0.0) * cosine
         likely *= _gaussian(before_m, _BEHIND_SIGMA_M) ** edgewise
     likely *= np.exp(-width_m / (_WIDTH_SCALE_M * (1.0 + _WIDTH_SCALE_MORE * edgewise)))
-    likely *= np.exp(-_wider_m(width_m, at_m, along_m[at_end]) / _WIDER_SCALE_M)
+    likely *= np.exp(-_misfit_m(width_m, at_m, along_m[at_end]) / _MISFIT_SCALE_M)
     likely *= np.minimum(width_m / _WRIST_WIDTH_M, 1.0) ** 4
     likely /= max(float(likely.sum()), 1e-300)
     wrist_m = float(likely @ at_m)
@@ -119,12 +121,19 @@ def find_wrist_m(
     )
 
 
-def _wider_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
-    """Return how much wider a limb is at each place than where it is narrowest behind it."""
+def _misfit_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
+    """Return how little what is behind each place is like the forearm behind a wrist.
+
+    It is how much narrower the limb is somewhere behind, or how much wider shortly behind, than a
+    forearm may be.
+    """
     end_m = float(ends_m[ends_m > 0.0].min(initial=np.inf)) - _END_M
     is_arm = (at_m < end_m) & (width_m > _WRIST_WIDTH_M)
     narrowest_m = np.minimum.accumulate(np.where(is_arm, width_m, np.inf)[::-1])[::-1]
-    return np.clip(width_m - narrowest_m - _WIDER_M, 0.0, _WIDER_MAX_M)
+    behind_m = sliding_window_view(np.pad(width_m, (0, _SHORTLY - 1)), _SHORTLY)
+    narrower_m = np.clip(width_m - narrowest_m - _NARROWER_M, 0.0, _MISFIT_MAX_M)
+    wider_m = np.clip(behind_m.max(axis=1) - width_m - _WIDER_M, 0.0, _MISFIT_MAX_M)
+    return np.asarray(narrower_m + wider_m, np.float64)
 
 
 def _gaussian(deviation_m: Float64, sigma_m: float) -> Float64:
