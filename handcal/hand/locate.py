@@ -52,7 +52,7 @@ _ARM_IN_BOX_MAX = 0.25
 
 # With a larger standard deviation the wrist is not known well enough for a cut. A palm with a
 # smaller inscribed circle is seen from its edge.
-_LIMIT_SIGMA_MAX_M, _EDGE_RADIUS_M = 0.026, 0.03
+_LIMIT_SIGMA_MAX_M, _FROM_EDGE_M = 0.026, 0.03
 _NO_WRIST = (
     "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
     "camera"
@@ -189,7 +189,7 @@ def _check_wrist(located: LocatedHand) -> None:
     if located.limit_sigma_m > _LIMIT_SIGMA_MAX_M:
         raise HandError(
             "the hand is seen from its edge; turn its palm or its back to the camera"
-            if located.palm_radius_m < _EDGE_RADIUS_M
+            if located.palm_radius_m < _FROM_EDGE_M
             else _NO_WRIST
         )
 

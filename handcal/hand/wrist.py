@@ -6,8 +6,8 @@ well they fit, so that it varies continuously with the image.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from handcal.hand.view import Box, DepthView
 from handcal.types import Bool, Float32, Float64
@@ -42,6 +42,8 @@ _HALF_THICKNESS_M, _NARROWEST_M = 0.017, 0.004
 
 _SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
 _SMOOTHING /= _SMOOTHING.sum()
+_BINS = round((_PROFILE_M[1] - _PROFILE_M[0]) / _BIN_M)
+_AT_M = _PROFILE_M[0] + _BIN_M * (np.arange(_BINS - len(_SMOOTHING) + 1) + 0.5 * len(_SMOOTHING))
 
 
 def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
@@ -92,13 +94,10 @@ def find_wrist_m(
     # Seen at an angle, a limb's length is foreshortened, and so is its area.
     forward = float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
     cosine = max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - forward**2))))
-    start_m, end_m = _PROFILE_M
-    bins = round((end_m - start_m) / _BIN_M)
-    place = np.floor((along_m - start_m) / _BIN_M).astype(int)
-    kept = (place >= 0) & (place < bins)
-    width_m = np.bincount(place[kept], area_m2[kept], bins) / (_BIN_M * cosine)
-    width_m = np.convolve(width_m, _SMOOTHING, "valid")
-    at_m = start_m + _BIN_M * (np.arange(len(width_m)) + 0.5 * len(_SMOOTHING))
+    place = np.floor((along_m - _PROFILE_M[0]) / _BIN_M).astype(int)
+    kept = (place >= 0) & (place < _BINS)
+    width_m = np.bincount(place[kept], area_m2[kept], _BINS) / (_BIN_M * cosine)
+    width_m, at_m = np.convolve(width_m, _SMOOTHING, "valid"), _AT_M
     if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
         return np.inf, np.inf if width_m[-1] > _NOTHING_M else 0.0
     edgewise = float(np.interp(palm_radius_m, (_EDGE_RADIUS_M, _FACING_RADIUS_M), (1.0, 0.0)))
@@ -130,10 +129,15 @@ def _misfit_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
     end_m = float(ends_m[ends_m > 0.0].min(initial=np.inf)) - _END_M
     is_arm = (at_m < end_m) & (width_m > _WRIST_WIDTH_M)
     narrowest_m = np.minimum.accumulate(np.where(is_arm, width_m, np.inf)[::-1])[::-1]
-    behind_m = sliding_window_view(np.pad(width_m, (0, _SHORTLY - 1)), _SHORTLY)
-    narrower_m = np.clip(width_m - narrowest_m - _NARROWER_M, 0.0, _MISFIT_MAX_M)
-    wider_m = np.clip(behind_m.max(axis=1) - width_m - _WIDER_M, 0.0, _MISFIT_MAX_M)
-    return np.asarray(narrower_m + wider_m, np.float64)
+    widest_m = cv2.dilate(width_m, np.ones(_SHORTLY, np.uint8), anchor=(0, 0)).ravel()
+    misfit_m: Float64 = _excess(width_m - narrowest_m, _NARROWER_M)
+    misfit_m += _excess(widest_m - width_m, _WIDER_M)
+    return misfit_m
+
+
+def _excess(difference_m: Float64, allowed_m: float) -> Float64:
+    excess_m: Float64 = np.minimum(np.maximum(difference_m - allowed_m, 0.0), _MISFIT_MAX_M)
+    return excess_m
 
 
 def _gaussian(deviation_m: Float64, sigma_m: float) -> Float64:
