@@ -24,7 +24,7 @@ from handcal.types import Bool, Float32, Float64
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
 # Personnel: hand breadth 68–100 mm, hand length 165–220 mm). Seen from its edge the inscribed
 # circle of a palm is about 20 mm in radius.
-_PALM_RADIUS_M = (0.018, 0.065)
+_PALM_RADIUS_M, _FINGER_RADIUS_M = (0.018, 0.065), 0.012
 _TIP_M = 0.05
 _TIP_TO_PALM_M = 0.15
 _HAND_REACH_M = 0.20
@@ -53,6 +53,11 @@ _ARM_IN_BOX_MAX = 0.25
 # With a larger standard deviation the wrist is not known well enough for a cut. A palm with a
 # smaller inscribed circle is seen from its edge.
 _LIMIT_SIGMA_MAX_M, _FROM_EDGE_M = 0.026, 0.03
+_NOT_A_HAND = (
+    "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
+    "bare hand, clear of other things"
+)
+_FROM_EDGE = "the hand is seen from its edge; turn its palm or its back to the camera"
 _NO_WRIST = (
     "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
     "camera"
@@ -144,7 +149,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
         areas = parts.stats[:, cv2.CC_STAT_AREA]
         candidates = [part for part in range(1, len(areas)) if areas[part] >= least_px]
 
-    found = None
+    found, problem = None, _NOT_A_HAND
     for part in candidates:
         limb, place = _limb(parts, part)
         likely = None if within is None else within[place][limb.pixels]
@@ -154,11 +159,10 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             found = located
             if within is not None:
                 _check_arm(located, within[place])
+        elif _FINGER_RADIUS_M < located.palm_radius_m < _PALM_RADIUS_M[0]:
+            problem = _FROM_EDGE
     if found is None and box is not None:
-        raise HandError(
-            "what the detector takes for a hand is not shaped like one in the depth image; "
-            "show the whole bare hand, clear of other things"
-        )
+        raise HandError(problem)
     if found is None:
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
@@ -187,11 +191,7 @@ def _check_wrist(located: LocatedHand) -> None:
             "its back faces the camera"
         )
     if located.limit_sigma_m > _LIMIT_SIGMA_MAX_M:
-        raise HandError(
-            "the hand is seen from its edge; turn its palm or its back to the camera"
-            if located.palm_radius_m < _FROM_EDGE_M
-            else _NO_WRIST
-        )
+        raise HandError(_FROM_EDGE if located.palm_radius_m < _FROM_EDGE_M else _NO_WRIST)
 
 
 def _check_arm(located: LocatedHand, within: Float32) -> None:
