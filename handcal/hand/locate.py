@@ -18,12 +18,13 @@ from handcal.errors import HandError
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
 from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
+from handcal.hand.wrist import box_exit_m, find_wrist_m
 from handcal.types import Bool, Float32, Float64
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
 # Personnel: hand breadth 68–100 mm, hand length 165–220 mm). Seen from its edge the inscribed
 # circle of a palm is about 20 mm in radius.
-_PALM_RADIUS_M = (0.018, 0.065)
+_PALM_RADIUS_M, _FINGER_RADIUS_M = (0.018, 0.065), 0.012
 _TIP_M = 0.05
 _TIP_TO_PALM_M = 0.15
 _HAND_REACH_M = 0.20
@@ -35,17 +36,7 @@ _PALM_SIGMA_M, _PALM_STEPS = 0.04, 2
 # The forearm's axis runs from the palm to the mean of the arm about this distance from it.
 _ARM_M, _ARM_SIGMA_M = 0.11, 0.025
 _AXIS_STEPS = 3
-_LEAST_COS = 0.5  # of the angle between the axis and the image plane
-# Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
-# (same survey), and an inscribed circle of 40 to 45 mm in radius touches its upper end.
-_WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
-# A detector's box ends at the wrist or behind it, with this error.
-_BEYOND_BOX_M = 0.025
-# The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
-# another is e times less likely the wrist.
-_BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
-_PROFILE_M = (-0.02, 0.16)
-_LIMB_WIDTH_M, _ARM_RADIUS_M = 0.03, 0.014  # a narrower limb is no arm; a finger is 24 mm wide
+_ARM_RADIUS_M = 0.014  # a narrower limb is no arm; a finger is 24 mm wide
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
 _GAP_M, _JUMP_M = 0.015, 0.05
 # One no larger than a finger may be as far before or behind as a finger is long.
@@ -59,8 +50,18 @@ PART_M2 = 5e-5
 _BOX_SIGMA, _IN_BOX, _NEAREST, _LAYER_M = 0.35, 0.35, 0.1, 0.12
 _ARM_IN_BOX_MAX = 0.25
 
-_SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
-_SMOOTHING /= _SMOOTHING.sum()
+# With a larger standard deviation the wrist is not known well enough for a cut. A palm with a
+# smaller inscribed circle is seen from its edge.
+_LIMIT_SIGMA_MAX_M, _FROM_EDGE_M = 0.026, 0.03
+_NOT_A_HAND = (
+    "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
+    "bare hand, clear of other things"
+)
+_FROM_EDGE = "the hand is seen from its edge; turn its palm or its back to the camera"
+_NO_WRIST = (
+    "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
+    "camera"
+)
 
 Labels: TypeAlias = NDArray[np.int32]
 
@@ -81,6 +82,9 @@ class LocatedHand:
     """(3,); direction of the forearm, from hand to elbow."""
     limit_m: float
     """Distance from `palm_m` along `axis` to the start of the arm; infinite if none is seen."""
+    limit_sigma_m: float
+    """Its standard deviation: 0 if no arm is seen, infinite if that points along the line of sight.
+    """
     depth_min_m: float
     """Nearest depth at which it was looked for."""
 
@@ -145,7 +149,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
         areas = parts.stats[:, cv2.CC_STAT_AREA]
         candidates = [part for part in range(1, len(areas)) if areas[part] >= least_px]
 
-    found = None
+    found, problem = None, _NOT_A_HAND
     for part in candidates:
         limb, place = _limb(parts, part)
         likely = None if within is None else within[place][limb.pixels]
@@ -155,16 +159,16 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             found = located
             if within is not None:
                 _check_arm(located, within[place])
+        elif _FINGER_RADIUS_M < located.palm_radius_m < _PALM_RADIUS_M[0]:
+            problem = _FROM_EDGE
     if found is None and box is not None:
-        raise HandError(
-            "what the detector takes for a hand is not shaped like one in the depth image; "
-            "show the whole bare hand, clear of other things"
-        )
+        raise HandError(problem)
     if found is None:
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
             f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
         )
+    _check_wrist(found)
     return found
 
 
@@ -179,14 +183,22 @@ def _is_plausible(located: LocatedHand) -> bool:
     return bool(has_palm and area_m2 >= _AREA_MIN_M2)
 
 
+def _check_wrist(located: LocatedHand) -> None:
+    """Raise HandError if it is too uncertain where the wrist is."""
+    if located.limit_sigma_m == np.inf:
+        raise HandError(
+            "the arm points along the camera's line of sight; raise the hand so that its palm or "
+            "its back faces the camera"
+        )
+    if located.limit_sigma_m > _LIMIT_SIGMA_MAX_M:
+        raise HandError(_FROM_EDGE if located.palm_radius_m < _FROM_EDGE_M else _NO_WRIST)
+
+
 def _check_arm(located: LocatedHand, within: Float32) -> None:
     """Raise HandError if much of what is in the middle of a hand's box would be arm."""
     arm, hand = (float(within[part].sum()) for part in (located.arm, located.hand))
     if arm > _ARM_IN_BOX_MAX * (arm + hand):
-        raise HandError(
-            "the wrist cannot be found in the depth image; turn the palm or the back of the hand "
-            "to the camera"
-        )
+        raise HandError(_NO_WRIST)
 
 
 def _within(view: DepthView, box: Box) -> Float32:
@@ -279,8 +291,10 @@ def _locate_on(
     from_palm_m = points_m - palm_m[:, None]
     area_m2 = (np.float32(_pitch(limb.view)) * points_m[2]) ** 2
     axis = _axis(from_palm_m, area_m2, arm_m - palm_m)
-    exit_m = np.inf if box is None else _exit_m(limb.view, box, palm_m, axis)
-    wrist_m = _wrist(from_palm_m, area_m2, palm_m, axis, exit_m)
+    exit_m = np.inf if box is None else box_exit_m(limb.view, box, palm_m, axis)
+    wrist_m, wrist_sigma_m = find_wrist_m(
+        from_palm_m, area_m2, limb.at_end, palm_m, palm_radius_m, axis, exit_m
+    )
     limit_m = wrist_m + settings.forearm_m
     is_arm = axis @ from_palm_m > limit_m
     if not (limb.radius_m[is_arm] >= _ARM_RADIUS_M).any():  # too thin for an arm: fingers
@@ -296,6 +310,7 @@ def _locate_on(
         palm_radius_m,
         axis.astype(np.float64),
         limit_m,
+        wrist_sigma_m,
         depth_min_m,
     )
 
@@ -349,47 +364,6 @@ def _axis(from_palm_m: Float32, area_m2: Float32, toward_arm_m: Float32) -> Floa
         center_m = from_palm_m @ weight
         axis = center_m / max(float(np.linalg.norm(center_m)), 1e-12)
     return np.asarray(axis, np.float32)
-
-
-def _exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
-    """Return the distance from the palm along the axis to the side of a box in the image."""
-    camera = view.camera
-    sides = (
-        (0, (box[0] - camera.cx) / camera.fx),
-        (1, (box[1] - camera.cy) / camera.fy),
-        (0, (box[2] - camera.cx) / camera.fx),
-        (1, (box[3] - camera.cy) / camera.fy),
-    )
-    rates = [float(axis[k] - tangent * axis[2]) for k, tangent in sides]
-    gaps_m = [float(tangent * palm_m[2] - palm_m[k]) for k, tangent in sides]
-    exits_m = (gap / rate for gap, rate in zip(gaps_m, rates, strict=True) if abs(rate) > 1e-6)
-    return min((one for one in exits_m if one > 0.0), default=np.inf)
-
-
-def _wrist(
-    from_palm_m: Float32, area_m2: Float32, palm_m: Float32, axis: Float32, exit_m: float
-) -> float:
-    """Return the distance of the wrist along the axis, at most a little beyond the box's side.
-
-    Infinite without an arm.
-    """
-    along_m = axis @ from_palm_m
-    # Seen at an angle, a limb's length is foreshortened, and so is its area.
-    forward = float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
-    cosine = max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - forward**2))))
-    start_m, end_m = _PROFILE_M
-    bins = round((end_m - start_m) / _BIN_M)
-    place = np.floor((along_m - start_m) / _BIN_M).astype(int)
-    kept = (place >= 0) & (place < bins)
-    width_m = np.bincount(place[kept], area_m2[kept], bins) / (_BIN_M * cosine)
-    width_m = np.convolve(width_m, _SMOOTHING, "same")
-    at_m = start_m + _BIN_M * (np.arange(bins) + 0.5)
-    if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
-        return np.inf
-    likely = np.exp(-0.5 * ((at_m - _WRIST_M) / _WRIST_SIGMA_M) ** 2 - width_m / _WIDTH_SCALE_M)
-    likely *= np.exp(-0.5 * (np.maximum(at_m - exit_m, 0.0) / _BEYOND_BOX_M) ** 2)
-    likely *= np.minimum(width_m / _LIMB_WIDTH_M, 1.0) ** 2
-    return float(likely @ at_m / likely.sum())
 
 
 def _distance(points_m: Float32, from_m: Float32) -> Float32:
