@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QRectF, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QStackedLayout, QWidget
 
@@ -23,8 +23,10 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _BLINK_MS = 800
 _LEAST_PX = 80, 48
-_WIDE = 2.2
-"""Width over height above which the result stands beside the eyes."""
+_ANY_HEIGHT_PX = 16_777_215
+"""Qt's largest height of a widget."""
+_ASPECT = 0.8
+"""Height over width of a view, until one is known."""
 _OF_THE_HAND = frozenset({Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR})
 OF_THE_RESULT = frozenset({Step.VERIFY, Step.SAVE})
 """Steps whose picture shows the result."""
@@ -55,6 +57,7 @@ class GuidePicture(QWidget):
             vbox(self._titles[eye], (self._eyes[eye], 1), on=column, margins=0, spacing=0)
         self.result = ResultBar()
         self.result.hide()
+        self._aspect = 0.0  # height over width of the views, the largest beside one result
         self._is_before = False
         self._blink = QTimer(self, interval=_BLINK_MS)
         self._blink.timeout.connect(lambda: self._show_before(not self._is_before))
@@ -88,11 +91,20 @@ class GuidePicture(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the result beside the eyes if that makes them larger."""
         super().resizeEvent(event)
-        least_px = 2 * self.result.minimumSizeHint().width()
-        is_wide = self.width() > max(_WIDE * self.height(), least_px)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Put the result below the eyes, or beside them if they are larger then."""
+        width_px, height_px, card = self.width(), self.height(), self.result
+        aspect = self._aspect or _ASPECT
+        card_px = max(card.sizeHint().height(), card.heightForWidth(width_px))
+        below_px = min(height_px - card_px, aspect * width_px / 2)
+        beside_px = min(height_px, aspect * width_px / 4)
+        is_wide = beside_px > below_px and width_px > 2 * card.minimumSizeHint().width()
         directions = QBoxLayout.Direction
         self._layout.setDirection(directions.LeftToRight if is_wide else directions.TopToBottom)
-        self._layout.setStretchFactor(self.result, 1 if is_wide else 0)
+        self._layout.setStretchFactor(card, 1 if is_wide else 0)
+        self._fit_eyes()
 
     def _show_camera(self, snapshot: Snapshot) -> None:
         self.result.hide()  # or it takes its room in the layout
@@ -122,11 +134,29 @@ class GuidePicture(QWidget):
             when = (tr(", before the calibration") if self._is_before else tr(", now")) * is_result
             origin = origin_text(view, is_solved=is_solved)
             self._titles[eye].setText(f"{EYE_NAMES[eye]}{origin}{when}")
-        show_alike([self._eyes[eye] for eye in eyes])
+        part_px = show_alike([self._eyes[eye] for eye in eyes])
+        is_new = is_result and self.result.isHidden()
         self.result.setVisible(is_result)
+        # Only higher while the result is shown, or the result would move with the hand.
+        before = self._aspect * is_result
+        self._aspect = before if part_px.isEmpty() else max(before, _aspect(part_px))
         if is_result:
             self.result.show_snapshot(snapshot)
+        if is_new:
+            self._arrange()
+        self._fit_eyes()
         self._stack.setCurrentWidget(self._views)
+
+    def _fit_eyes(self) -> None:
+        """Make the eyes no higher than their picture, so that the result stands right below."""
+        is_below = self._layout.direction() is QBoxLayout.Direction.TopToBottom
+        is_fitted = is_below and not self.result.isHidden() and self._aspect > 0.0
+        shown = sum(not column.isHidden() for column in self._columns.values())
+        width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
+        for eye, column in self._columns.items():
+            title_px = self._titles[eye].sizeHint().height()
+            fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1])
+            column.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
 
     def _set_blinking(self, is_blinking: bool) -> None:
         if is_blinking:
@@ -141,3 +171,8 @@ class GuidePicture(QWidget):
         for canvas in self._eyes.values():
             canvas.show_offline(is_before)
             canvas.show_drawn(not is_before)
+
+
+def _aspect(part_px: QRectF) -> float:
+    """Return height over width."""
+    return part_px.height() / part_px.width()

@@ -166,16 +166,22 @@ class EyeCanvas(QWidget):
         self._shown = self._crop
 
 
-def show_alike(canvases: Collection[EyeCanvas]) -> None:
-    """Show the same rows of several displays, at one scale."""
+def show_alike(canvases: Collection[EyeCanvas]) -> QRectF:
+    """Show the same rows of several displays, at one scale.
+
+    Returns the part of the last display that is shown, in its pixels; empty without any view.
+    """
+    part_px = QRectF()
     known = [canvas for canvas in canvases if not canvas.crop_px.isEmpty()]
     if not known:
-        return
+        return part_px
     parts = [canvas.crop_px for canvas in known]
     top, bottom = min(one.top() for one in parts), max(one.bottom() for one in parts)
     width = max(one.width() for one in parts)
     for canvas, part in zip(known, parts, strict=True):
-        canvas.show_part(QRectF(part.center().x() - width / 2, top, width, bottom - top))
+        part_px = QRectF(part.center().x() - width / 2, top, width, bottom - top)
+        canvas.show_part(part_px)
+    return part_px
 
 
 def _display(view: EyeView) -> QRectF:

@@ -4,9 +4,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtPrintSupport import QPrinter
-from PySide6.QtWidgets import QToolButton
+from PySide6.QtWidgets import QApplication, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.station.snapshot import Snapshot
@@ -15,6 +16,7 @@ from handcal_gui.pages.wizard.picture import GuidePicture
 from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.image_view import ImageView
 from tests.gui.helpers import button, child, show
 
@@ -69,12 +71,31 @@ def test_the_result_stands_beside_the_eyes_in_a_low_wide_window(
     assert picture.result.x() > eye.width()
 
 
+@pytest.mark.parametrize("size_px", [(650, 700), (1580, 690)])  # of 1600x1000, with panels or not
+def test_the_result_stands_right_below_the_eyes_where_there_is_height(
+    qtbot: QtBot, snapshot: Maker, size_px: tuple[int, int]
+) -> None:
+    picture = show(qtbot, GuidePicture(), *size_px)
+    picture.step = Step.VERIFY
+    picture.show_snapshot(snapshot(State.APPLIED))
+    eye = next(one for one in picture.findChildren(EyeCanvas) if one.isVisible())
+
+    def is_close() -> bool:
+        drawn_px = eye.width() * eye.crop_px.height() / eye.crop_px.width()
+        gap_px = picture.result.y() - eye.mapTo(picture, eye.rect().topLeft()).y() - drawn_px
+        return picture.result.x() == 0 and gap_px < 2 * SPACING_PX
+
+    qtbot.waitUntil(is_close)
+
+
 def test_before_and_after_are_shown_in_turn(qtbot: QtBot, snapshot: Maker) -> None:
     picture = show(qtbot, GuidePicture(), 700, 500)
     qtbot.addWidget(picture.result.buttons)
     picture.step = Step.VERIFY
     picture.show_snapshot(snapshot(State.APPLIED))
     left = next(one for one in picture.findChildren(EyeCanvas) if one.isVisible())
+    for _ in range(3):  # a layout may ask for another
+        QApplication.processEvents()
     after = left.grab().toImage()
     blink = button(picture.result.buttons, QToolButton, "Blink before/after")
     blink.click()
