@@ -134,7 +134,7 @@ def test_its_name_tells_host_and_rig_file(tmp_path: Path) -> None:
     assert is_live("hololens2:h,realsense=rig.yaml")
     nameless = hololens2_settings("hololens2:h,realsense")
     assert nameless is not None
-    with pytest.raises(CameraError, match="say which rig file"):
+    with pytest.raises(CameraError, match="name the rig file"):
         open_hololens2(nameless)
     with pytest.raises(CameraError, match=r"absent\.yaml"):
         open_hololens2(HoloLens2Settings("h", realsense_rig=str(tmp_path / "absent.yaml")))
