@@ -130,17 +130,20 @@ def devices_by_child(progress: Progress = Progress()) -> list[Device]:
         # On Windows a console would appear each time that the start page looks.
         creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
     ) as child:
-        while True:
-            try:
-                printed, complaint = child.communicate(timeout=_POLL_S)
-                break
-            except subprocess.TimeoutExpired as error:
-                if progress.is_cancelled() or time.monotonic() > end_s:
-                    child.kill()
+        try:
+            while True:
+                try:
+                    printed, complaint = child.communicate(timeout=_POLL_S)
+                    break
+                except subprocess.TimeoutExpired as error:
                     progress.check()
-                    raise CameraError(
-                        f"librealsense lists no devices within {_LONGEST_LISTING_S:g} s: {advice}"
-                    ) from error
+                    if time.monotonic() > end_s:
+                        raise CameraError(
+                            f"librealsense lists no devices within {_LONGEST_LISTING_S:g} s: "
+                            f"{advice}"
+                        ) from error
+        finally:
+            child.kill()  # if it has not ended; a hung SDK outlives Ctrl+C
     answer = printed.rpartition("\n")[2]  # a library may print before
     try:
         listed = json.loads(answer)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -95,13 +96,26 @@ def test_an_sdk_that_crashes_or_hangs_is_one_clear_line(
 
 
 @pytest.mark.process
+@pytest.mark.parametrize("error", [CancelledError, KeyboardInterrupt])
 def test_a_listing_that_hangs_ends_when_it_is_cancelled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    error: type[BaseException], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "pyrealsense2.py").write_text("import time; time.sleep(600)\n")
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
-    with pytest.raises(CancelledError):
-        devices_by_child(Progress(is_cancelled=lambda: True))
+    children: list[subprocess.Popen[str]] = []
+
+    def begin(*args: Any, **settings: Any) -> subprocess.Popen[str]:
+        children.append(popen(*args, **settings))
+        return children[0]
+
+    def is_cancelled() -> bool:
+        raise error
+
+    popen = subprocess.Popen
+    monkeypatch.setattr(subprocess, "Popen", begin)
+    with pytest.raises(error):
+        devices_by_child(Progress(is_cancelled=is_cancelled))
+    children[0].wait(20.0)
 
 
 @pytest.mark.parametrize(
