@@ -122,7 +122,7 @@ def fail(message: str, code: int) -> NoReturn:
 
 def require_writable(path: Path) -> None:
     """Exit with code 1 if a file cannot be written, as far as that can be known before."""
-    folder = next(one for one in path.absolute().parents if one.exists())
+    folder = next((one for one in path.absolute().parents if one.exists()), path)
     if path.is_dir() or not (folder.is_dir() and os.access(folder, os.W_OK)):
         why = "is a folder" if path.is_dir() else f"{folder} is not a folder that can be written to"
         fail(f"cannot write {path}: {why}; choose another file", 1)

@@ -122,6 +122,7 @@ def test_misuse_is_one_line_and_exit_code_2(
         ("segment --color a --depth b --intrinsics c --output d", "cannot read c: No such file"),
         ("solve nowhere", "nowhere is not a session"),
         ("bench --json one_session", "cannot write one_session: is a folder"),
+        ("bench --json /", ": is a folder"),
         ("bench --json one_session/journal.jsonl/a", "journal.jsonl is not a folder"),
         ("prior one_session", "one_session is one session; choose the folder above"),
         ("replay nowhere.db3", "there is no recording nowhere.db3"),
