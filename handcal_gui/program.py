@@ -162,8 +162,9 @@ class Program(QObject):
 
     def _keep_entries(self) -> None:
         """Remember the start page's entries, also those with which nothing was started."""
-        if self.window.page == "start":
-            self._current.change(station=self.start.new.settings)
+        settings = self.start.new.settings
+        if self.window.page == "start" and settings != self.preferences.station:
+            self._current.change(station=settings)
 
     def _connect(self, review_page: ReviewPage) -> None:
         self.start.start_requested.connect(self.start_calibration)
