@@ -132,7 +132,7 @@ def test_closing_ends_a_running_trial(
     dialog = make(Recorder())
     part(dialog, QPushButton, "start").click()
     instruction = part(dialog, QLabel, "instruction")
-    qtbot.waitUntil(lambda: instruction.text() != "", timeout=20_000)
+    qtbot.waitUntil(lambda: instruction.text().startswith("Put the cube"), timeout=20_000)
     dialog.reject()
     assert not dialog.isVisible()
 
