@@ -36,7 +36,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
     arg(
         "--viewpoint",
         metavar="SOURCE",
-        help="number of the viewpoint camera (default: ask the person at the display)",
+        help="number of the viewpoint camera (default: ask who looks through the display)",
     ),
     arg(
         "--eyes",

@@ -83,8 +83,8 @@ class LocatedHand:
     limit_m: float
     """Distance from `palm_m` along `axis` to the start of the arm; infinite if none is seen."""
     limit_sigma_m: float
-    """Its standard deviation: 0 if no arm is seen, infinite if that points along the line of sight.
-    """
+    """Standard deviation of the wrist along `axis`; infinite if an arm points along the line of
+    sight."""
     depth_min_m: float
     """Nearest depth at which it was looked for."""
 

@@ -148,7 +148,7 @@ class PoseDelay:
 
     @property
     def is_wrong(self) -> bool:
-        """True if the stamps are off by certainly more than the camera's uncertain latency."""
+        """True if the stamps are certainly off by more than the camera's latency is uncertain."""
         return abs(self.delay_s) - 2.0 * self.sigma_s > CAMERA_UNCERTAINTY_S
 
     def __str__(self) -> str:

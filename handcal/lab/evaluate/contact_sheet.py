@@ -32,7 +32,6 @@ def contact_sheet(
     score_min : float
         Detections with a lower score are ignored.
 
-
     Returns
     -------
     (h, w, 3) uint8
