@@ -49,7 +49,8 @@ class Plot(QWidget):
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._view.setMinimumSize(100, 44)
         self.item = self._view.getPlotItem()
-        self.item.ctrlMenu.setParent(self, self.item.ctrlMenu.windowFlags())  # or it outlives this
+        # Never shown, it would outlive this; a child of this, its fields would be among the panel's.
+        self.destroyed.connect(self.item.ctrlMenu.deleteLater)
         self.item.hideButtons()
         self.item.setContentsMargins(*4 * (SPACING_PX // 2,))
         self.item.setMouseEnabled(x=False, y=False)
