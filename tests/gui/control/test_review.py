@@ -68,6 +68,7 @@ def is_open(program: Program) -> bool:
 def test_the_example_is_opened_from_the_start_page(
     program: Program, qtbot: QtBot, tmp_path: Path
 ) -> None:
+    assert not (tmp_path / "preferences.json").exists()  # nothing has changed yet
     entered = str(tmp_path / "sessions")
     (folder,) = (
         one for one in program.start.findChildren(PathField) if one.name == "Session folder"
