@@ -1,4 +1,4 @@
-"""Makes the pictures of rig-guide.md: the rig wizard, with rendered photographs, by itself."""
+"""Makes the pictures of rig-guide.md, by an automatic run of the rig wizard on rendered images."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ EXAMPLE = Path(__file__).parents[1] / "resources/example_session"
 
 
 def main() -> None:
-    """Draw the report's own figures into axes of our own, and save them."""
+    """Draw two of the report's figures into axes made here, and save them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--session", type=Path, default=EXAMPLE, help="session folder")
     parser.add_argument(

@@ -1,8 +1,8 @@
-"""A headset app in miniature: what the app of a real headset does, to begin one from.
+"""A minimal headset app: it does what the app of a real headset does. Start your own from it.
 
     HANDCAL_PAIRING_KEY=KEY python 08_headset_client.py HOST PORT
 
-It introduces itself, tells its pose 60 times a second, says what it is to draw whenever that
+It introduces itself, sends its pose 60 times per second, prints what to draw whenever that
 changes, and confirms an alignment on Enter. It needs no rig file. Ctrl+C, or the PC, ends it.
 """
 
@@ -20,12 +20,12 @@ from handcal.link.pairing import read_pairing_key
 from handcal.types import Float64, HeadsetIdentity
 
 IDENTITY = HeadsetIdentity("0123456789abcdef", "Example", runtime="none", app="example 08")
-"""A real app makes its identity at random once, stores it, and reports the views of its runtime."""
+"""A real app creates a random identity once, stores it, and reports the views of its runtime."""
 PERIOD_S = 1 / 60
 
 
 def main() -> None:
-    """Connect, and go on until the PC is closed."""
+    """Connect, and run until the PC closes the link."""
     host, port = sys.argv[1], int(sys.argv[2])
     told = ""
     with HeadsetClient((host, port), read_pairing_key(), IDENTITY) as client:

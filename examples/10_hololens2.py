@@ -1,4 +1,4 @@
-"""Look through a HoloLens 2's own depth camera: where it is, and the hand before it.
+"""Read a HoloLens 2's own depth camera: print its position, and the hand in front of it.
 
     python 10_hololens2.py HOST
 

@@ -81,7 +81,7 @@ class ActionBar(QWidget):
     def show_view(self, view: WizardView | None, *, is_quiet: bool = False) -> None:
         """Show the buttons of a view; if it is None, no button can be pressed.
 
-        Quiet is a main button that nobody needs to press; it has no accent colour.
+        A main button that nobody needs to press is quiet: it has no accent colour.
         """
         before, self._view = self._view, view
         if is_quiet != self._is_quiet:

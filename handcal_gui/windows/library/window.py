@@ -1,4 +1,4 @@
-"""The library: the sessions of a folder, found again, compared, exported, checked, deleted."""
+"""The library: the sessions of a folder, searched, compared, exported, checked, deleted."""
 
 from __future__ import annotations
 
