@@ -10,17 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import (
-    Option,
-    arg,
-    command,
-    fail,
-    flag,
-    folder_option,
-    number,
-    seed,
-    value,
-)
+from handcal.cli.terminal import Option, arg, command, fail, number, seed
 from handcal.errors import CancelledError
 
 if TYPE_CHECKING:
@@ -31,8 +21,11 @@ Result = TypeVar("Result")
 
 
 _STUDY_OPTIONS: dict[str, Option] = {
-    "--workers": value(
-        "--workers", number(int, 1, 1024), "N", "number of processes (default: one per core)"
+    "--workers": arg(
+        "--workers",
+        type=number(int, 1, 1024),
+        metavar="N",
+        help="number of processes (default: one per core)",
     ),
     "--scheduler": arg(
         "--scheduler",
@@ -40,23 +33,27 @@ _STUDY_OPTIONS: dict[str, Option] = {
         help="Dask cluster to run on, such as tcp://HOST:PORT (default: this computer)",
     ),
     "--seed": seed("the whole study"),
-    "--quick": flag("--quick", "few trials: do not report the figures"),
+    "--quick": arg("--quick", action="store_true", help="few trials: do not report the figures"),
 }
 
 
 def _study_options(name: str) -> tuple[Option, ...]:
     return (
-        folder_option(
+        arg(
             "--output",
-            "folder for this study only; an unfinished study is resumed",
+            type=Path,
+            metavar="FOLDER",
             default=Path(f"results/study-{name}"),
+            help="folder for this study only; an unfinished study is resumed",
         ),
         *_STUDY_OPTIONS.values(),
     )
 
 
 @command(
-    flag("--open3d", "solve by Open3D's ICP too (pip install handcal[3d])"),
+    arg(
+        "--open3d", action="store_true", help="solve by Open3D's ICP too (pip install handcal[3d])"
+    ),
     *_study_options("noise"),
     json=True,
 )
@@ -77,17 +74,18 @@ def noise(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    value(
+    arg(
         "--wearers",
-        number(int, 2, 10_000),
-        "N",
-        "simulated wearers in each population (default: the study's own number)",
+        type=number(int, 2, 10_000),
+        metavar="N",
+        help="simulated wearers in each population (default: the study's own number)",
     ),
-    value(
+    arg(
         "--fit-noise",
-        number(int, 2, 1000),
-        "N",
-        "first find the noise at which the paper's method has its published error, with N wearers",
+        type=number(int, 2, 1000),
+        metavar="N",
+        help="first find the noise at which the paper's method has its published error, with N "
+        "wearers",
     ),
     *_study_options("methods"),
     json=True,
@@ -118,12 +116,12 @@ def methods(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    value(
+    arg(
         "--wearers",
-        number(int, 2, 10_000),
-        "N",
-        "simulated wearers for each plan, variant and scale",
+        type=number(int, 2, 10_000),
+        metavar="N",
         default=100,
+        help="simulated wearers for each plan, variant and scale",
     ),
     arg(
         "--plan",
@@ -161,9 +159,11 @@ def methods(arguments: argparse.Namespace) -> None:
         help="learned: from simulated earlier sessions",
     ),
     *(option for name, option in _STUDY_OPTIONS.items() if name != "--quick"),
-    folder_option(
+    arg(
         "--output",
-        "folder for this study only; an unfinished study is resumed (default: none is kept)",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for this study only; an unfinished study is resumed (default: none is kept)",
     ),
     json=True,
 )

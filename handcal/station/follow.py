@@ -15,7 +15,7 @@ from handcal.station.station import Station
 from handcal.types import Eye
 
 _DELIVERY_S = 5.0
-# Steps that the station takes automatically, within a few frames.
+# Steps that the station does by itself, within a few frames.
 _PASSING = (StepName.SOLVE, StepName.APPLY, StepName.WAIT, StepName.CURSOR, StepName.VERIFY)
 
 
@@ -57,7 +57,7 @@ def follow_plan(
         If it was cancelled.
     """
     led = _Led(station, patience, progress)
-    led.wait(0.0, "Waiting for the headset", lambda one: one.link.connected, "no headset connected")
+    led.wait(0.0, "Waiting for the headset", _is_connected, "no headset connected")
     if station.plan.settings.is_automatic:
         led.follow()
     else:
@@ -159,6 +159,10 @@ def _place(snapshot: Snapshot) -> tuple[object, ...]:
     """Return what each step that the wearer does changes; two steps may differ in results only."""
     step = snapshot.procedure.next_step
     return step and (step.name, step.eyes), snapshot.procedure.results
+
+
+def _is_connected(snapshot: Snapshot) -> bool:
+    return snapshot.link.connected
 
 
 def _observed(snapshot: Snapshot, is_true: Callable[[Observation], bool]) -> bool:

@@ -15,8 +15,7 @@ from handcal_gui.widgets.sentence import sentence
 class Banner(QWidget):
     """Shows the newest message; hidden if there is none.
 
-    A message, which the user must close, takes precedence over a condition, which disappears on
-    its own.
+    A message, which the user must close, takes precedence over a condition, which ends by itself.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
