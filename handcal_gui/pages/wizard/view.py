@@ -124,6 +124,6 @@ class WizardView:
     fact: str = ""
     """The findings so far; empty if there are none."""
     runs_after_s: float | None = None
-    """Time for which the main button is enabled before it is pressed by the program, if it is."""
+    """Time until the enabled main button is pressed automatically; None if never."""
     unearned: frozenset[Step] = frozenset()
     """Earlier steps that were left without what they are for."""
