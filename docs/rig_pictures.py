@@ -1,4 +1,4 @@
-"""Makes the pictures of rig-guide.md: the rig wizard, run with rendered photographs."""
+"""Makes the pictures of rig-guide.md, by an automatic run of the rig wizard on rendered images."""
 
 from __future__ import annotations
 

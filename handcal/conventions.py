@@ -1,4 +1,4 @@
-"""Poses and projections in the conventions of OpenGL, Unity, WinRT, OpenXR and 3D Slicer.
+"""Poses and projections in the conventions of OpenGL, Unity, OpenXR and 3D Slicer.
 
 handcal's own axes are OpenCV's, x right, y down, z forward, and its pixels have their centres at
 whole numbers, so that a display's image runs from -0.5 to width - 0.5. The others:
@@ -8,7 +8,6 @@ system    axes                                      poses
 ========  ========================================  =======================================
 OpenGL    x right, y up, z back                     column vectors
 OpenXR    as OpenGL                                 quaternion and position
-WinRT     as OpenGL                                 row vectors: the transpose
 Unity     world x right, y up, z forward (left-     column vectors, or quaternion and position
           handed); camera space as OpenGL
 Slicer    x right, y forward (anterior), z up       column vectors, mm

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Literal
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, QRectF, Qt, Signal
@@ -246,17 +246,21 @@ def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:
 
 def icon(name: str, color: str = "") -> QIcon:
     """Return the icon ``resources/icons/NAME.svg``, in the palette's text colour or another."""
-    svg = resource_path(f"icons/{name}.svg").read_bytes()
     result = QIcon()
     text = QGuiApplication.palette().windowText().color()
     for mode, shade in (
         (QIcon.Mode.Normal, QColor(color) if color else text),
         (QIcon.Mode.Disabled, QColor(colors().muted)),
     ):
-        tinted = svg.replace(b"currentColor", shade.name().encode())
+        tinted = _svg(name).replace(b"currentColor", shade.name().encode())
         for size_px in (16, 24, 32, 48, 64):
             result.addPixmap(QPixmap.fromImage(_draw(tinted, size_px)), mode)
     return result
+
+
+@cache
+def _svg(name: str) -> bytes:
+    return resource_path(f"icons/{name}.svg").read_bytes()
 
 
 class _PaletteWatch(QObject):

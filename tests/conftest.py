@@ -119,6 +119,11 @@ def _refuse_process(self: object, *_arguments: object, **_options: object) -> No
     pytest.fail("mark this test with pytest.mark.process: it starts one")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """End a run whose worker crashes: with another in its place, xdist may wait for ever."""
+    config.option.maxworkerrestart = "0"
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
     """Give out tests by file; all that start whole programs go to one worker, one by one."""

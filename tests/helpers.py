@@ -20,6 +20,17 @@ from handcal.types import Intrinsics
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests/data"
+FOLDERS = {
+    "HOME": "home",
+    "XDG_CACHE_HOME": "cache",
+    "XDG_CONFIG_HOME": "config",
+    "XDG_DATA_HOME": "data",
+    "XDG_STATE_HOME": "state",
+    "TMPDIR": "temporary",
+}
+"""Variables that name a user's folders, and fresh folders for them."""
+SILENCERS = "CI", "ORT_DISABLE_TELEMETRY", "ORT_TELEMETRY_DISABLED", "ORT_RUNNING_UNIT_TESTS"
+"""Variables that switch a library's telemetry off; the tests may run where one is set."""
 
 _PROBE = range(400_000)
 _PROBE_PERIOD_S = 1.0

@@ -1,4 +1,4 @@
-"""Second tries are listed by name, and more than one fails the run: a rule of tests/conftest.py."""
+"""Rules of tests/conftest.py: second tries, and workers that crash."""
 
 from __future__ import annotations
 
@@ -27,26 +27,46 @@ def test_flaky(number, client):
         raise ValueError("too early")
 """
 
+CRASH = """
+import os
+
+def test_crash():
+    os._exit(3)
+"""
+
 
 @pytest.mark.process
 @pytest.mark.parametrize(("workers", "count", "code"), [(0, 1, 0), (1, 2, 1)])
 def test_one_second_try_is_listed_and_two_fail(
     tmp_path: Path, workers: int, count: int, code: int
 ) -> None:
-    (tmp_path / "test_flaky.py").write_text(FLAKY.format(count=count))
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n quick\n")
+    run = _run(tmp_path, FLAKY.format(count=count), workers)
+    assert run.returncode == code, run.stdout + run.stderr
+    assert f"{count} passed, {count} rerun" in run.stdout
+    for number in range(count):
+        assert f"test_it.py::test_flaky[{number}] - ValueError: too early" in run.stdout
+    assert ("at most 1 may" in run.stdout) == (count > 1)
+
+
+@pytest.mark.process
+def test_a_crash_ends_the_run(tmp_path: Path) -> None:
+    run = _run(tmp_path, CRASH, workers=1)
+    assert run.returncode == 1, run.stdout + run.stderr
+    assert "crashed while running 'test_it.py::test_crash'" in run.stdout
+    assert "1 failed in" in run.stdout  # once, not again by each worker in its place
+
+
+def _run(folder: Path, tests: str, workers: int) -> subprocess.CompletedProcess[str]:
+    """Run tests by the rules of tests/conftest.py."""
+    (folder / "test_it.py").write_text(tests)
+    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n quick\n")
     command = [
         *(sys.executable, "-m", "pytest", "-q", "-p", "tests.conftest", "-p", "no:dash"),
         *("-p", "no:pytest-qt", f"--numprocesses={workers}", "--dist=loadfile"),
     ]
-    run = subprocess.run(
-        command, cwd=tmp_path, env=_environment(), capture_output=True, text=True, check=False
+    return subprocess.run(
+        command, cwd=folder, env=_environment(), capture_output=True, text=True, check=False
     )
-    assert run.returncode == code, run.stdout + run.stderr
-    assert f"{count} passed, {count} rerun" in run.stdout
-    for number in range(count):
-        assert f"test_flaky.py::test_flaky[{number}] - ValueError: too early" in run.stdout
-    assert ("at most 1 may" in run.stdout) == (count > 1)
 
 
 def _environment() -> dict[str, str]:

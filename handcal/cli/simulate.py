@@ -80,7 +80,7 @@ _LINK = (
 )
 def demo(arguments: argparse.Namespace) -> None:
     """Calibrate a simulated wearer from start to end, and compare with the truth."""
-    from handcal.cli.demo import DemoSettings, run_demo
+    from handcal.lab.demo import DemoSettings, run_demo
     from handcal.types import EyeDistance
 
     settings = DemoSettings(

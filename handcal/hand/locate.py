@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from handcal.errors import HandError
 from handcal.hand.settings import NEARER_M, SegmentSettings
-from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
+from handcal.hand.surface import NEIGHBOURS, covered, goes_on, on_border, solid_surface
 from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
 from handcal.hand.wrist import box_exit_m, find_wrist_m
 from handcal.types import Bool, Float32, Float64
@@ -53,6 +53,9 @@ _ARM_IN_BOX_MAX = 0.25
 # With a larger standard deviation the wrist is not known well enough for a cut. A palm with a
 # smaller inscribed circle is seen from its edge.
 _LIMIT_SIGMA_MAX_M, _FROM_EDGE_M = 0.026, 0.03
+# Length of the outline with something this far before it: about a palm's breadth if a thing hides
+# half of the hand; by stray pixels it was 45 mm at most.
+_COVERED_MAX_M, _COVER_JUMP_M = 0.065, 0.03
 _NOT_A_HAND = (
     "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
     "bare hand, clear of other things"
@@ -169,6 +172,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
         )
     _check_wrist(found)
+    _check_covered(found)
     return found
 
 
@@ -192,6 +196,23 @@ def _check_wrist(located: LocatedHand) -> None:
         )
     if located.limit_sigma_m > _LIMIT_SIGMA_MAX_M:
         raise HandError(_FROM_EDGE if located.palm_radius_m < _FROM_EDGE_M else _NO_WRIST)
+
+
+def _check_covered(located: LocatedHand) -> None:
+    """Raise HandError if much of the hand's outline is that of something before it."""
+    view, hand = located.view, located.hand
+    other = (view.depth > 0) & ~(hand | located.arm)
+    jump = round(_COVER_JUMP_M / view.scale_m)
+    # The surface ends one pixel beside what is before it, so one of two is marked.
+    most_px = _COVERED_MAX_M / (_pitch(view) * float(located.palm_m[2]))
+    if np.count_nonzero(covered(hand, other, view.depth, jump)) <= most_px:
+        return
+    # Without stray pixels.
+    other = cv2.morphologyEx(other.view(np.uint8), cv2.MORPH_OPEN, NEIGHBOURS).view(bool)
+    if np.count_nonzero(covered(hand, other, view.depth, jump)) > most_px:
+        raise HandError(
+            "part of the hand is hidden behind something; hold it clear of other things"
+        )
 
 
 def _check_arm(located: LocatedHand, within: Float32) -> None:

@@ -73,6 +73,26 @@ def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
     return beside
 
 
+def covered(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
+    """Mark the pixels of `surface` with one of `other` before them, two pixels away or less.
+
+    Parameters
+    ----------
+    surface, other : (h, w) bool
+        Disjoint parts of a depth image.
+    depth : (h, w) uint16
+    jump : int
+        Least distance in front, in the units of `depth`.
+
+    Returns
+    -------
+    (h, w) bool
+    """
+    nearest_other = cv2.erode(_only(depth, other), np.ones((5, 5), np.uint8))
+    before: Bool = surface & (cv2.subtract(depth, nearest_other) > jump)  # saturates at 0
+    return before
+
+
 def _only(depth: UInt16, mask: Bool) -> UInt16:
     """Return the depth on a mask, _UNMEASURED elsewhere; five times faster than np.where."""
     return depth | (mask.astype(np.uint16) - np.uint16(1))

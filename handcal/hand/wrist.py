@@ -43,7 +43,10 @@ _HALF_THICKNESS_M, _NARROWEST_M = 0.017, 0.004
 _SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
 _SMOOTHING /= _SMOOTHING.sum()
 _BINS = round((_PROFILE_M[1] - _PROFILE_M[0]) / _BIN_M)
-_AT_M = _PROFILE_M[0] + _BIN_M * (np.arange(_BINS - len(_SMOOTHING) + 1) + 0.5 * len(_SMOOTHING))
+_AT_M = np.asarray(
+    _PROFILE_M[0] + _BIN_M * (np.arange(_BINS - len(_SMOOTHING) + 1) + 0.5 * len(_SMOOTHING)),
+    np.float64,
+)
 
 
 def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:

@@ -146,6 +146,14 @@ def _open_at_once(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
+def modified_s(path: Path) -> float:
+    """Return the time at which a file was last changed; 0 if it cannot be read or is gone."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
 def make_folder(path: Path) -> Path:
     """Create `path` with its parents if needed, on the disk, and return it.
 

@@ -14,22 +14,14 @@ from handcal.rig.cube import Cube, face_pose
 from handcal.types import Float64
 
 _AROUND = 0.5 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
-
-
-@dataclass(frozen=True, slots=True)
-class CubeTrackSettings:
-    """Settings of the filter."""
-
-    smoothing_s: float = 0.3
-    """Time constant while the cube moves slowly, and at most that many seconds at rest."""
-    jump_m: float = 0.01
-    jump_rad: float = 0.07
-    """A measured pose this far from the filtered one starts the filter again."""
-    rest_s: float = 0.6
-    """The cube is at rest if its measured poses stayed together for this time."""
-    rest_m: float = 0.004
-    rest_rad: float = 0.03
-    """Largest distance of a measured pose from the filtered one at rest."""
+_SMOOTHING_S = 0.3
+"""Time constant while the cube moves slowly, and at most that many seconds at rest."""
+_JUMP_M, _JUMP_RAD = 0.01, 0.07
+"""A measured pose this far from the filtered one starts the filter again."""
+_REST_NS = 600_000_000
+"""The cube is at rest if its measured poses stayed together for this time."""
+_REST_M, _REST_RAD = 0.004, 0.03
+"""Largest distance of a measured pose from the filtered one at rest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,40 +45,32 @@ class CubeFilter:
 
     The n-th pose after a start has the weight 1/n, or that of the time constant if it is larger: a
     mean first, which then forgets.
-
-    Parameters
-    ----------
-    settings : CubeTrackSettings, optional
     """
 
-    def __init__(self, settings: CubeTrackSettings | None = None) -> None:
-        self._settings = settings or CubeTrackSettings()
+    def __init__(self) -> None:
         self._newest: TrackedCube | None = None
         self._recent: deque[tuple[int, Float64]] = deque()
 
     def take(self, T_W_T: Float64, t_ns: int) -> TrackedCube:
         """Return the filtered pose after a measured one, (4, 4); the time is the camera's."""
-        settings, before = self._settings, self._newest
+        before = self._newest
         if (
             before is None
             or t_ns < before.t_ns  # the camera has started again
-            or not _near(T_W_T, before.T_W_T, settings.jump_m, settings.jump_rad)
+            or not _near(T_W_T, before.T_W_T, _JUMP_M, _JUMP_RAD)
         ):
             self._recent.clear()
             filtered = TrackedCube(t_ns, T_W_T, False, 1)
         else:
             passed_s = 1e-9 * (t_ns - before.t_ns)
-            weight = max(
-                1.0 / (before.frames + 1), 1.0 - float(np.exp(-passed_s / settings.smoothing_s))
-            )
+            weight = max(1.0 / (before.frames + 1), 1.0 - float(np.exp(-passed_s / _SMOOTHING_S)))
             pose = interpolate_pose(before.T_W_T, T_W_T, min(weight, 1.0))
             filtered = TrackedCube(t_ns, pose, False, before.frames + 1)
         self._recent.append((t_ns, T_W_T))
-        rest_ns = round(1e9 * settings.rest_s)
-        while len(self._recent) > 1 and self._recent[1][0] <= t_ns - rest_ns:
+        while len(self._recent) > 1 and self._recent[1][0] <= t_ns - _REST_NS:
             self._recent.popleft()
-        is_at_rest = t_ns - self._recent[0][0] >= rest_ns and all(
-            _near(T, filtered.T_W_T, settings.rest_m, settings.rest_rad) for _, T in self._recent
+        is_at_rest = t_ns - self._recent[0][0] >= _REST_NS and all(
+            _near(T, filtered.T_W_T, _REST_M, _REST_RAD) for _, T in self._recent
         )
         self._newest = replace(filtered, is_at_rest=is_at_rest)
         return self._newest

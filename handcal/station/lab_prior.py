@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from handcal.errors import FileError
+from handcal.io.files import modified_s
 from handcal.progress import Progress
 from handcal.register.prior import (
     LearnedPrior,
@@ -66,7 +67,7 @@ def run_learn_prior(
     CancelledError
         If it was cancelled.
     """
-    journals = sorted(folder.glob("*/journal.jsonl"), key=_modified_s, reverse=True)[:MAX_SESSIONS]
+    journals = sorted(folder.glob("*/journal.jsonl"), key=modified_s, reverse=True)[:MAX_SESSIONS]
     sessions: list[list[Observed]] = []
     left_out: dict[str, int] = {}
     wearers: set[str] = set()
@@ -86,13 +87,6 @@ def run_learn_prior(
 
 class _NotUsableError(Exception):
     """A session that does not count; the text says why."""
-
-
-def _modified_s(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return 0.0
 
 
 def _read_session(journal: Path, rig: Rig) -> tuple[list[Observed], str]:

@@ -14,20 +14,10 @@ import tempfile
 from pathlib import Path
 
 from tests.campaigns.campaign import Tally, campaign
-from tests.helpers import write_small_rig
+from tests.helpers import FOLDERS, SILENCERS, write_small_rig
 
 WEARER = "Zdenka Quorvath"
 CALLS = "connect,sendto,sendmsg,sendmmsg"
-# Telemetry is off where one of these is set, and this may run where it is.
-SILENCERS = "CI", "ORT_DISABLE_TELEMETRY", "ORT_TELEMETRY_DISABLED", "ORT_RUNNING_UNIT_TESTS"
-FOLDERS = {
-    "HOME": "home",
-    "XDG_CACHE_HOME": "cache",
-    "XDG_CONFIG_HOME": "config",
-    "XDG_DATA_HOME": "data",
-    "XDG_STATE_HOME": "state",
-    "TMPDIR": "temporary",
-}
 _ADDRESS = re.compile(
     r'sin_addr=inet_addr\("([^"]+)"\)|inet_pton\(AF_INET6, "([^"]+)"|sa_family=(AF_[A-Z0-9]+)'
 )

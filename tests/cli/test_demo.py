@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.cli.demo import measure_eye_distance
 from handcal.cli.main import main
 from handcal.display import reprojection_arcmin
 from handcal.geometry import rigid
+from handcal.lab.demo import measure_eye_distance
 from handcal.register.prior import eye_position_m
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from handcal.cli.main import main
 from handcal.link import inviting
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
@@ -20,15 +19,6 @@ from tests.helpers import eventually
 
 DEVICE, OTHER = "00000000000000aa", "00000000000000bb"
 PORT = 47941
-
-
-@pytest.fixture
-def handcal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    def run(*arguments: object) -> None:
-        monkeypatch.setattr(sys, "argv", ["handcal", *map(str, arguments)])
-        main()
-
-    return run
 
 
 @pytest.fixture

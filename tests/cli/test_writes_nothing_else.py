@@ -25,21 +25,11 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
-from tests.helpers import write_small_rig
+from tests.helpers import FOLDERS, SILENCERS, write_small_rig
 
 pytestmark = pytest.mark.process
 
 EXAMPLE = resource_path("example_session")
-FOLDERS = {
-    "HOME": "home",
-    "XDG_CACHE_HOME": "cache",
-    "XDG_CONFIG_HOME": "config",
-    "XDG_DATA_HOME": "data",
-    "XDG_STATE_HOME": "state",
-    "TMPDIR": "temporary",
-}
-# Their own telemetry is off where one of these is set, and pytest may run where it is.
-SILENCERS = "CI", "ORT_DISABLE_TELEMETRY", "ORT_TELEMETRY_DISABLED", "ORT_RUNNING_UNIT_TESTS"
 
 
 @pytest.fixture(scope="module")

@@ -219,8 +219,7 @@ class Camera(Closable):
         if self.shows == "silence":
             raise CameraTimeoutError("the camera gives no frame")
         self._index += 1
-        now_ns = time.monotonic_ns()
-        shown = self._frames[self.shows]
+        shown, now_ns = self._frames[self.shows], time.monotonic_ns()
         depth = shown.depth.copy()
         depth[0, 0] = self._index % 1000  # a live picture always changes
         return replace(shown, index=self._index, t_camera_ns=now_ns, t_host_ns=now_ns, depth=depth)
@@ -274,12 +273,11 @@ class Headset(Closable):
         self._thread.join()
         self._client.close()
 
+    close = fall_silent
+
     def come_back(self) -> None:
         self._ended.clear()
         self._open()
-
-    def close(self) -> None:
-        self.fall_silent()
 
     def _open(self) -> None:
         self._client = HeadsetClient(self._address, self._key.encode(), IDENTITY)
@@ -316,10 +314,7 @@ def frames(small_rig: Path) -> dict[str, Frame]:
 
 @pytest.fixture
 def studio(
-    small_rig: Path,
-    frames: Mapping[str, Frame],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    small_rig: Path, frames: Mapping[str, Frame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Studio]:
     """Return the parts of a station to be opened with their settings and the pairing key `KEY`."""
     camera = Camera(frames)
@@ -355,39 +350,35 @@ def _shoot(rig: Rig, world: World, T_D_hand: Float64) -> tuple[Frame, PlacedHand
     cloud = segment_hand(frame, SegmentSettings())
     T_W_D = T_W_H @ rig.T_H_D
     points_W_m = transform(T_W_D, cloud.points_m)
-    return frame, PlacedHand(
-        cloud, frame.t_host_ns, T_W_D, points_W_m, np.median(points_W_m, axis=0)
-    )
+    middle_W_m = np.median(points_W_m, axis=0)
+    return frame, PlacedHand(cloud, frame.t_host_ns, T_W_D, points_W_m, middle_W_m)
 
 
 def _observe(state: State, shots: Shots) -> Observation:
-    is_aligning = state is State.ALIGN
     return Observation(
         state,
         shots.live,
         problem="",
         is_steady=True,
         cloud=shots.live.cloud,
-        rotation_rad=shots.rotation_rad if is_aligning else None,
+        rotation_rad=shots.rotation_rad if state is State.ALIGN else None,
         segment_ms=4.2,
-        guard_ms=3.1 if is_aligning else None,
+        guard_ms=3.1 if state is State.ALIGN else None,
     )
 
 
 def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
-    has_cursor = state in (State.ALIGN, State.ALIGNED, State.SOLVED)
-    is_solved = state in (State.SOLVED, State.APPLYING, State.APPLIED)
     is_sent = state in (State.APPLYING, State.APPLIED)
     applied_m = {eye: results.eyes[eye].shift_m if is_sent else np.zeros(3) for eye in EYES}
     return Procedure(
         state=state,
         eyes=EYES,
-        cursor=shots.cursor if has_cursor else None,
+        cursor=shots.cursor if state in (State.ALIGN, State.ALIGNED, State.SOLVED) else None,
         refusal="",
         refused=0,
         guard_limit_rad=float(np.radians(9.0)),
         alignments={},
-        results=results if is_solved else None,
+        results=results if is_sent or state is State.SOLVED else None,
         applied_shift_m=applied_m,
         is_applied=state is not State.APPLYING,
     )

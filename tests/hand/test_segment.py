@@ -169,6 +169,19 @@ def test_hand_at_the_border_is_refused() -> None:
         segment_hand(shoot(at_m=(0.0, -0.11, 0.52)).frame, SETTINGS)
 
 
+def test_a_hand_half_hidden_by_another_thing_is_refused(shot: Shot) -> None:
+    x0, y0, x1, y1 = segment_hand(shot.frame, SETTINGS).box_px
+    nearer = round((float(shot.depth_m[shot.is_hand()].min()) - 0.06) / shot.frame.depth_scale_m)
+    for rows in (slice((y0 + y1) // 2, CAMERA.height), slice((y0 + y1) // 2, (y0 + y1) // 2 + 20)):
+        depth = shot.frame.depth.copy()
+        depth[rows, :] = nearer
+        with pytest.raises(HandError, match=r"hidden behind something|shaped like"):
+            segment_hand(with_depth(shot.frame, depth), SETTINGS, (x0, y0, x1, y1))
+    depth = shot.frame.depth.copy()
+    depth[y0 : y0 + 20, x0 - 30 : x0] = nearer  # beside it
+    segment_hand(with_depth(shot.frame, depth), SETTINGS, (x0, y0, x1, y1))
+
+
 def test_nothing_within_the_gate_is_refused(shot: Shot) -> None:
     with pytest.raises(HandError, match=r"no hand-sized object between 0\.35 and 0\.70 m"):
         segment_hand(shoot(at_m=(0.0, 0.02, 0.9)).frame, SETTINGS)

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from handcal.cli.demo import DemoSettings, run_demo
 from handcal.io.resources import resource_path
+from handcal.lab.demo import DemoSettings, run_demo
 from handcal.progress import Progress
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.cli.demo import DemoSettings
 from handcal.errors import FileError
 from handcal.io.settings import read_settings, settings_json
+from handcal.lab.demo import DemoSettings
 from handcal.register.fuse import FuseSettings
 from handcal.station.states import CalibrationSettings
 

@@ -89,7 +89,7 @@ class NewCalibration(Card):
         self._lay_out()
         self._has_stopped = threading.Event()
         progress = Progress(is_cancelled=self._has_stopped.is_set)
-        self._check = LatestJob(lambda question: check(*question, progress), self)
+        self._check = LatestJob(lambda asked: check(asked[0], asked[1], progress), self)
         self._check.answered.connect(self._on_findings)
         self._check.failed.connect(self._show_problem)
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)

@@ -8,6 +8,7 @@ from itertools import chain, islice
 from pathlib import Path
 
 from handcal.errors import FileError
+from handcal.io.files import modified_s
 from handcal.session.library import EyeOutcome, eye_outcomes
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
@@ -53,7 +54,7 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
     """
     unfinished = unfinished_sessions(folder)
     listed = {path.absolute() for path in (*recent, *(session.path for session in unfinished))}
-    journals = sorted(folder.glob("*/journal.jsonl"), key=_changed_s, reverse=True)
+    journals = sorted(folder.glob("*/journal.jsonl"), key=modified_s, reverse=True)
     others = (path.parent for path in journals if path.parent.absolute() not in listed)
     offered = (_recent(path) for path in chain(recent, others) if path.exists())
     return KnownSessions(
@@ -64,13 +65,6 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
         ),
         recent=tuple(islice((entry for entry in offered if entry is not None), MOST_RECENT)),
     )
-
-
-def _changed_s(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:  # deleted meanwhile
-        return 0.0
 
 
 def _unfinished(session: UnfinishedSession) -> Entry:

@@ -124,6 +124,6 @@ class WizardView:
     fact: str = ""
     """The findings so far; empty if there are none."""
     runs_after_s: float | None = None
-    """Time after which the program presses the enabled main button; None if it never does."""
+    """Time until the enabled main button is pressed automatically; None if never."""
     unearned: frozenset[Step] = frozenset()
     """Earlier steps that were left without what they are for."""

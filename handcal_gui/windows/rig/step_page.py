@@ -12,7 +12,7 @@ from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
@@ -107,7 +107,8 @@ class StepPage(QWidget):
         dialog.open()
 
     def _lay_out(self, panels: Mapping[str, ImagesPanel]) -> None:
-        layout = vbox(self.form, on=self, margins=0, spacing=SPACING_PX)
+        content = QWidget()
+        layout = vbox(self.form, on=content, margins=0, spacing=SPACING_PX)
         if len(panels) == 1:
             layout.addWidget(self.panels[0], 1)
         else:
@@ -116,7 +117,8 @@ class StepPage(QWidget):
                 panel.setContentsMargins(*4 * (SPACING_PX,))
                 tabs.addTab(panel, title)
             layout.addWidget(tabs, 1)
-        layout.addWidget(self.box)
+        # Or a low screen hides the button that solves.
+        vbox((scrollable(content), 1), self.box, on=self, margins=0, spacing=SPACING_PX)
 
     def _refresh(self) -> None:
         is_looking = any(panel.bar.is_busy for panel in self.panels)

@@ -22,7 +22,7 @@ from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, with_name
-from handcal_gui.widgets.layouts import hbox, scrollable, vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
 from handcal_gui.windows.rig.project import RigProject
@@ -102,7 +102,7 @@ class RigWizard(QDialog):
             DisplayPage(self.project, "right"),
             result,
         ):
-            self._stack.addWidget(scrollable(page))  # or a low screen hides the buttons below
+            self._stack.addWidget(page)
             self._pages.append(page)
         self._back = button("rigBack", tr("Back"))
         self._next = button("rigNext", tr("Next"))

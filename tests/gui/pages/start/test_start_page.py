@@ -40,6 +40,7 @@ from handcal_gui.preferences import Preferences
 from handcal_gui.widgets.path_field import PathField
 
 KEY = "0123456789abcdef0123456789abcdef"
+NETWORK = {"headset": "network"}
 
 
 class Inspector:
@@ -145,9 +146,7 @@ def test_typing_a_name_and_enter_starts(
     assert threading.main_thread() not in inspector.threads
 
 
-def test_the_next_wearer_finds_everything_as_it_was(
-    qtbot: QtBot, open_page: Callable[..., StartPage]
-) -> None:
+def test_the_next_wearer_finds_everything_as_it_was(open_page: Callable[..., StartPage]) -> None:
     page = open_page(source="realsense", headset="network", port=50_001)
     QTest.keyClicks(wearer(page), "Ada")
     before = page.new.settings
@@ -195,20 +194,8 @@ def test_what_breaks_after_the_last_look_is_found_by_the_start(
 @pytest.mark.parametrize(
     ("part", "health", "station", "fix", "mended"),
     [
-        (
-            "headset",
-            Health.BROKEN,
-            {"headset": "network"},
-            "virtual headset",
-            {"headset": "virtual"},
-        ),
-        (
-            "headset",
-            Health.LIMITED,
-            {"source": "realsense"},
-            "network headset",
-            {"headset": "network"},
-        ),
+        ("headset", Health.BROKEN, NETWORK, "virtual headset", {"headset": "virtual"}),
+        ("headset", Health.LIMITED, {"source": "realsense"}, "network headset", NETWORK),
         ("rig", Health.BROKEN, {"rig": "/nowhere.yaml"}, "example", {"rig": ""}),
     ],
 )
