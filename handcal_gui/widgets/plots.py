@@ -49,7 +49,7 @@ class Plot(QWidget):
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._view.setMinimumSize(100, 44)
         self.item = self._view.getPlotItem()
-        # Never shown, it would outlive this; a child of this, its fields would be among the panel's.
+        # Never shown, it would outlive this; as a child, its fields would be among the panel's.
         self.destroyed.connect(self.item.ctrlMenu.deleteLater)
         self.item.hideButtons()
         self.item.setContentsMargins(*4 * (SPACING_PX // 2,))
