@@ -52,7 +52,7 @@ _ARM_IN_BOX_MAX = 0.25
 
 # With a larger standard deviation the wrist is not known well enough for a cut. A palm with a
 # smaller inscribed circle is seen from its edge.
-_LIMIT_SIGMA_MAX_M, _FROM_EDGE_M = 0.026, 0.03
+_LIMIT_SIGMA_MAX_M, _FROM_EDGE_M = 0.03, 0.03
 # Length of the outline with something this far before it: about a palm's breadth if a thing hides
 # half of the hand; by stray pixels it was 45 mm at most.
 _COVERED_MAX_M, _COVER_JUMP_M = 0.065, 0.03
