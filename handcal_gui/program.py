@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QObject, QSize
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt
 from PySide6.QtGui import QGuiApplication
 
 from handcal.errors import FileError
@@ -90,8 +90,9 @@ class Program(QObject):
         )
         self._connect(review_page)
         self._make_menus()
-        self._restore()
+        state = self._restore()
         self.show_start()
+        self.window.setWindowState(state)
         self.window.banner.show_message(self._current.complaint)
 
     @property
@@ -220,19 +221,27 @@ class Program(QObject):
         add_edit_menu(self.window, self.windows.show_library)
         add_help_menu(self.window, self.manual, self.windows.make_support_bundle)
 
-    def _restore(self) -> None:
+    def _restore(self) -> Qt.WindowState:
+        """Restore the window as it was left, and return its state, which is set when all is done.
+
+        Of a hidden window that is maximized, Qt keeps each layout of docks that is restored, to
+        apply it later: with tab bars that are deleted meanwhile, which crashed.
+        """
         preferences = self.preferences
         self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
         geometry = QByteArray.fromBase64(preferences.geometry.encode())
         if not self.window.restoreGeometry(geometry):  # none, or that of a far larger screen
             screen = QGuiApplication.primaryScreen().availableSize()
             self.window.resize(screen.boundedTo(QSize(*FIRST_SIZE_PX)))
+        state = self.window.windowState()
+        self.window.setWindowState(Qt.WindowState.WindowNoState)
         layouts: dict[Page, str] = {
             "live": preferences.live_layout,
             "review": preferences.review_layout,
         }
         self.window.restore_layouts({page: text for page, text in layouts.items() if text})
         self.window.use_arrangement(preferences.arrangement)
+        return state
 
     def _use_theme(self) -> None:
         use_theme(self.preferences.theme)

@@ -8,7 +8,8 @@ import importlib, pkgutil, sys, handcal
 for module in pkgutil.walk_packages(handcal.__path__, "handcal."):
     if not module.name.startswith("handcal.train."):  # all of which needs torch
         importlib.import_module(module.name)
-print(len(sys.modules), *{"PySide6", "pyqtgraph", "open3d", "pyrealsense2"} & sys.modules.keys())
+heavy = {"PySide6", "pyqtgraph", "open3d", "pyrealsense2", "scipy.signal", "scipy.stats"}
+print(len(sys.modules), *heavy & sys.modules.keys())
 """
 
 

@@ -12,6 +12,7 @@ from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
+from handcal.types import Eye
 from handcal_gui.control.compare import Comparison
 from handcal_gui.engine.jobs import Job
 from handcal_gui.pages.review_page import ReviewPage
@@ -57,6 +58,8 @@ class ReviewController(QObject):
         self._job: Job | None = None
         self._progress: QProgressDialog | None = None
         self.record: SessionRecord | None = None
+        self._results: Results | None = None
+        page.residuals.shown.connect(self._show_alignment)
 
     def open(self, path: Path) -> None:
         """Read and solve a session, then show it."""
@@ -107,6 +110,7 @@ class ReviewController(QObject):
     def _show(self, stored: _Stored) -> None:
         self._end_progress()
         self.record = record = stored.record
+        self._results = stored.results
         panels = self._window.panels
         note = "" if stored.results else tr("It contains no alignments yet.")
         target_arcmin = stored.settings.verdict.target_arcmin
@@ -119,8 +123,14 @@ class ReviewController(QObject):
         panels.cloud.clear(note)  # of the session shown before
         if stored.results is not None:
             number, last = list(record.alignments.items())[-1]
-            residuals_m = stored.results.alignments[number][last.eyes[0]].residuals_m
-            panels.cloud.show_alignment(last, residuals_m)
+            self._show_alignment(number, last.eyes[0])
             self._comparison.use(record, stored.settings)
         self._window.show_page("review")
         self.opened.emit(record.path)
+
+    def _show_alignment(self, number: int, eye: Eye) -> None:
+        """Show the clouds of an alignment, the hand in the colours of its residuals."""
+        if self.record is not None and self._results is not None:
+            residuals_m = self._results.alignments[number][eye].residuals_m
+            cloud = self._window.panels.cloud
+            cloud.show_alignment(self.record.alignments[number], residuals_m)

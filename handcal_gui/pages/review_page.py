@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
+from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph
@@ -17,12 +19,17 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.widgets.times import local_time
 
+_LEAST_MAP_PX = 240
+"""Height below which the residual map is left to the panel of the results."""
+
 
 class ReviewPage(QWidget):
     """A summary of a session; the panels show its contents.
 
     Attributes
     ----------
+    residuals : ResidualsTab
+        The residual map of an alignment, where the window is high enough.
     export_requested, resume_requested, again_requested, close_requested : Signal()
         *again_requested*: the wearer is to be calibrated again, beginning from this session.
     """
@@ -37,10 +44,12 @@ class ReviewPage(QWidget):
         self.setObjectName("reviewPage")
         self._title = QLabel()
         scale_font(self._title, 1.6, is_bold=True)
+        self._is_solved = False
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)
         self._card = ResultCard()
+        self.residuals = ResidualsTab()
         self._export = main_button("reviewExport", tr("&Export…"))
         self._resume = button("reviewResume", tr("&Resume this session"))
         self._resume.setToolTip(
@@ -64,7 +73,8 @@ class ReviewPage(QWidget):
             self._facts,
             self._card,
             buttons,
-            1,
+            (self.residuals, 1),
+            0,
             on=self,
             margins=2 * SPACING_PX,
             spacing=2 * SPACING_PX,
@@ -94,12 +104,28 @@ class ReviewPage(QWidget):
         self._again.setEnabled(results is not None)
         self._card.show_results(results, target_arcmin)
         self._card.setVisible(results is not None)
+        if results is not None:
+            self.residuals.show_results(results, record.alignments)
+        self._is_solved = results is not None
+        self._fit()
         while self._facts.rowCount():
             self._facts.removeRow(0)
         for name, fact in _facts(record, note):
             text = paragraph(f"review{name.replace(' ', '')}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._facts.addRow(QLabel(name, alignment=Qt.AlignmentFlag.AlignTop), text)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show the residual map only where it fits below the rest."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        viewport = self.parentWidget() or self
+        parts = self._title, self._facts, self._card, self._export
+        others_px = sum(2 * SPACING_PX + part.sizeHint().height() for part in parts)
+        room_px = viewport.height() - others_px - 4 * SPACING_PX
+        self.residuals.setVisible(self._is_solved and room_px > _LEAST_MAP_PX)
 
 
 def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
@@ -19,7 +20,15 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 
 class ResidualsTab(QWidget):
-    """Shows the residual map of one alignment and eye; drawn only while visible."""
+    """Shows the residual map of one alignment and eye; drawn only while visible.
+
+    Attributes
+    ----------
+    shown : Signal(int, str)
+        The number of the alignment and the eye whose map is shown.
+    """
+
+    shown = Signal(int, str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -65,3 +74,4 @@ class ResidualsTab(QWidget):
         alignment, shifts = self._solved[number]
         hand_E_m = transform(alignment.T_E_W[eye], alignment.hand_m)
         self._map.show_residuals(hand_E_m[:, :2], shifts[eye].residuals_m)
+        self.shown.emit(number, eye)

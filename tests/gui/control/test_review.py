@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QLabel, QProgressDialog, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QProgressDialog, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError
@@ -109,6 +109,33 @@ def test_a_session_is_shown_and_closed_again(
     child(program, QPushButton, "reviewClose").click()
     assert program.window.page == "start"
     assert program.review.record is None
+
+
+def test_the_alignment_whose_residuals_are_shown_is_in_the_hand_cloud(
+    program: Program,
+    qtbot: QtBot,
+    record: SessionRecord,
+    results: Results,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown = []
+    cloud = program.window.panels.cloud
+    monkeypatch.setattr(cloud, "show_alignment", lambda one, _residuals_m: shown.append(one))
+    program.window.resize(1280, 900)
+    program.review._show(_Stored(record, stored_solve_settings(record), results))
+    residuals = child(program, ReviewPage, "reviewPage").residuals
+    qtbot.waitUntil(residuals.isVisible)
+    choice = residuals.findChild(QComboBox, "residuals-choice")
+    assert isinstance(choice, QComboBox)
+    numbers = set()
+    for index in range(choice.count()):
+        choice.setCurrentIndex(index)
+        number, _ = choice.currentData()
+        assert shown[-1] is record.alignments[number]
+        numbers.add(number)
+    assert numbers == set(record.alignments)
+    program.window.resize(960, 510)
+    qtbot.waitUntil(residuals.isHidden)  # nothing scrolls there
 
 
 def tear(path: Path) -> None:
