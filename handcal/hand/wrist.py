@@ -34,7 +34,7 @@ _LIMB_WIDTH_M, _NOTHING_M = 0.03, 0.005
 # From the wrist to the elbow an arm widens, but slowly: nowhere behind the wrist is it this much
 # narrower, nor this much wider within so many bins. A wrist seen from its edge is 36 mm wide.
 _NARROWER_M, _WIDER_M, _SHORTLY, _WRIST_WIDTH_M = 0.01, 0.025, 16, 0.036
-_MISFIT_SCALE_M, _MISFIT_MAX_M = 0.003, 0.015
+_MISFIT_SCALE_M = 0.003  # a place that misses this by as much is e times less likely
 _END_M = 0.005  # where the arm leaves the view it is cut off at an angle
 # The surface of a wrist is this far from its middle, toward the camera. The narrowest place is this
 # far behind the wrist.
@@ -133,14 +133,9 @@ def _misfit_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
     is_arm = (at_m < end_m) & (width_m > _WRIST_WIDTH_M)
     narrowest_m = np.minimum.accumulate(np.where(is_arm, width_m, np.inf)[::-1])[::-1]
     widest_m = cv2.dilate(width_m, np.ones(_SHORTLY, np.uint8), anchor=(0, 0)).ravel()
-    misfit_m: Float64 = _excess(width_m - narrowest_m, _NARROWER_M)
-    misfit_m += _excess(widest_m - width_m, _WIDER_M)
+    misfit_m: Float64 = np.maximum(width_m - narrowest_m - _NARROWER_M, 0.0)
+    misfit_m += np.maximum(widest_m - width_m - _WIDER_M, 0.0)
     return misfit_m
-
-
-def _excess(difference_m: Float64, allowed_m: float) -> Float64:
-    excess_m: Float64 = np.minimum(np.maximum(difference_m - allowed_m, 0.0), _MISFIT_MAX_M)
-    return excess_m
 
 
 def _gaussian(deviation_m: Float64, sigma_m: float) -> Float64:
