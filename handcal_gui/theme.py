@@ -180,6 +180,7 @@ def use_theme(theme: Literal["system", "light", "dark", "contrast"]) -> None:
     for special, kinds in ((boxes, _BOXES), (main, ("MainButton",))):
         for kind in kinds:  # as text; PySide's stub is wrong
             QApplication.setPalette(special, kind)  # type: ignore[arg-type]
+    _THEME.changed.emit()
 
 
 def is_dark() -> bool:
@@ -205,18 +206,7 @@ def set_style(widget: QWidget, sheet: str) -> None:
 
     Qt does not update the colours of a widget that has one.
     """
-    styled = 0
-
-    def restyle() -> None:
-        nonlocal styled
-        palette = QGuiApplication.palette().cacheKey()
-        if styled != palette:  # a change of the theme comes as a dozen events
-            styled = palette
-            widget.setStyleSheet("")
-            widget.setStyleSheet(sheet)
-
-    _PaletteWatch(widget, QEvent.Type.ApplicationPaletteChange).changed.connect(restyle)
-    restyle()
+    _THEME.changed.connect(_Style(widget, sheet).set)
 
 
 def flat_header(header: QHeaderView) -> None:
@@ -261,6 +251,28 @@ def icon(name: str, color: str = "") -> QIcon:
 @cache
 def _svg(name: str) -> bytes:
     return resource_path(f"icons/{name}.svg").read_bytes()
+
+
+class _Theme(QObject):
+    """Emits `changed` after each change of the theme."""
+
+    changed = Signal()
+
+
+_THEME = _Theme()
+
+
+class _Style(QObject):
+    """Sets its parent's style sheet; deleted with it, and its connection, too."""
+
+    def __init__(self, widget: QWidget, sheet: str) -> None:
+        super().__init__(widget)
+        self._widget, self._sheet = widget, sheet
+        self.set()
+
+    def set(self) -> None:
+        self._widget.setStyleSheet("")
+        self._widget.setStyleSheet(self._sheet)
 
 
 class _PaletteWatch(QObject):

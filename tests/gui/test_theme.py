@@ -53,9 +53,11 @@ def test_dark_is_dark_and_gives_way_again() -> None:
 @pytest.mark.usefixtures("themes")
 def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
     use_theme("light")
+    window = QWidget()
     made = tool_button()
-    qtbot.addWidget(made)
-    made.show()
+    made.setParent(window)  # Qt tells only windows of another palette
+    qtbot.addWidget(window)
+    window.show()
 
     def follows() -> bool:
         return made.palette().button().color() == QGuiApplication.palette().button().color()
