@@ -18,7 +18,7 @@ from handcal.errors import HandError
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, covered, goes_on, on_border, solid_surface
 from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
-from handcal.hand.wrist import box_exit_m, find_wrist_m
+from handcal.hand.wrist import EDGE_RADIUS_M, FACING_RADIUS_M, box_exit_m, find_wrist_m
 from handcal.types import Bool, Float32, Float64
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
@@ -50,9 +50,9 @@ PART_M2 = 5e-5
 _BOX_SIGMA, _IN_BOX, _NEAREST, _LAYER_M = 0.35, 0.35, 0.1, 0.12
 _ARM_IN_BOX_MAX = 0.25
 
-# With a larger standard deviation the wrist is not known well enough for a cut. A palm with a
-# smaller inscribed circle is seen from its edge.
-_LIMIT_SIGMA_MAX_M, _FROM_EDGE_M = 0.026, 0.03
+# With a larger standard deviation the wrist is not known well enough for a cut: of a palm seen from
+# its edge, and from the front. A palm with a smaller inscribed circle is seen from its edge.
+_LIMIT_SIGMAS_M, _FROM_EDGE_M = (0.026, 0.03), 0.03
 # Length of the outline with something this far before it: about a palm's breadth if a thing hides
 # half of the hand; by stray pixels it was 45 mm at most.
 _COVERED_MAX_M, _COVER_JUMP_M = 0.065, 0.03
@@ -194,7 +194,8 @@ def _check_wrist(located: LocatedHand) -> None:
             "the arm points along the camera's line of sight; raise the hand so that its palm or "
             "its back faces the camera"
         )
-    if located.limit_sigma_m > _LIMIT_SIGMA_MAX_M:
+    seen_m = (EDGE_RADIUS_M, FACING_RADIUS_M)
+    if located.limit_sigma_m > np.interp(located.palm_radius_m, seen_m, _LIMIT_SIGMAS_M):
         raise HandError(_FROM_EDGE if located.palm_radius_m < _FROM_EDGE_M else _NO_WRIST)
 
 

@@ -19,7 +19,7 @@ _LEAST_COS = 0.5  # of the angle between the axis and the image plane
 _WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
 # Inscribed radius of a palm seen from its edge, and of one seen from the front. Seen from its edge
 # a hand is about as wide everywhere, so that neither the palm's centre nor the width says much.
-_EDGE_RADIUS_M, _FACING_RADIUS_M = 0.018, 0.034
+EDGE_RADIUS_M, FACING_RADIUS_M = 0.018, 0.034
 _SIGMA_MORE, _WIDTH_SCALE_MORE = 2.0, 2.0
 # A detector's box ends at the wrist or up to _BEHIND_M behind it, with these errors in the image.
 _BEYOND_BOX_M, _BEHIND_M, _BEHIND_SIGMA_M = 0.02, 0.03, 0.03
@@ -103,7 +103,7 @@ def find_wrist_m(
     width_m, at_m = np.convolve(width_m, _SMOOTHING, "valid"), _AT_M
     if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
         return np.inf, np.inf if width_m[-1] > _NOTHING_M else 0.0
-    edgewise = float(np.interp(palm_radius_m, (_EDGE_RADIUS_M, _FACING_RADIUS_M), (1.0, 0.0)))
+    edgewise = float(np.interp(palm_radius_m, (EDGE_RADIUS_M, FACING_RADIUS_M), (1.0, 0.0)))
     likely = _gaussian(at_m - _WRIST_M, _WRIST_SIGMA_M * (1.0 + _SIGMA_MORE * edgewise)) + _MISTAKEN
     likely *= _gaussian(np.maximum(at_m - exit_m, 0.0) * cosine, _BEYOND_BOX_M) + _MISTAKEN
     if exit_m < np.inf:
