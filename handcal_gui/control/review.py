@@ -114,7 +114,6 @@ class ReviewController(QObject):
         panels = self._window.panels
         note = "" if stored.results else tr("It contains no alignments yet.")
         target_arcmin = stored.settings.verdict.target_arcmin
-        self._page.show_session(record, stored.results, target_arcmin, note)
         panels.results.show_results(stored.results, record.alignments, record.rig)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
@@ -125,6 +124,8 @@ class ReviewController(QObject):
             number, last = list(record.alignments.items())[-1]
             self._show_alignment(number, last.eyes[0])
             self._comparison.use(record, stored.settings)
+        # Then: if it is on the screen, it chooses the alignment whose clouds are shown.
+        self._page.show_session(record, stored.results, target_arcmin, note)
         self._window.show_page("review")
         self.opened.emit(record.path)
 

@@ -134,6 +134,9 @@ def test_the_alignment_whose_residuals_are_shown_is_in_the_hand_cloud(
         assert shown[-1] is record.alignments[number]
         numbers.add(number)
     assert numbers == set(record.alignments)
+    program.review._show(_Stored(record, stored_solve_settings(record), results))  # another one
+    number, _ = choice.currentData()
+    assert shown[-1] is record.alignments[number]
     program.window.resize(960, 510)
     qtbot.waitUntil(residuals.isHidden)  # nothing scrolls there
 
