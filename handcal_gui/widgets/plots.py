@@ -50,7 +50,7 @@ class Plot(QWidget):
         self._view.setMinimumSize(100, 44)
         self.item = self._view.getPlotItem()
         self.item.setMenuEnabled(False)
-        self.item.ctrlMenu.setParent(self, self.item.ctrlMenu.windowFlags())  # or it outlives this
+        self.destroyed.connect(self.item.ctrlMenu.deleteLater)  # it has no parent
         self.item.hideButtons()
         self.item.setContentsMargins(*4 * (SPACING_PX // 2,))
         self.item.setMouseEnabled(x=False, y=False)

@@ -94,7 +94,8 @@ def test_no_menu_of_pyqtgraph_outlives_a_plot() -> None:
     gc.disable()  # Python would free the menu some time
     try:
         plot.deleteLater()
-        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        for _ in range(2):  # the plot, then its menu
+            QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         assert set(QApplication.topLevelWidgets()) <= before
     finally:
         gc.enable()
