@@ -163,9 +163,8 @@ class Program(QObject):
 
     def _keep_entries(self) -> None:
         """Remember the start page's entries, also those with which nothing was started."""
-        settings = self.start.new.settings
-        if self.window.page == "start" and settings != self.preferences.station:
-            self._current.change(station=settings)
+        if self.window.page == "start" and self.start.new.is_changed:
+            self._current.change(station=self.start.new.settings)
 
     def _connect(self, review_page: ReviewPage) -> None:
         self.start.start_requested.connect(self.start_calibration)

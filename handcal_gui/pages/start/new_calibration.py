@@ -109,9 +109,15 @@ class NewCalibration(Card):
         """The settings as shown."""
         return self._form.settings
 
+    @property
+    def is_changed(self) -> bool:
+        """True if the settings are not those that were given to be shown."""
+        return self.settings != self._given
+
     def show_preferences(self, preferences: Preferences) -> None:
         """Show the preferences, for the next wearer."""
         self._form.show_settings(preferences.station)
+        self._given = self.settings
         self._wearer.setCurrentIndex(-1)
         self._wearer.clearEditText()
 

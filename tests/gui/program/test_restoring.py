@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from PySide6.QtCore import QByteArray
 from PySide6.QtWidgets import QMainWindow
 from pytestqt.qtbot import QtBot
 
+from handcal.station.settings import StationSettings
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.window import MainWindow
@@ -38,3 +40,14 @@ def test_layouts_are_restored_before_the_window_is_maximized(
     assert not any(states)
     assert program.window.isMaximized()
     program.close()
+
+
+def test_settings_for_one_run_are_not_remembered(qtbot: QtBot, tmp_path: Path) -> None:
+    file = PreferencesFile(tmp_path / "preferences.json")
+    file.save(Preferences(station=StationSettings(seed=1)))
+    program = Program(file)
+    qtbot.addWidget(program.window)
+    for_once = replace(program.preferences.station, seed=7)  # as by --seed 7
+    program.start.show_preferences(replace(program.preferences, station=for_once))
+    program.close()
+    assert file.load()[0].station.seed == 1
