@@ -4229,10 +4229,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Running</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>{} is running</source>
         <translation type="unfinished"></translation>
     </message>

@@ -68,6 +68,9 @@ class EvaluationPage(QWidget):
         self._preparing = [PreparationButton(one) for one in spec.preparations]
         self._bar = JobBar()
         self._found = FindingLine("readiness")
+        policy = self._found.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self._found.setSizePolicy(policy)
         self._results = ResultsView()
         self._look = LatestJob(self._check, self)
         self._lay_out(spec.question)
@@ -170,13 +173,12 @@ class EvaluationPage(QWidget):
         self._button.setEnabled(can_run)
         if readiness is not None:
             self._button.setText(readiness.button)
+        self._found.setVisible(not self.is_busy)  # the progress bar says more
         if finding := self._finding():
             self._found.show_finding(finding)
 
     def _finding(self) -> Finding | None:
         """Return the message to show; None to keep the present one."""
-        if self.is_busy:
-            return Finding("", Health.GOOD, tr("Running"))
         if self._failure:
             return Finding("", Health.BROKEN, self._failure)
         if self._waits_for:

@@ -29,11 +29,13 @@ class Readiness:
 
     finding: Finding
     button: str = tr("Run")
+    is_complete: bool = True
+    """False if an entry is missing, which is no problem yet."""
 
     @property
     def can_run(self) -> bool:
         """True if the evaluation can be run."""
-        return self.finding.health is not Health.BROKEN
+        return self.is_complete and self.finding.health is not Health.BROKEN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +120,7 @@ class FileEvaluation:
     def readiness(self, entries: Any) -> Readiness:
         """Return which entry is missing, or whether an earlier report will be replaced."""
         if missing := self.missing(entries):
-            return Readiness(Finding("", Health.BROKEN, missing))
+            return Readiness(_note(missing), is_complete=False)
         folder = free_of_studies(output_folder(entries.output))
         if (folder / "report.pdf").exists():
             return Readiness(_note(tr("The report in {} will be replaced").format(folder)))

@@ -62,7 +62,9 @@ def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseStudySet
 
     data = FileEvaluation(lambda given: "" if given.sessions else "no sessions", order)
     given = UserEntries(sessions="here", output=f"{entries.output}-data")
-    assert data.readiness(replace(given, sessions="")).finding.health is Health.BROKEN
+    missing = data.readiness(replace(given, sessions=""))
+    assert not missing.can_run
+    assert missing.finding.health is Health.LIMITED  # not yet a problem
     assert data.readiness(given).can_run
     told: list[tuple[str, float]] = []
     outcome = data.run(given, Progress(lambda *one: told.append(one)))
