@@ -39,7 +39,9 @@ class Staging(Closable):
     def __init__(self, folder: Path) -> None:
         self._folder = folder.absolute()
         # In the folder itself if it exists: it may be a separate disk.
-        home = next(path for path in (self._folder, *self._folder.parents) if path.is_dir())
+        home = next(path for path in (self._folder, *self._folder.parents) if path.exists())
+        if not home.is_dir():
+            raise FileError(f"cannot write to {self._folder}: {home} is a file, not a folder")
         self._root = make_folder(home / f".{self._folder.name}.handcal-export")
         self._lock = FileLock(self._root / "lock")
         self.path = self._root / "new"

@@ -102,9 +102,19 @@ def test_what_a_killed_program_left_is_removed(tmp_path: Path) -> None:
 
 
 def test_a_file_in_the_way_is_reported(tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("a file")
     with Staging(tmp_path / "out") as staging:
+        (tmp_path / "out").write_text("a file")
         write(staging, x="1")
         with pytest.raises(FileError, match="cannot create the folder"):
             staging.publish([])
     assert tree(tmp_path) == {"out": "a file"}
+
+
+@pytest.mark.parametrize("name", ["file", "file/export"])
+def test_a_file_as_the_folder_is_refused_before_anything_is_written(
+    tmp_path: Path, name: str
+) -> None:
+    (tmp_path / "file").write_text("old")
+    with pytest.raises(FileError, match="is a file, not a folder"):
+        Staging(tmp_path / name)
+    assert tree(tmp_path) == {"file": "old"}
