@@ -170,6 +170,7 @@ class MainWindow(QMainWindow):
             share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
         self._leave_titles_to_tabs()
+        self.layout().activate()  # or the least size stays that of the page before
 
     @property
     def _docks_of_page(self) -> frozenset[str]:
