@@ -145,7 +145,7 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
     window.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
     column = [docks[name] for name in _LEFT_COLUMN]
     window.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
-    results = height * 45 // 100
+    results = height // 2
     window.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
 
 
