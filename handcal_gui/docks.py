@@ -158,6 +158,15 @@ def draw_title_buttons(docks: Docks) -> None:
                 button.setIcon(icon(drawing))
 
 
+def hide_tabs(window: QMainWindow) -> None:
+    """Hide the tabs of all docks before a layout is restored.
+
+    Qt makes and shows other tab bars for it, and leaves the former ones where they were.
+    """
+    for bar in window.findChildren(QTabBar, options=_CHILDREN_ONLY):
+        bar.hide()
+
+
 def leave_titles_to_tabs(window: QMainWindow, docks: Docks) -> None:
     """Hide the titles of docks whose tabs show the same text."""
     bars = window.findChildren(QTabBar, options=_CHILDREN_ONLY)

@@ -225,6 +225,27 @@ def test_every_tab_is_in_sight_and_says_what_it_is(
     assert all(has_title(window, name) == is_small for name in group)
 
 
+def test_no_tabs_of_a_former_layout_stay(window: MainWindow) -> None:
+    def tabs() -> list[int]:
+        QApplication.processEvents()
+        bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        seen = (bar for bar in bars if bar.isVisible() and bar.geometry().intersects(window.rect()))
+        return [bar.count() for bar in seen]
+
+    window.show_page("live")
+    assert tabs() == [len(TABBED)]
+    window.use_arrangement("station")
+    assert tabs() == []
+    window.use_arrangement("panels")
+    window.docks["link"].setFloating(True)
+    window.docks["link"].setFloating(False)
+    assert tabs() == [len(TABBED)]
+    window.show_page("review")
+    assert tabs() == [3]
+    window.show_page("start")
+    assert tabs() == []
+
+
 def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:
     window.show_page("live")
     wizard = window.centralWidget()
