@@ -145,7 +145,7 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
     window.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
     column = [docks[name] for name in _LEFT_COLUMN]
     window.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
-    results = height * 45 // 100
+    results = height // 2
     window.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
 
 
@@ -156,6 +156,15 @@ def draw_title_buttons(docks: Docks) -> None:
             button = dock.findChild(QAbstractButton, name)
             if button is not None:
                 button.setIcon(icon(drawing))
+
+
+def hide_tabs(window: QMainWindow) -> None:
+    """Hide the tabs of all docks before a layout is restored.
+
+    Qt makes and shows other tab bars for it, and leaves the former ones where they were.
+    """
+    for bar in window.findChildren(QTabBar, options=_CHILDREN_ONLY):
+        bar.hide()
 
 
 def leave_titles_to_tabs(window: QMainWindow, docks: Docks) -> None:

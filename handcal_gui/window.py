@@ -34,6 +34,7 @@ from handcal_gui.docks import (
     Panels,
     arrange_docks,
     draw_title_buttons,
+    hide_tabs,
     leave_titles_to_tabs,
     make_docks,
     share_room,
@@ -155,6 +156,7 @@ class MainWindow(QMainWindow):
         is_alone = self._arrangement == "station"
         self._guide.fill_window(is_alone and not is_small)
         layout = self._layouts.get(page, self._default_layouts[is_small])
+        hide_tabs(self)
         self.restoreState(layout, _LAYOUT_VERSION)
         if self.minimumSizeHint().height() > self.screen().availableGeometry().height():
             self.restoreState(self._default_layouts[is_small], _LAYOUT_VERSION)
@@ -170,6 +172,8 @@ class MainWindow(QMainWindow):
             share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
         self._leave_titles_to_tabs()
+        if (box := self.layout()) is not None:
+            box.activate()  # or the least size stays that of the page before
 
     @property
     def _docks_of_page(self) -> frozenset[str]:

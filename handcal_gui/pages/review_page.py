@@ -23,6 +23,10 @@ _LEAST_MAP_PX = 240
 """Height below which the residual map is left to the panel of the results."""
 
 
+_EXPORT = tr("Look at the result, then export it, or resume the session to add to it.")
+_RESUME = tr("Resume the session to make its first alignment.")
+
+
 class ReviewPage(QWidget):
     """A summary of a session; the panels show its contents.
 
@@ -44,6 +48,7 @@ class ReviewPage(QWidget):
         self.setObjectName("reviewPage")
         self._title = QLabel()
         scale_font(self._title, 1.6, is_bold=True)
+        self._task = paragraph("reviewTask")
         self._is_solved = False
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
@@ -70,6 +75,7 @@ class ReviewPage(QWidget):
         buttons = hbox(self._export, self._resume, self._again, 0, close)
         vbox(
             self._title,
+            self._task,
             self._facts,
             self._card,
             buttons,
@@ -102,6 +108,7 @@ class ReviewPage(QWidget):
         self._title.setText(record.wearer or tr("Session without a name"))
         self._export.setEnabled(bool(record.alignments))
         self._again.setEnabled(results is not None)
+        self._task.setText(_EXPORT if record.alignments else _RESUME)
         self._card.show_results(results, target_arcmin)
         self._card.setVisible(results is not None)
         if results is not None:
@@ -122,7 +129,7 @@ class ReviewPage(QWidget):
 
     def _fit(self) -> None:
         viewport = self.parentWidget() or self
-        parts = self._title, self._facts, self._card, self._export
+        parts = self._title, self._task, self._facts, self._card, self._export
         others_px = sum(2 * SPACING_PX + part.sizeHint().height() for part in parts)
         room_px = viewport.height() - others_px - 4 * SPACING_PX
         self.residuals.setVisible(self._is_solved and room_px > _LEAST_MAP_PX)

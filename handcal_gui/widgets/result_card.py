@@ -140,7 +140,7 @@ class _Column(QWidget):
         bold.setBold(True)
         self._verdict.setFont(bold)  # its size is the card's
         self._bars = _Bars()
-        self._another = QLabel()
+        self._another = QLabel(wordWrap=True)
         self._reason = paragraph(f"card-reason-{eye}")
         self._reason.setAlignment(Qt.AlignmentFlag.AlignTop)
         vbox(
@@ -219,7 +219,8 @@ class _Bars(QWidget):
             is_known = bar.arcmin is not None
             side = Qt.AlignmentFlag.AlignRight if is_known else Qt.AlignmentFlag.AlignLeft
             painter.setPen(text if is_known else QColor(colors().muted))
-            place = row if is_known else row.adjusted(name_px, 0, 0, 0)
+            free_px = self.width() - metrics.horizontalAdvance(bar.text)
+            place = row if is_known else row.adjusted(min(name_px, free_px), 0, 0, 0)
             painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | side, bar.text)
         x = name_px + room * self._target / self._scale
         painter.setPen(QPen(text, 1.5, Qt.PenStyle.DashLine))

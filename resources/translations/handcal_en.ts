@@ -655,6 +655,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Look at the result, then export it, or resume the session to add to it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Resume the session to make its first alignment.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Export…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2191,11 +2199,11 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Unacknowledged</source>
+        <source>Messages that the headset has not acknowledged yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Messages that the headset has not acknowledged yet</source>
+        <source>In flight</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -245,6 +245,7 @@ class WizardPanel(QWidget):
         self._scale_texts()
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._plan.addItems(list(PLANS.values()))
+        self._plan.setMinimumWidth(12 * SPACING_PX)  # narrower than its longest text
         self._plan.setToolTip(
             tr(
                 "One eye after the other measures the position of each eye and takes two "

@@ -29,6 +29,7 @@ from handcal_gui.panels.camera.depth_scale import DepthColors, DepthLegend
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.translation import tr
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -114,7 +115,7 @@ class CameraPanel(QWidget):
         write_atomic(path, bytes(buffer.data().data()))
 
     def _lay_out(self) -> None:
-        top = hbox(self._mode, 0)
+        top = hbox(self._mode, (self._status.name, 1), spacing=SPACING_PX)
         freeze = tool_button()
         freeze.setDefaultAction(self._freeze)
         freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
@@ -208,13 +209,12 @@ class _Pictures(QWidget):
 
 
 class _Status(QWidget):
-    """One line of numbers with fixed widths, below the camera's name."""
+    """One line of numbers with fixed widths; the camera's name stands elsewhere."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._name = QLabel()
-        self._name.setObjectName("camera-name")
-        self._name.setWordWrap(True)
+        self.name = ElidedLabel()
+        self.name.setObjectName("camera-name")
         self._rate = NumberLabel(
             "camera-rate", "999.9 fps", tr("Frames per second over the last second")
         )
@@ -226,7 +226,7 @@ class _Status(QWidget):
             "99999",
             tr("Frames missing from the camera's own count since it started"),
         )
-        row = hbox(
+        hbox(
             self._rate,
             0,
             QLabel(tr("Age")),
@@ -234,13 +234,14 @@ class _Status(QWidget):
             0,
             QLabel(tr("Dropped")),
             self._dropped,
+            on=self,
+            margins=0,
             spacing=SPACING_PX // 2,
         )
-        vbox(self._name, row, on=self, margins=0, spacing=SPACING_PX // 2)
         self.show_status(CameraStatus(UNKNOWN), None)
 
     def show_status(self, camera: CameraStatus, age_ms: float | None) -> None:
-        self._name.setText(camera.name)
+        self.name.setText(camera.name)
         self._rate.setText(f"{camera.rate_hz:.1f} fps")
         self._age.setText(_age(age_ms))
         self._dropped.setText(str(camera.dropped))

@@ -56,7 +56,7 @@ class CloudView(QWidget):
                 "double-click to reset the view. Keys: arrows, +, −, 1, 2, 3 and R."
             )
         )
-        self.setMinimumSize(160, 120)
+        self.setMinimumSize(160, 80)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # as ImageView

@@ -6,6 +6,7 @@ from collections import deque
 from math import nan
 
 import numpy as np
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget
 
 from handcal.link.rates import LinkRates
@@ -16,7 +17,8 @@ from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.plots import Plot
 
 _LASTS_S = 30.0
-_HEIGHT_PX = 100
+_HEIGHTS_PX = 56, 200
+"""Least and largest height."""
 _TOPS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
 """Allowed upper limits of the scales."""
 
@@ -46,7 +48,12 @@ class LinkHistory(QWidget):
         self._lost_line = self._loss.add_line("live")
         self._lost_inbound_line = self._loss.add_line("cursor", dashed=True)
         hbox(self._latency, self._loss, on=self, margins=0, spacing=SPACING_PX)
-        self.setFixedHeight(_HEIGHT_PX)
+        self.setMinimumHeight(_HEIGHTS_PX[0])
+        self.setMaximumHeight(_HEIGHTS_PX[1])
+
+    def sizeHint(self) -> QSize:
+        """Prefer the least height, because the numbers above come first."""
+        return QSize(super().sizeHint().width(), _HEIGHTS_PX[0])
 
     def add(self, t_s: float, latency_ms: float | None, rates: LinkRates | None) -> None:
         """Add a point in time; unknown values leave a gap."""

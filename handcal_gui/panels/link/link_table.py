@@ -1,4 +1,4 @@
-"""The link's numbers: a column for each direction, and a row for each reason of rejection."""
+"""The link's numbers: a half for each direction, and a row for each reason of rejection."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import Rejection
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.numbers import signed
 
@@ -19,22 +20,11 @@ RATES_S = 2.0
 """Interval of rates and losses."""
 
 _OUT, _IN, _BOTH = 1, 2, 3
-"""Columns of the table; the last spans both."""
-_WIDEST = {_OUT: "9999.9 kB/s", _IN: "9999.9 kB/s", _BOTH: "−999999.999 s ± 9.9 ms"}
+"""Halves of the table; the last spans both."""
+_PLACES = {_OUT: (0, 1, 1), _IN: (2, 3, 1), _BOTH: (0, 1, 3)}
+"""Columns of the caption and of the number, and how many the number spans."""
+_WIDEST = {_OUT: "999.9 kB/s", _IN: "999.9 kB/s", _BOTH: "−999999.999 s ± 9.9 ms"}
 _ROWS = {
-    tr("Latency"): {
-        _IN: tr("Half the median time of a round trip to the headset, in milliseconds")
-    },
-    tr("Clock"): {
-        _BOTH: tr(
-            "Headset's clock minus this computer's, in seconds, and its uncertainty, "
-            "in milliseconds"
-        )
-    },
-    tr("Clock drift"): {
-        _IN: tr("Drift of the headset's clock, in parts per million; positive is fast")
-    },
-    tr("Poses"): {_IN: tr("Poses received from the headset per second")},
     tr("Data"): {
         _OUT: tr("Kilobytes per second to the headset, over {:g} s").format(RATES_S),
         _IN: tr("Kilobytes per second from the headset, over {:g} s").format(RATES_S),
@@ -50,11 +40,24 @@ _ROWS = {
     tr("Resent"): {
         _OUT: tr("Fragments of messages retransmitted because they were not acknowledged in time")
     },
-    tr("Unacknowledged"): {_OUT: tr("Messages that the headset has not acknowledged yet")},
+    tr("Poses"): {_IN: tr("Poses received from the headset per second")},
+    tr("In flight"): {_OUT: tr("Messages that the headset has not acknowledged yet")},
+    tr("Latency"): {
+        _IN: tr("Half the median time of a round trip to the headset, in milliseconds")
+    },
     tr("Failed"): {_OUT: tr("Messages that the headset did not acknowledge in time")},
     tr("Rejected"): {_IN: tr("Datagrams that were not accepted, for the reasons below")},
+    tr("Clock"): {
+        _BOTH: tr(
+            "Headset's clock minus this computer's, in seconds, and its uncertainty, "
+            "in milliseconds"
+        )
+    },
+    tr("Clock drift"): {
+        _BOTH: tr("Drift of the headset's clock, in parts per million; positive is fast")
+    },
 }
-"""Captions, and what the numbers mean by column."""
+"""Captions, and what the numbers mean by half."""
 REJECTIONS = {
     Rejection.UNPAIRED: tr("Signed with another pairing key: enter the key above in the headset"),
     Rejection.CORRUPT: tr("Damaged in transit, or not meant for handcal"),
@@ -76,20 +79,22 @@ class LinkTable(QWidget):
         self.setObjectName("link-table")
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setHorizontalSpacing(2 * SPACING_PX)
+        self._grid.setHorizontalSpacing(SPACING_PX)
         self._grid.setVerticalSpacing(0)
-        self._grid.setColumnStretch(0, 1)
-        for column, heading in ((_OUT, tr("To headset")), (_IN, tr("From headset"))):
-            self._grid.addWidget(QLabel(heading), 0, column, Qt.AlignmentFlag.AlignRight)
+        for half, heading in ((_OUT, tr("To headset")), (_IN, tr("From headset"))):
+            caption, number, _ = _PLACES[half]
+            self._grid.setColumnStretch(caption, 1)
+            self._grid.addWidget(QLabel(heading), 0, number, Qt.AlignmentFlag.AlignRight)
+        self._rows = dict.fromkeys((_OUT, _IN), 1)  # the next free ones
         self._numbers = {
-            (caption, column): number
+            (caption, half): self._add_number(caption, half, meaning)[1]
             for caption, meanings in _ROWS.items()
-            for column, number in self._add_row(caption, meanings)[1].items()
+            for half, meaning in meanings.items()
         }
-        self._rejections: dict[str, tuple[QLabel, NumberLabel]] = {}
-        for reason, meaning in REJECTIONS.items():
-            caption, numbers = self._add_row(f"    {reason.replace('_', ' ')}", {_IN: meaning})
-            self._rejections[reason] = caption, numbers[_IN]
+        self._rejections = {
+            reason: self._add_number(f"    {reason.replace('_', ' ')}", _IN, meaning)
+            for reason, meaning in REJECTIONS.items()
+        }
         self._show_rejections({})
 
     def show_link(self, link: LinkStatistics, rates: LinkRates | None) -> None:
@@ -105,33 +110,31 @@ class LinkTable(QWidget):
             caption.setVisible(count > 0)
             number.setVisible(count > 0)
 
-    def _add_row(
-        self, text: str, meanings: Mapping[int, str]
-    ) -> tuple[QLabel, dict[int, NumberLabel]]:
-        """Append a row; return its caption, and its numbers by column."""
-        row = self._grid.rowCount()
-        caption = QLabel(text)
-        self._grid.addWidget(caption, row, 0)
-        numbers = {}
-        for column, meaning in meanings.items():
-            caption.setToolTip(meaning)
-            name = f"link-{text.strip().lower().replace(' ', '-')}-{column}"
-            numbers[column] = NumberLabel(name, _WIDEST[column], meaning)
-            place = (_OUT, 1, 2) if column == _BOTH else (column, 1, 1)
-            self._grid.addWidget(numbers[column], row, *place)
-        return caption, numbers
+    def _add_number(self, text: str, half: int, meaning: str) -> tuple[QLabel, NumberLabel]:
+        """Append a number to a half; return its caption, and the number."""
+        row = max(self._rows.values()) if half == _BOTH else self._rows[half]
+        self._rows |= {one: row + 1 for one in self._rows if half in (one, _BOTH)}
+        caption = ElidedLabel()
+        caption.setText(text)
+        caption.setToolTip(f"{text.strip()}: {meaning}")
+        name = f"link-{text.strip().lower().replace(' ', '-')}-{half}"
+        number = NumberLabel(name, _WIDEST[half], meaning)
+        caption_column, number_column, columns = _PLACES[half]
+        self._grid.addWidget(caption, row, caption_column)
+        self._grid.addWidget(number, row, number_column, 1, columns)
+        return caption, number
 
 
 def _texts(link: LinkStatistics, rates: LinkRates | None) -> dict[tuple[str, int], str]:
-    """Return the texts of the rows above, by caption and column."""
+    """Return the texts of the numbers above, by caption and half."""
     drift_ppm = link.clock_drift_ppm
     texts = {
         (tr("Latency"), _IN): _text(link.latency_ms, "ms"),
         (tr("Clock"), _BOTH): _clock(link),
-        (tr("Clock drift"), _IN): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
+        (tr("Clock drift"), _BOTH): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
         (tr("Poses"), _IN): _text(link.pose_rate_hz, "Hz"),
         (tr("Resent"), _OUT): str(link.resent),
-        (tr("Unacknowledged"), _OUT): str(link.unacked),
+        (tr("In flight"), _OUT): str(link.unacked),
         (tr("Failed"), _OUT): str(link.failed),
         (tr("Rejected"), _IN): str(sum(link.rejected.values())),
     }

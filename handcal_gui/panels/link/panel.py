@@ -131,7 +131,7 @@ class LinkPanel(QWidget):
             top,
             self._pairing,
             self._table,
-            self._history,
+            (self._history, 1),
             0,
             on=content,
             margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),

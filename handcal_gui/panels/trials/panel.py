@@ -240,7 +240,9 @@ class TrialsPanel(QWidget):
     def _show_deletions(self) -> None:
         can_undo = self._record is not None and not self._is_read_only
         found = deletions(self._record) if self._record and can_undo else []
-        self._strip.show_deletions([deletion for deletion in found if deletion.kind == "trial"])
+        trials = [deletion for deletion in found if deletion.kind == "trial"]
+        self._strip.show_deletions(trials)
+        self._strip.setVisible(bool(trials))  # the table needs its room
 
     def _ask(self) -> None:
         """Request a trial; one that may be a mistake must be requested twice."""
@@ -308,6 +310,6 @@ class TrialsPanel(QWidget):
             self._summary,
             self._strip,
             on=self,
-            margins=SPACING_PX,
-            spacing=SPACING_PX,
+            margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
+            spacing=SPACING_PX // 2,
         )

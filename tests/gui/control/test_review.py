@@ -87,11 +87,14 @@ def test_a_session_without_alignments_shows_no_hand_of_another(
     program: Program, record: SessionRecord, results: Results
 ) -> None:
     settings = stored_solve_settings(record)
-    points = []
+    points, tasks = [], []
     for alignments, solved in ((record.alignments, results), ({}, None)):
         one = replace(record, alignments=alignments)
         program.review._show(_Stored(one, settings, solved))
         points.append([e.text for e in program.window.panels.cloud.findChildren(LegendEntry)])
+        tasks.append(child(program, QLabel, "reviewTask").text())
+    assert "export" in tasks[0]
+    assert tasks[1].startswith("Resume")
     assert not any(text.endswith("–") for text in points[0])
     assert all(text.endswith("–") for text in points[1])
 

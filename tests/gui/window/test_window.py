@@ -143,6 +143,32 @@ def test_no_step_needs_scrolling(
     assert main_button(window).visibleRegion().boundingRect() == main_button(window).rect()
 
 
+def test_a_window_without_panels_may_be_lower_than_one_with_them(window: MainWindow) -> None:
+    window.show_page("live")
+    window.resize(1920, 1050)
+    window.use_arrangement("station")
+    window.resize(960, 510)
+    assert window.size().toTuple() == (960, 510)
+
+
+def test_a_larger_font_needs_no_larger_window(qtbot: QtBot, tmp_path: Path) -> None:
+    was = QApplication.font()
+    larger = QApplication.font()
+    larger.setPointSizeF(1.25 * was.pointSizeF())
+    QApplication.setFont(larger)
+    try:
+        window = Program(PreferencesFile(tmp_path / "preferences.json")).window
+        qtbot.addWidget(window)
+        window.resize(1280, 690)
+        window.show()
+        window.show_page("live")
+        QApplication.processEvents()
+        assert window.size().toTuple() == (1280, 690)
+        window.close()
+    finally:
+        QApplication.setFont(was)
+
+
 @pytest.mark.parametrize("text", ["", "garbage", "AAAA"])
 def test_a_layout_that_does_not_fit_is_left_out(window: MainWindow, text: str) -> None:
     window.restore_layouts({"live": text})
@@ -197,6 +223,27 @@ def test_every_tab_is_in_sight_and_says_what_it_is(
         assert bar.tabToolTip(i) == bar.tabText(i)
     assert not any(arrow.isVisible() for arrow in bar.findChildren(QToolButton))
     assert all(has_title(window, name) == is_small for name in group)
+
+
+def test_no_tabs_of_a_former_layout_stay(window: MainWindow) -> None:
+    def tabs() -> list[int]:
+        QApplication.processEvents()
+        bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        seen = (bar for bar in bars if bar.isVisible() and bar.geometry().intersects(window.rect()))
+        return [bar.count() for bar in seen]
+
+    window.show_page("live")
+    assert tabs() == [len(TABBED)]
+    window.use_arrangement("station")
+    assert tabs() == []
+    window.use_arrangement("panels")
+    window.docks["link"].setFloating(True)
+    window.docks["link"].setFloating(False)
+    assert tabs() == [len(TABBED)]
+    window.show_page("review")
+    assert tabs() == [3]
+    window.show_page("start")
+    assert tabs() == []
 
 
 def test_the_wizard_has_the_room_it_needs(window: MainWindow) -> None:

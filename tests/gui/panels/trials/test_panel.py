@@ -48,6 +48,17 @@ def tried(record: SessionRecord, rig: Rig) -> SessionRecord:
     return Session.open(record.path)
 
 
+def test_a_low_panel_shows_four_trials(panel: TrialsPanel, record: SessionRecord, rig: Rig) -> None:
+    with Session(record.path) as session:
+        session.save_trial(make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), [1e-3, 0, 0]))
+    panel.show_record(Session.open(record.path))
+    panel.resize(384, 276)
+    for _ in range(3):  # a layout may ask for another
+        QApplication.processEvents()
+    table = child(panel, RecordTable)
+    assert table.viewport().height() >= 4 * table.rowHeight(0)
+
+
 def tuned(snapshot: Callable[..., Snapshot]) -> Snapshot:
     """Return what is there once φ of both eyes has been moved by hand."""
     applied_m = snapshot(State.APPLIED).procedure.applied_shift_m
