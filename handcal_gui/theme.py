@@ -197,7 +197,7 @@ def colors() -> Colors:
 
 def follow_theme(widget: QWidget, redraw: Callable[[], object]) -> None:
     """Call a method of a widget now and after each change of the widget's palette."""
-    _PaletteWatch(widget, QEvent.Type.PaletteChange).changed.connect(redraw)
+    _PaletteWatch(widget).changed.connect(redraw)
     redraw()
 
 
@@ -280,13 +280,12 @@ class _PaletteWatch(QObject):
 
     changed = Signal()
 
-    def __init__(self, widget: QWidget, kind: QEvent.Type) -> None:
+    def __init__(self, widget: QWidget) -> None:
         super().__init__(widget)
-        self._kind = kind
         widget.installEventFilter(self)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        if event.type() == self._kind:
+        if event.type() == QEvent.Type.PaletteChange:
             self.changed.emit()
         return False
 

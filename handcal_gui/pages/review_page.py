@@ -21,8 +21,6 @@ from handcal_gui.widgets.times import local_time
 
 _LEAST_MAP_PX = 240
 """Height below which the residual map is left to the panel of the results."""
-
-
 _EXPORT = tr("Look at the result, then export it, or resume the session to add to it.")
 _RESUME = tr("Resume the session to make its first alignment.")
 
