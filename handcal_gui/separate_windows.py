@@ -213,7 +213,8 @@ class SeparateWindows(QObject):
 
     def edit_preferences(self) -> None:
         """Let the user change the preferences."""
-        self._current.change(station=self._start.new.settings)  # or it would show older ones
+        if self._start.new.is_changed:  # or it would show older ones
+            self._current.change(station=self._start.new.settings)
         dialog = PreferencesDialog(self._current.now, self._window)
         keep_on_screen(dialog)
         if dialog.exec():
