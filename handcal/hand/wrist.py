@@ -23,7 +23,7 @@ EDGE_RADIUS_M, FACING_RADIUS_M = 0.018, 0.034
 _SIGMA_MORE, _WIDTH_SCALE_MORE = 2.0, 2.0
 # A detector's box ends at the wrist or up to _BEHIND_M behind it, with these errors in the image.
 _BEYOND_BOX_M, _BEHIND_M, _BEHIND_SIGMA_M = 0.02, 0.03, 0.03
-# How likely the wrist is where the palm or the box would not have it: both are mistaken sometimes.
+# Weight of the places that the palm or the box rules out: both are sometimes mistaken.
 _MISTAKEN = 0.01
 # The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
 # another is e times less likely the wrist.
@@ -124,10 +124,10 @@ def find_wrist_m(
 
 
 def _misfit_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
-    """Return how little what is behind each place is like the forearm behind a wrist.
+    """Return by how much the limb behind each place differs from a forearm behind a wrist.
 
-    It is how much narrower the limb is somewhere behind, or how much wider shortly behind, than a
-    forearm may be.
+    The difference is what it is narrower anywhere behind, and wider shortly behind, than a forearm
+    may be.
     """
     end_m = float(ends_m[ends_m > 0.0].min(initial=np.inf)) - _END_M
     is_arm = (at_m < end_m) & (width_m > _WRIST_WIDTH_M)
