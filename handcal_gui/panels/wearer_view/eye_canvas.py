@@ -59,6 +59,11 @@ class EyeCanvas(QWidget):
         """The part of the display that is shown, in its pixels; more if there is space."""
         return self._shown
 
+    @property
+    def display_px(self) -> QRectF:
+        """The whole display, in its pixels; empty without a view."""
+        return _display(self._view) if self._view else QRectF()
+
     def show_part(self, part_px: QRectF) -> None:
         """Show another part of the display, until the view changes."""
         if part_px != self._shown:
@@ -162,12 +167,12 @@ class EyeCanvas(QWidget):
             self._crop = display
         elif not self._crop.contains(hand) or not _is_close(self._crop, hand):
             margin = _MARGIN * max(hand.width(), hand.height())
-            self._crop = hand.adjusted(-margin, -margin, margin, margin)
+            self._crop = hand.adjusted(-margin, -margin, margin, margin).intersected(display)
         self._shown = self._crop
 
 
 def show_alike(canvases: Collection[EyeCanvas]) -> QRectF:
-    """Show the same rows of several displays, at one scale.
+    """Show equally large parts of several displays, with the same rows.
 
     Returns the part of the last display that is shown, in its pixels; empty without any view.
     """
@@ -179,7 +184,10 @@ def show_alike(canvases: Collection[EyeCanvas]) -> QRectF:
     top, bottom = min(one.top() for one in parts), max(one.bottom() for one in parts)
     width = max(one.width() for one in parts)
     for canvas, part in zip(known, parts, strict=True):
-        part_px = QRectF(part.center().x() - width / 2, top, width, bottom - top)
+        display = canvas.display_px
+        left = max(part.center().x() - width / 2, display.left())
+        left = min(left, display.right() - width)
+        part_px = QRectF(left, top, width, bottom - top)
         canvas.show_part(part_px)
     return part_px
 

@@ -71,6 +71,17 @@ def test_two_displays_show_the_same_rows_at_one_scale(qtbot: QtBot) -> None:
     show_alike([EyeCanvas("Nothing shown")])
 
 
+def test_a_hand_at_the_edge_of_a_display_is_shown_as_large_as_the_other(qtbot: QtBot) -> None:
+    canvases = [EyeCanvas(f"{side} eye") for side in ("Left", "Right")]
+    for canvas, off_m in zip(canvases, ([0.0, 0.0, 0.0], [0.12, 0.06, 0.0]), strict=True):
+        qtbot.addWidget(canvas)
+        canvas.show_view(_view(RING_M + off_m))
+    show_alike(canvases)
+    one, other = (canvas.crop_px for canvas in canvases)
+    assert one.size() == other.size()
+    assert all(canvas.display_px.contains(canvas.crop_px) for canvas in canvases)
+
+
 def test_crop_holds_the_hand_and_stays_while_it_does(canvas: EyeCanvas) -> None:
     canvas.show_view(_view())
     crop = QRectF(canvas.crop_px)
