@@ -16,6 +16,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import matplotlib.font_manager  # noqa: F401 - at its first import it starts a process
 import numpy as np
 import pytest
 
