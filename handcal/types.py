@@ -266,8 +266,8 @@ class EyeShift:
     converged: bool
     stop_reason: str
     history_m2: Float64
-    """(iterations,); mean squared pair distance at each iteration. ``consistent`` measures it first
-    along normals and outlines, while it registers, and last, while it fits φ, in full."""
+    """(iterations,); mean squared pair distance at each iteration. ``consistent`` measures it along
+    normals and outlines, or, where it fits φ to pairs of the same points, in full."""
     method: str
     """One of `METHODS`, or ``"fused"``."""
 

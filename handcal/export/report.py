@@ -252,8 +252,8 @@ def _shift_plots(outcome: SessionOutcome, results: Results) -> Section:
 def _convergence(results: Results) -> Section:
     figure = Figure(
         "convergence",
-        "Root mean square distance of the pairs at each iteration. The last iterations of "
-        "consistent measure it to the nearest point instead of the surface, which makes it larger.",
+        "Root mean square distance of the pairs at each iteration. The method consistent measures "
+        "it along the surface's normals, which is less than the rms in the table.",
         lambda axes: figures.draw_convergence(axes, results),
         list(convergence_rows(results)),
         height_mm=55.0,

@@ -206,6 +206,8 @@ def fit_match(
         shift_m, aspect_m, moved_m = fit_m, np.zeros(3), np.zeros(3)
     if len(history) > 1:
         turn = _measure_turn(match, T_E, R, paired)
+    # Of one measure: the registration's is along normals and outlines, and smaller.
+    history_m2 = np.array(history) if same_points else match.rigid.history_m2
     return EyeShift(
         shift_m=shift_m,
         covariance_m2=_covariance(match, T_E, turn, moved_m, unturned, paired, distance_m)
@@ -213,10 +215,10 @@ def fit_match(
         rms_m=float(np.sqrt(history[-1])),
         residuals_m=residuals_m,
         inlier_ratio=float(np.mean(inliers)),
-        iterations=len(match.rigid.history_m2) + len(history),
+        iterations=len(history_m2),
         converged=match.rigid.converged,
         stop_reason=match.rigid.stop_reason,
-        history_m2=np.concatenate([match.rigid.history_m2, history]),
+        history_m2=history_m2,
         method="consistent",
     )
 

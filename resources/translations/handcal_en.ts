@@ -2372,9 +2372,7 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>RMS distance between matched points of hand and cursor at each iteration
-of each alignment (1, 2, …).
-The last iterations of “consistent” measure it to the nearest point instead of the surface,
-which makes it larger.</source>
+of each alignment (1, 2, …). “consistent” measures it along the surface’s normals, which is less than the RMS in the table.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

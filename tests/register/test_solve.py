@@ -70,6 +70,8 @@ def test_every_method_gives_the_same_kind_of_result(
     assert 0.0 < result.rms_m < 0.01
     assert 0.5 < result.inlier_ratio <= 1.0
     assert result.iterations == len(result.history_m2)
+    if method in ("consistent", "icp"):  # one measure from first to last, minimised
+        assert (np.diff(result.history_m2) <= 1e-3 * result.history_m2[0]).all()
     assert result.converged == ("limit" not in result.stop_reason)
     inliers_m = result.residuals_m[np.isfinite(result.residuals_m)]
     assert len(result.residuals_m) == len(made.hand_m)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
@@ -140,6 +141,16 @@ def test_convergence_has_a_line_for_each_alignment_and_eye(
     history_m2 = results.alignments[2]["left"].history_m2
     np.testing.assert_array_equal(iterations, np.arange(1, len(history_m2) + 1))
     np.testing.assert_allclose((rms_mm / 1e3) ** 2, history_m2)
+
+
+def test_lines_that_end_together_share_one_text(solved: ResultsPanel, results: Results) -> None:
+    plot = child(solved, ConvergencePlot)
+    texts = {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
+    assert texts == {"1", "2"}
+    eyes = results.alignments[1]
+    plot.show_results(replace(results, alignments={1: eyes, 2: eyes, 5: eyes}))
+    texts = {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
+    assert texts == {"1, 2, 5"}
 
 
 def test_the_map_shows_each_point_of_the_chosen_hand_once(
