@@ -607,6 +607,22 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>works everywhere</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>works during a calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>a menu; works everywhere</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>a panel; works while it has the keyboard focus</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Press the button, or open the list, that has the focus</source>
         <translation type="unfinished"></translation>
     </message>
@@ -636,6 +652,10 @@ local network can read them.</source>
     </message>
     <message>
         <source>Tab</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Guide</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2984,6 +3004,34 @@ and record which fits the hand better. The report says which was which.</source>
     </message>
     <message>
         <source>Keys</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search (Ctrl+F)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search the keys</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No key contains these words.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Print…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print all keys, or save them as PDF</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Effect</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
