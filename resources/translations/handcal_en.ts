@@ -500,7 +500,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Largest expected error of a calibration that is accepted, in arcminutes.</source>
+        <source>Largest expected error of an eye that is accepted, in arcminutes.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -551,7 +551,23 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Send events to the Lab Streaming Layer</source>
+        <source>Send events</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest expected error of an accepted eye; 60′ are 1°.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye box</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expects eyes where those of earlier wearers were.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Colours of all windows.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -568,6 +584,22 @@ local network can read them.</source>
     </message>
     <message>
         <source>Sent to other programs, from the next calibration on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses and results, for 3D Slicer; no password.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Port</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>TCP port of OpenIGTLink on this computer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Marks events in recordings of other instruments.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3098,15 +3130,27 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Limit of the hand&apos;s rotation from the cursor; beyond it an alignment is refused.</source>
+        <source>Limit of the hand&apos;s rotation from the cursor, in degrees; beyond it an alignment is refused.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Anything nearer to the camera is ignored.</source>
+        <source>Anything nearer to the camera is ignored; in metres.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Anything farther from the camera is ignored.</source>
+        <source>Anything farther from the camera is ignored; in metres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Farthest distance of the hand from the depth camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finds the hand in the camera&apos;s images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Computes where the eyes are from each alignment.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3118,11 +3162,23 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Calibration, from the next one on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Rotation guard</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The hand may be rotated this much from the cursor.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Depth gate from</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nearest distance of the hand from the depth camera.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
