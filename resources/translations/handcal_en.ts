@@ -4645,7 +4645,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>not accepted yet</source>
+        <source>not accepted yet: take images of the grid for one eye at least</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4781,11 +4781,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>calibrated: {}</source>
+        <source>Calibrated: {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>not calibrated yet</source>
+        <source>Not calibrated yet.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4837,22 +4837,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Measured z(C0→S).</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Angle that a square of the grid subtends.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Nominal distance for this angle, from the manufacturer.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Side length of the grid&apos;s squares, in pixels.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4897,10 +4881,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>T_V_H, from the headset rig to this eye&apos;s rendering camera, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Images of the grid</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4917,31 +4897,51 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Board poses</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>or a stereo calibration</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Rendering camera T_V_H</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Distance z(C0→S)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>measured</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Angle of a square</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>at nominal distance</source>
+        <source>Distance of the virtual screen from the eye, z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured distance of the virtual screen, in metres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle that a square of the grid subtends, in arcminutes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nominal distance for this angle, from the manufacturer, in metres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Instead of the images of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pose of this eye&apos;s rendering camera relative to the headset, T_V_H, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rendering camera&apos;s pose</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Screen&apos;s distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nominal distance</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5145,7 +5145,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>; still as in the initial rig: {}</source>
+        <source>; not calibrated here, as in the initial rig: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5173,23 +5173,43 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Rotation vector of the depth camera in the headset camera: axis times angle.</source>
+        <source>Focal length fx</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Position of the depth camera in the headset camera: x right, y down, z forward.</source>
+        <source>Focal length fy</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>From the headset&apos;s rendering camera V to the offline viewpoint C0, in the axes of V.</source>
+        <source>Centre cx</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Distance of the virtual screen S from the offline viewpoint C0.</source>
+        <source>Centre cy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation of the depth camera relative to the headset&apos;s camera, from T_H_D: axis times angle.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Position of the depth camera relative to the headset&apos;s camera, from T_H_D: x right, y down, z forward.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Position of the headset&apos;s rendering camera relative to the viewpoint of the offline calibration, t(C0→V): x right, y down, z forward.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the virtual screen from the viewpoint of the offline calibration, z(C0→S).</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>In pixels; σ from the residuals.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distortion {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5217,6 +5237,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Focal length</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Focal length of K, on the display&apos;s axis.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5237,7 +5261,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>T_H_D rotation {}</source>
+        <source>Rendering camera {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Position {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5349,7 +5381,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>its intrinsics</source>
+        <source>Its intrinsics</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5437,10 +5469,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>or its intrinsics</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>the intrinsics are in {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5461,19 +5489,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Pose of the depth camera on the headset: T_H_D.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The camera in the position of the wearer&apos;s eye.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Left display</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Projection and position of the left eye&apos;s display.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5481,11 +5497,23 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Projection and position of the right eye&apos;s display.</source>
+        <source>Take images of the board with both cameras, and solve where the depth camera is on the headset.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The whole rig: check, compare and save it.</source>
+        <source>Take images of the board with the camera that later takes the eye&apos;s place, and solve its lens.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the viewpoint camera behind the left display, take images of its grid and of the board, and solve.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The same behind the right display: images of its grid and of the board, and solve.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name the rig, look at what is doubtful, save it, and use it.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
