@@ -3877,6 +3877,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>there is no file {}: choose another, or leave the field empty</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>there is no folder {} yet: press Capture… to create it</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3886,6 +3890,10 @@ one turns out.</source>
     </message>
     <message>
         <source>choose a folder of frames with true masks</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is no folder {}: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

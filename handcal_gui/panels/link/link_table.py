@@ -67,7 +67,7 @@ _ROWS = {
         _BOTH: tr("Drift of the headset's clock, in parts per million; positive is fast")
     },
 }
-"""What the numbers of each row mean, by half."""
+"""Meaning of the numbers of each row, by half."""
 REJECTIONS = {
     Rejection.UNPAIRED: tr("Signed with another pairing key: enter the key above in the headset"),
     Rejection.CORRUPT: tr("Damaged in transit, or not meant for handcal"),
