@@ -17,6 +17,11 @@ from handcal.types import EYES, CameraIdentity, Eye, Float64, HeadsetIdentity, I
 
 RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
 RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")
+PART_NAMES: dict[RigPart, str] = {
+    "left": "left display",
+    "right": "right display",
+    "T_H_D": "depth camera's pose",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

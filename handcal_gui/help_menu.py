@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib.metadata import version
 
-from PySide6.QtCore import QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QMessageBox
 
 from handcal.errors import FileError
 from handcal.io.resources import resource_path
-from handcal_gui.keys import keys_html
+from handcal_gui.dialogs.keys import KeysDialog
 from handcal_gui.translation import tr
+from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow
 from handcal_gui.windows.manual import Manual
 
@@ -40,7 +41,12 @@ def add_help_menu(window: MainWindow, manual: Manual, support: Callable[[], obje
 
 
 def _show_keys(window: MainWindow) -> None:
-    QMessageBox.information(window, tr("Keys"), keys_html(window))
+    for one in window.findChildren(KeysDialog):
+        one.accept()
+    dialog = KeysDialog(window)  # not modal: to be read while the keys are used
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    dialog.show()
+    keep_on_screen(dialog)
 
 
 def _read(window: MainWindow, manual: Manual, page: str) -> None:

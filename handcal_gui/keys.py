@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
@@ -11,6 +12,10 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 from handcal_gui.translation import tr
 
 _WINDOW = tr("Window")
+_EVERYWHERE = tr("works everywhere")
+_IN_CALIBRATION = tr("works during a calibration")
+_IN_MENU = tr("a menu; works everywhere")
+_IN_PANEL = tr("a panel; works while it has the keyboard focus")
 _NOT_ACTIONS = {
     _WINDOW: (
         (tr("Return"), tr("Press the button, or open the list, that has the focus")),
@@ -23,6 +28,15 @@ _NOT_ACTIONS = {
     ),
 }
 """Keys that widgets handle themselves, as their meaning depends on the focus."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeyGroup:
+    """Keys that work at the same place."""
+
+    where: str
+    rows: list[tuple[str, str]]
+    """Keys and their meaning."""
 
 
 def add_action(
@@ -60,31 +74,22 @@ def add_action(
     return action
 
 
-def keys_by_group(window: QMainWindow) -> dict[str, list[tuple[str, str]]]:
-    """Return the keys and their meanings: by menu, for the whole window, and by panel."""
-    groups: dict[str, list[tuple[str, str]]] = {}
+def keys_by_group(window: QMainWindow) -> dict[str, KeyGroup]:
+    """Return the keys of the whole window, of the guide, of menus and of panels, by their names."""
+    groups = {_WINDOW: KeyGroup(_EVERYWHERE, [])}
     for action in window.findChildren(QAction):
         keys = ", ".join(_native(shortcut) for shortcut in action.shortcuts())
         if keys and not _is_of_another_window(action, window):
             meaning = action.whatsThis() or action.text().replace("&", "").rstrip("…")
             row = keys, meaning
-            rows = groups.setdefault(_group(action), [])
+            name, where = _group(action)
+            rows = groups.setdefault(name, KeyGroup(where, [])).rows
             if row not in rows:
                 rows.append(row)
-    for group, others in _NOT_ACTIONS.items():
-        groups.setdefault(group, []).extend(others)
-    return groups
-
-
-def keys_html(window: QMainWindow) -> str:
-    """Return the keys as a table, one row for each group."""
-    rows = (
-        f"<tr><td style='padding: 4px 16px 4px 0'>{group}</td><td style='padding: 4px 0'>"
-        + " · ".join(f"<b>{keys}</b>&nbsp;{meaning}" for keys, meaning in keys_of_group)
-        + "</td></tr>"
-        for group, keys_of_group in keys_by_group(window).items()
-    )
-    return f"<table width='640'>{''.join(rows)}</table>"
+    for name, others in _NOT_ACTIONS.items():
+        groups[name].rows.extend(others)
+    places = [_EVERYWHERE, _IN_CALIBRATION, _IN_MENU, _IN_PANEL]
+    return dict(sorted(groups.items(), key=lambda group: places.index(group[1].where)))
 
 
 def _is_of_another_window(action: QAction, window: QMainWindow) -> bool:
@@ -97,16 +102,19 @@ def _is_of_another_window(action: QAction, window: QMainWindow) -> bool:
     return False
 
 
-def _group(action: QAction) -> str:
+def _group(action: QAction) -> tuple[str, str]:
+    """Return the name of the group of an action, and where its keys work."""
     for owner in action.associatedObjects():
         if isinstance(owner, QMenu):
-            return owner.title().replace("&", "")
+            return owner.title().replace("&", ""), _IN_MENU
     parent = action.parent()
     while isinstance(parent, QWidget):
         if isinstance(parent, QDockWidget):
-            return parent.windowTitle()
+            return parent.windowTitle(), _IN_PANEL
+        if parent.objectName() == "wizard":
+            return tr("Guide"), _IN_CALIBRATION
         parent = parent.parent()
-    return _WINDOW
+    return _WINDOW, _EVERYWHERE
 
 
 def _native(shortcut: QKeySequence) -> str:

@@ -98,10 +98,9 @@ def _begin(program: Program, arguments: argparse.Namespace) -> Demonstration | N
         demonstration = Demonstration(program, arguments.output, arguments.screenshots)
         demonstration.start(settings)
         return demonstration
+    program.use_for_one_run(settings)
     if arguments.session:
         program.open_session(arguments.session)
-    else:
-        program.start.show_preferences(replace(program.preferences, station=settings))
     return None
 
 
@@ -117,7 +116,7 @@ def _station(settings: StationSettings, arguments: argparse.Namespace) -> Statio
         case live if is_live(live):
             settings = replace(with_source(settings, live), headset="network")
         case path:
-            recording = str(Path(path).absolute())  # remembered, and valid from any folder
+            recording = str(Path(path).absolute())  # valid from any folder, if it is remembered
             settings = replace(settings, source="recording", recording=recording, headset="virtual")
     if arguments.rig:
         settings = replace(settings, rig=str(arguments.rig.absolute()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias, get_type_hints
 
@@ -188,6 +188,7 @@ class CurrentPreferences(QObject):
         self._file, self._remembers = file, remembers
         self.folder = file.path.parent
         self.now, self.complaint = file.load()
+        self._for_one_run = self._instead = self.now.station
         try:
             self.pairings = file.pairings()
         except FileError as error:
@@ -198,12 +199,23 @@ class CurrentPreferences(QObject):
         """Change some of the preferences, by their names."""
         self.use(replace(self.now, **changed))
 
+    def use_for_one_run(self, station: StationSettings) -> None:
+        """Use other settings of the station; each is remembered only if it is changed again."""
+        self._for_one_run, self._instead = station, self.now.station
+        self.now = replace(self.now, station=station)
+
     def use(self, preferences: Preferences) -> None:
         """Replace all preferences."""
         self.now = preferences
+        station = preferences.station
+        former = {
+            one.name: getattr(self._instead, one.name)
+            for one in fields(StationSettings)
+            if getattr(station, one.name) == getattr(self._for_one_run, one.name)
+        }
         try:
             if self._remembers:
-                self._file.save(preferences)
+                self._file.save(replace(preferences, station=replace(station, **former)))
         except FileError as error:
             self.not_saved.emit(tr("The preferences could not be saved: {}").format(error))
 

@@ -100,6 +100,11 @@ class Program(QObject):
         """The current preferences."""
         return self._current.now
 
+    def use_for_one_run(self, settings: StationSettings) -> None:
+        """Use settings of the station that are not remembered, such as those of a command."""
+        self._current.use_for_one_run(settings)
+        self.start.show_preferences(self.preferences)
+
     def start_calibration(self, settings: StationSettings, wearer: str) -> None:
         """Open a station for a wearer."""
         self._current.change(station=settings)
@@ -107,7 +112,7 @@ class Program(QObject):
 
     def resume_session(self, path: Path) -> None:
         """Resume a session, at the station that was used last or chosen since."""
-        self._keep_entries()
+        self.start.keep_entries(self._current)
         settings = self.preferences.station
         self._run(lambda: Station(settings, resume=path, pairings=self._current.pairings))
 
@@ -125,7 +130,7 @@ class Program(QObject):
 
     def open_session(self, path: Path) -> None:
         """Open a stored session for review."""
-        self._keep_entries()
+        self.start.keep_entries(self._current)
         self.live.stop()
         self.window.banner.clear()
         self.review.open(path)
@@ -139,7 +144,7 @@ class Program(QObject):
 
     def show_start(self) -> None:
         """End the calibration or review, and show the start page."""
-        self._keep_entries()
+        self.start.keep_entries(self._current)
         self.live.stop()
         self.review.close()
         self.start.set_opening(False)
@@ -149,7 +154,7 @@ class Program(QObject):
     def close(self) -> None:
         """Save the window's layout and end all running work; safe to call twice."""
         layouts = self.window.layouts()
-        self._keep_entries()
+        self.start.keep_entries(self._current)
         self._current.change(
             geometry=self.window.saveGeometry().toBase64().toStdString(),
             live_layout=layouts.get("live", ""),
@@ -160,11 +165,6 @@ class Program(QObject):
         self.live.stop()
         self.review.close()
         self.start.stop()
-
-    def _keep_entries(self) -> None:
-        """Remember the start page's entries, also those with which nothing was started."""
-        if self.window.page == "start" and self.start.new.is_changed:
-            self._current.change(station=self.start.new.settings)
 
     def _connect(self, review_page: ReviewPage) -> None:
         self.start.start_requested.connect(self.start_calibration)

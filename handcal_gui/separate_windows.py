@@ -213,14 +213,13 @@ class SeparateWindows(QObject):
 
     def edit_preferences(self) -> None:
         """Let the user change the preferences."""
-        if self._start.new.is_changed:  # or it would show older ones
-            self._current.change(station=self._start.new.settings)
+        self._start.keep_entries(self._current)
         dialog = PreferencesDialog(self._current.now, self._window)
         keep_on_screen(dialog)
         if dialog.exec():
             self._current.use(dialog.preferences())
             use_theme(self._current.now.theme)
-            self._start.show_preferences(self._current.now)
+            self._start.new.show_settings(self._current.now.station)
 
     def _open_export(
         self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str

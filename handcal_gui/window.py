@@ -167,6 +167,7 @@ class MainWindow(QMainWindow):
             elif page not in self._layouts:
                 dock.show()
             dock.toggleViewAction().setEnabled(belongs)
+            self._go_to[name].setEnabled(belongs)
         if page not in self._layouts:
             review_px = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
             share_room(self, self._docks, review_px if page == "review" else None)
@@ -273,9 +274,11 @@ class MainWindow(QMainWindow):
     def _make_menus(self) -> None:
         self.menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}
         view = self.menus["View"]
-        go_to = view.addMenu(tr("&Go to"))
-        for number, (name, title) in enumerate(TITLES.items(), 1):
-            go_to.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
+        menu = view.addMenu(tr("&Go to"))
+        self._go_to = {
+            name: menu.addAction(title, QKeySequence(f"Ctrl+{number}"), partial(self.go_to, name))
+            for number, (name, title) in enumerate(TITLES.items(), 1)
+        }
         self._station = view.addAction(
             tr("&Station: only the guide"), QKeySequence("F11"), self._swap
         )

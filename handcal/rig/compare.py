@@ -42,7 +42,7 @@ def compare_rigs(a: Rig, b: Rig) -> tuple[RigDifference, ...]:
     The last difference of each eye is the mean distance, seen from C0, between the user test's
     target as drawn by each rig when the depth camera tracks it.
     """
-    differences = _between_poses("T_H_D", a.T_H_D, b.T_H_D)
+    differences = _between_poses("depth camera (T_H_D)", a.T_H_D, b.T_H_D)
     differences.append(
         RigDifference(
             "depth camera: largest move of a pixel",
@@ -52,11 +52,17 @@ def compare_rigs(a: Rig, b: Rig) -> tuple[RigDifference, ...]:
     )
     for eye in EYES:
         ours, theirs = a.eyes[eye], b.eyes[eye]
-        differences += _between_poses(f"{eye}: T_V_H", ours.T_V_H, theirs.T_V_H)
+        differences += _between_poses(f"{eye}: rendering camera (T_V_H)", ours.T_V_H, theirs.T_V_H)
         differences += [
-            RigDifference(f"{eye}: C0 in V", 1e3 * _distance(ours.t_C0_V_m, theirs.t_C0_V_m), "mm"),
             RigDifference(
-                f"{eye}: z(C0→S)", 100.0 * abs(theirs.z_C0_S_m / ours.z_C0_S_m - 1.0), "%"
+                f"{eye}: viewpoint in the rendering camera",
+                1e3 * _distance(ours.t_C0_V_m, theirs.t_C0_V_m),
+                "mm",
+            ),
+            RigDifference(
+                f"{eye}: distance of the virtual screen",
+                100.0 * abs(theirs.z_C0_S_m / ours.z_C0_S_m - 1.0),
+                "%",
             ),
             RigDifference(
                 f"{eye}: largest move of a display pixel", _display_move_px(ours, theirs), "px"

@@ -9,7 +9,15 @@ import numpy as np
 
 from handcal.display import arcmin_from_px, view_of_eye
 from handcal.geometry import image_points, invert, transform
-from handcal.rig_types import RIG_PARTS, DepthCheck, DisplayCheck, EyeDisplay, Rig
+from handcal.rig_types import (
+    PART_NAMES,
+    RIG_PARTS,
+    DepthCheck,
+    DisplayCheck,
+    EyeDisplay,
+    Rig,
+    RigPart,
+)
 from handcal.types import EYES, Float64
 
 _EYE_DISTANCE_M = 0.050, 0.075
@@ -120,9 +128,13 @@ def _display_findings(eye: str, display: EyeDisplay) -> Iterator[RigFinding]:
         f"{display.width_px}×{display.height_px} px, {arcmin:.2f}′ per pixel, "
         f"{_angle_deg(display):.0f}° across",
     )
-    yield _within(f"{eye}: z(C0→S)", display.z_C0_S_m, _FOCAL_DISTANCE_M, 1.0, "m")
+    yield _within(
+        f"{eye}: distance of the virtual screen", display.z_C0_S_m, _FOCAL_DISTANCE_M, 1.0, "m"
+    )
     offset_m = float(np.linalg.norm(display.t_C0_V_m))
-    yield _within(f"{eye}: C0 from V", offset_m, (0.0, _LARGEST_OFFSET_M), 1e3, "mm")
+    yield _within(
+        f"{eye}: viewpoint from the rendering camera", offset_m, (0.0, _LARGEST_OFFSET_M), 1e3, "mm"
+    )
 
 
 def _within(
@@ -196,12 +208,13 @@ def _not_told(what: str) -> RigFinding:
     return RigFinding(what, "not in this file", is_known=False)
 
 
-def _origin_finding(rig: Rig, part: str) -> RigFinding:
+def _origin_finding(rig: Rig, part: RigPart) -> RigFinding:
     origin = next((origin for name, origin in rig.origins.items() if name == part), None)
+    what = f"Calibration of the {PART_NAMES[part]}"
     if origin is None:
-        return _not_told(f"Calibration of {part}")
+        return _not_told(what)
     return RigFinding(
-        f"Calibration of {part}",
+        what,
         f"{origin.verdict}: {origin.reason} ({origin.method}, {origin.made})",
         origin.verdict == "good",
         "good",

@@ -114,7 +114,9 @@ class ReviewController(QObject):
         panels = self._window.panels
         note = "" if stored.results else tr("It contains no alignments yet.")
         target_arcmin = stored.settings.verdict.target_arcmin
-        panels.results.show_results(stored.results, record.alignments, record.rig)
+        panels.results.show_results(
+            stored.results, record.alignments, record.rig, has_verdicts=False
+        )
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QLabel, QWidget
+from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QWidget
 
 from handcal.bridge.bridges import BridgeSettings
 from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import choice, fill_row, number, whole_number, with_name
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.fields import choice, number, whole_number, with_name
+from handcal_gui.widgets.layouts import scrollable, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {
@@ -23,7 +23,7 @@ _THEMES: dict[Theme, str] = {
     "contrast": tr("High contrast"),
 }
 
-_TARGET_HELP = tr("Largest expected error of a calibration that is accepted, in arcminutes.")
+_TARGET_HELP = tr("Largest expected error of an eye that is accepted, in arcminutes.")
 _LEARN_HELP = tr(
     "Learn where wearers' eyes are from the finished sessions in this folder with the same rig,\n"
     "once there are enough."
@@ -63,8 +63,7 @@ class PreferencesDialog(QDialog):
         self._theme.setCurrentIndex(self._theme.findData(preferences.theme))
         self._sessions = PathField(tr("Session folder"), "folder")
         self._sessions.set_path(preferences.station.sessions)
-        self._sessions.setMinimumWidth(45 * SPACING_PX)
-        self._calibration = CalibrationFields()
+        self._calibration = CalibrationFields(explains=True)
         self._calibration.show_settings(preferences.station.calibration)
         self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
         self._target.setValue(preferences.station.calibration.solve.verdict.target_arcmin)
@@ -83,20 +82,22 @@ class PreferencesDialog(QDialog):
         self._slicer.currentIndexChanged.connect(
             lambda: self._port.setEnabled(bool(self._slicer.currentData()))
         )
-        self._lsl = with_name(
-            QCheckBox(tr("Send events to the Lab Streaming Layer")), "lsl", help_text=_LSL_HELP
-        )
+        self._lsl = with_name(QCheckBox(tr("Send events")), "lsl", help_text=_LSL_HELP)
         self._lsl.setChecked(bridges.lsl)
-        self._calibration.add_row(tr("Target"), self._target)
-        self._calibration.add_row(tr("Prior"), self._learn)
-        slicer = QWidget()
-        fill_row(slicer, self._slicer, QLabel(tr("port")), self._port, grows=self._port)
+        add = self._calibration.add_row
+        add(
+            tr("Target"),
+            self._target,
+            tr("Largest expected error of an accepted eye; 60′ are 1°."),
+        )
+        add(tr("Eye box"), self._learn, tr("Expects eyes where those of earlier wearers were."))
         self._calibration.add_heading(tr("Sent to other programs, from the next calibration on"))
-        self._calibration.add_row("OpenIGTLink", slicer)
-        self._calibration.add_row("LSL", self._lsl)
+        add("OpenIGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
+        add(tr("Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
+        add("LSL", self._lsl, tr("Marks events in recordings of other instruments."))
         self._calibration.add_heading(tr("Program"))
-        self._calibration.add_row(tr("Theme"), self._theme)
-        self._calibration.add_row(tr("Session folder"), self._sessions)
+        add(tr("Theme"), self._theme, tr("Colours of all windows."))
+        add(tr("Session folder"), self._sessions)
         buttons = QDialogButtonBox(
             QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
         )
@@ -104,7 +105,13 @@ class PreferencesDialog(QDialog):
             one.setIcon(QIcon())  # like all other buttons
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
-        vbox(self._calibration, buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
+        area = scrollable(self._calibration)
+        vbox((area, 1), buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
+        form, foot = self._calibration.sizeHint(), buttons.sizeHint()
+        self.resize(
+            form.width() + area.verticalScrollBar().sizeHint().width() + 4 * SPACING_PX,
+            form.height() + foot.height() + 6 * SPACING_PX,
+        )
 
     def preferences(self) -> Preferences:
         """Return the preferences with the values shown."""

@@ -115,10 +115,10 @@ class ReviewPage(QWidget):
         self._fit()
         while self._facts.rowCount():
             self._facts.removeRow(0)
-        for name, fact in _facts(record, note):
-            text = paragraph(f"review{name.replace(' ', '')}", fact)
+        for name, caption, fact in _facts(record, note):
+            text = paragraph(f"review{name}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-            self._facts.addRow(QLabel(name, alignment=Qt.AlignmentFlag.AlignTop), text)
+            self._facts.addRow(QLabel(caption, alignment=Qt.AlignmentFlag.AlignTop), text)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Show the residual map only where it fits below the rest."""
@@ -133,20 +133,20 @@ class ReviewPage(QWidget):
         self.residuals.setVisible(self._is_solved and room_px > _LEAST_MAP_PX)
 
 
-def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str]]:
-    """Yield the name and the text of each fact about a session."""
-    yield tr("Started"), local_time(record.events[0].time)
-    yield tr("Rig"), record.rig.name
+def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str, str]]:
+    """Yield the name, the caption and the text of each fact about a session."""
+    yield "Started", tr("Started"), local_time(record.events[0].time)
+    yield "Rig", tr("Rig"), record.rig.name
     state = tr("finished") if record.is_finished else tr("not finished")
     counts = (
         pluralize(len(record.alignments), tr("alignment"), tr("alignments")),
         pluralize(len(record.trials), tr("trial"), tr("trials")),
     )
-    yield tr("Contents"), f"{', '.join(counts)}; {state}"
-    yield tr("Folder"), str(record.path)
+    yield "Contents", tr("Contents"), f"{', '.join(counts)}; {state}"
+    yield "Folder", tr("Folder"), str(record.path)
     if note:
-        yield tr("Note"), note
+        yield "Note", tr("Note"), note
     if record.left_out:
-        yield tr("Damaged"), f"{record.left_out[0].upper()}{record.left_out[1:]}."
+        yield "Damaged", tr("Damaged"), f"{record.left_out[0].upper()}{record.left_out[1:]}."
     if record.torn_bytes:
-        yield tr("Journal"), tr("The last line is incomplete, as after a crash.")
+        yield "Journal", tr("Journal"), tr("The last line is incomplete, as after a crash.")

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
+from PySide6.QtGui import QPalette
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from handcal.hand.settings import Roi
 from handcal.station.states import CalibrationSettings
@@ -47,6 +48,11 @@ _GATE_M = 0.05
 class CalibrationFields(QWidget):
     """Fields for rotation guard, depth gate, hand search and solver.
 
+    Parameters
+    ----------
+    explains : bool
+        Whether to show what each field means beside it; the tooltips always do.
+
     Attributes
     ----------
     changed : Signal()
@@ -54,32 +60,65 @@ class CalibrationFields(QWidget):
 
     changed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None, *, explains: bool = False) -> None:
         super().__init__(parent)
+        self._explains = explains
         self._guard = number(
             "guard",
             1.0,
             45.0,
             0.5,
             " °",
-            tr("Limit of the hand's rotation from the cursor; beyond it an alignment is refused."),
+            tr(
+                "Limit of the hand's rotation from the cursor, in degrees; beyond it an alignment "
+                "is refused."
+            ),
         )
         self._near = number(
-            "gateNear", 0.10, 1.95, 0.05, " m", tr("Anything nearer to the camera is ignored.")
+            "gateNear",
+            0.10,
+            1.95,
+            0.05,
+            " m",
+            tr("Anything nearer to the camera is ignored; in metres."),
         )
         self._far = number(
-            "gateFar", 0.15, 2.00, 0.05, " m", tr("Anything farther from the camera is ignored.")
+            "gateFar",
+            0.15,
+            2.00,
+            0.05,
+            " m",
+            tr("Anything farther from the camera is ignored; in metres."),
         )
         self._roi = choice("roi", tr("Hand found by"), _ROIS, _ROI_HELP)
         self._method = choice("method", tr("Solver"), _METHODS, _METHOD_HELP)
-        self._form = QFormLayout(self)
-        self._form.setContentsMargins(0, 0, 0, 0)
-        self._form.setSpacing(SPACING_PX)
-        self.add_row(tr("Rotation guard"), self._guard)
-        self.add_row(tr("Depth gate from"), self._near)
-        self.add_row(tr("Depth gate to"), self._far)
-        self.add_row(tr("Hand found by"), self._roi)
-        self.add_row(tr("Solver"), self._method)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(2 * SPACING_PX if explains else SPACING_PX)
+        self._grid.setVerticalSpacing(SPACING_PX // 2 if explains else SPACING_PX)
+        self._grid.setColumnStretch(2, 1)
+        if explains:
+            self.add_heading(tr("Calibration, from the next one on"))
+        for label, field, meaning in (
+            (
+                tr("Rotation guard"),
+                self._guard,
+                tr("The hand may be rotated this much from the cursor."),
+            ),
+            (
+                tr("Depth gate from"),
+                self._near,
+                tr("Nearest distance of the hand from the depth camera."),
+            ),
+            (
+                tr("Depth gate to"),
+                self._far,
+                tr("Farthest distance of the hand from the depth camera."),
+            ),
+            (tr("Hand found by"), self._roi, tr("Finds the hand in the camera's images.")),
+            (tr("Solver"), self._method, tr("Computes where the eyes are from each alignment.")),
+        ):
+            self.add_row(label, field, meaning)
         self._near.valueChanged.connect(self._push_far)
         self._far.valueChanged.connect(self._push_near)
         for field in (self._guard, self._near, self._far):
@@ -109,16 +148,26 @@ class CalibrationFields(QWidget):
             solve=replace(settings.solve, method=self._method.currentData()),
         )
 
-    def add_row(self, label: str, field: QWidget) -> None:
-        """Add a field below."""
-        self._form.addRow(label, field)
+    def add_row(self, text: str, field: QWidget, meaning: str = "") -> None:
+        """Add a field below, with its meaning beside it if the form explains fields."""
+        row = self._grid.rowCount()
+        label = QLabel(text)
+        label.setBuddy(field)
+        self._grid.addWidget(label, row, 0)
+        if not (self._explains and meaning):
+            self._grid.addWidget(field, row, 1, 1, 2)
+            return
+        self._grid.addWidget(field, row, 1)
+        explained = QLabel(meaning)
+        explained.setForegroundRole(QPalette.ColorRole.PlaceholderText)
+        self._grid.addWidget(explained, row, 2)
 
     def add_heading(self, text: str) -> None:
         """Add a heading below, for the fields added next."""
         heading = QLabel(text)
         scale_font(heading, 1.0, is_bold=True)
         heading.setContentsMargins(0, SPACING_PX, 0, 0)
-        self._form.addRow(heading)
+        self._grid.addWidget(heading, self._grid.rowCount(), 0, 1, 3)
 
     def _push_far(self, near_m: float) -> None:
         """Keep the far limit beyond the near one."""

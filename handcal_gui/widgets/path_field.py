@@ -4,14 +4,25 @@ from __future__ import annotations
 
 from typing import Literal
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QPaintEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QLineEdit,
+    QStyle,
+    QStyleOptionFrame,
+    QStylePainter,
+    QToolButton,
+    QWidget,
+)
 
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, fill_row
 
 INTRINSICS_FILES = tr("Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)")
 """File filter for a camera's intrinsics."""
+_INSET_PX = 2
+"""Between the frame of a line edit and its text, as in Qt."""
 
 
 class PathField(QWidget):
@@ -46,8 +57,9 @@ class PathField(QWidget):
         super().__init__(parent)
         self.name = name
         self._pattern = pattern
-        self._line = QLineEdit(placeholderText=empty, clearButtonEnabled=bool(empty))
+        self._line = _PathLine(placeholderText=empty, clearButtonEnabled=bool(empty))
         self._line.setAccessibleName(name)
+        self._line.textChanged.connect(self._show_whole_path)
         self._line.textChanged.connect(self.changed)
         buttons = []
         for one, title, ask in (
@@ -67,9 +79,14 @@ class PathField(QWidget):
         return str(self._line.text()).strip()
 
     def set_path(self, path: str) -> None:
-        """Show a path, scrolled to its end."""
+        """Show a path."""
         if path != self.path:
             self._line.setText(path)
+
+    def setToolTip(self, text: str) -> None:
+        """Explain the field; the tooltip of the line has the whole path, too."""
+        super().setToolTip(text)
+        self._show_whole_path()
 
     def choose_file(self) -> None:
         """Choose a file in the system's dialog."""
@@ -80,3 +97,31 @@ class PathField(QWidget):
         """Choose a folder in the system's dialog."""
         chosen = QFileDialog.getExistingDirectory(self, self.name, self.path)
         self.set_path(chosen or self.path)
+
+    def _show_whole_path(self) -> None:
+        self._line.setToolTip("\n".join(filter(None, (self.path, self.toolTip()))))
+
+
+class _PathLine(QLineEdit):
+    """Elides the middle of a path that does not fit, unless it is being edited."""
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the path from its beginning to its end."""
+        option = QStyleOptionFrame()
+        self.initStyleOption(option)
+        contents = QStyle.SubElement.SE_LineEditContents
+        room = self.style().subElementRect(contents, option, self)
+        room.adjust(_INSET_PX, 0, -_INSET_PX, 0)
+        for clear in self.findChildren(QToolButton):
+            room.setRight(min(room.right(), clear.x()))
+        shown = self.fontMetrics().elidedText(
+            self.text(), Qt.TextElideMode.ElideMiddle, room.width()
+        )
+        if self.hasFocus() or shown == self.text():
+            super().paintEvent(event)
+            return
+        painter = QStylePainter(self)
+        painter.drawPrimitive(QStyle.PrimitiveElement.PE_PanelLineEdit, option)
+        painter.setPen(option.palette.text().color())
+        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, shown)
+        painter.end()

@@ -500,7 +500,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Largest expected error of a calibration that is accepted, in arcminutes.</source>
+        <source>Largest expected error of an eye that is accepted, in arcminutes.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -551,7 +551,23 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Send events to the Lab Streaming Layer</source>
+        <source>Send events</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest expected error of an accepted eye; 60′ are 1°.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Eye box</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expects eyes where those of earlier wearers were.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Colours of all windows.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -568,6 +584,22 @@ local network can read them.</source>
     </message>
     <message>
         <source>Sent to other programs, from the next calibration on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses and results, for 3D Slicer; no password.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Port</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>TCP port of OpenIGTLink on this computer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Marks events in recordings of other instruments.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -607,6 +639,22 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>works everywhere</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>works during a calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>a menu; works everywhere</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>a panel; works while it has the keyboard focus</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Press the button, or open the list, that has the focus</source>
         <translation type="unfinished"></translation>
     </message>
@@ -636,6 +684,10 @@ local network can read them.</source>
     </message>
     <message>
         <source>Tab</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Guide</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2372,7 +2424,8 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>RMS distance between matched points of hand and cursor at each iteration
-of each alignment (1, 2, …). “consistent” measures it along the surface’s normals, which is less than the RMS in the table.</source>
+of each alignment (1, 2, …). “consistent” measures it along the surface’s normals,
+which is less than the RMS in the table.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2985,6 +3038,34 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Search (Ctrl+F)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search the keys</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No key contains these words.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Print…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print all keys, or save them as PDF</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Effect</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>No file manager was found; the folder is {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3048,15 +3129,27 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Limit of the hand&apos;s rotation from the cursor; beyond it an alignment is refused.</source>
+        <source>Limit of the hand&apos;s rotation from the cursor, in degrees; beyond it an alignment is refused.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Anything nearer to the camera is ignored.</source>
+        <source>Anything nearer to the camera is ignored; in metres.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Anything farther from the camera is ignored.</source>
+        <source>Anything farther from the camera is ignored; in metres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Farthest distance of the hand from the depth camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finds the hand in the camera&apos;s images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Computes where the eyes are from each alignment.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3068,11 +3161,23 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Calibration, from the next one on</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Rotation guard</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The hand may be rotated this much from the cursor.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Depth gate from</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nearest distance of the hand from the depth camera.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3771,6 +3876,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>there is no file {}: choose another, or leave the field empty</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>there is no folder {} yet: press Capture… to create it</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3780,6 +3889,10 @@ one turns out.</source>
     </message>
     <message>
         <source>choose a folder of frames with true masks</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is no folder {}: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4539,7 +4652,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>not accepted yet</source>
+        <source>not accepted yet: take images of the grid for one eye at least</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4675,11 +4788,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>calibrated: {}</source>
+        <source>Calibrated: {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>not calibrated yet</source>
+        <source>Not calibrated yet.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4731,22 +4844,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Measured z(C0→S).</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Angle that a square of the grid subtends.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Nominal distance for this angle, from the manufacturer.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Side length of the grid&apos;s squares, in pixels.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4791,10 +4888,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>T_V_H, from the headset rig to this eye&apos;s rendering camera, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Images of the grid</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4811,31 +4904,51 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Board poses</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>or a stereo calibration</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Rendering camera T_V_H</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Distance z(C0→S)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>measured</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Angle of a square</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>at nominal distance</source>
+        <source>Distance of the virtual screen from the eye, z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured distance of the virtual screen, in metres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Angle that a square of the grid subtends, in arcminutes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nominal distance for this angle, from the manufacturer, in metres.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Instead of the images of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pose of this eye&apos;s rendering camera relative to the headset, T_V_H, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rendering camera&apos;s pose</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Screen&apos;s distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measured distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nominal distance</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5039,7 +5152,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>; still as in the initial rig: {}</source>
+        <source>; not calibrated here, as in the initial rig: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5067,23 +5180,43 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Rotation vector of the depth camera in the headset camera: axis times angle.</source>
+        <source>Focal length fx</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Position of the depth camera in the headset camera: x right, y down, z forward.</source>
+        <source>Focal length fy</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>From the headset&apos;s rendering camera V to the offline viewpoint C0, in the axes of V.</source>
+        <source>Centre cx</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Distance of the virtual screen S from the offline viewpoint C0.</source>
+        <source>Centre cy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation of the depth camera relative to the headset&apos;s camera, from T_H_D: axis times angle.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Position of the depth camera relative to the headset&apos;s camera, from T_H_D: x right, y down, z forward.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Position of the headset&apos;s rendering camera relative to the viewpoint of the offline calibration, t(C0→V): x right, y down, z forward.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the virtual screen from the viewpoint of the offline calibration, z(C0→S).</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>In pixels; σ from the residuals.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distortion {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5111,6 +5244,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Focal length</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Focal length of K, on the display&apos;s axis.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5131,7 +5268,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>T_H_D rotation {}</source>
+        <source>Rendering camera {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rotation {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Position {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5243,7 +5388,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>its intrinsics</source>
+        <source>Its intrinsics</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5331,10 +5476,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>or its intrinsics</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>the intrinsics are in {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5355,19 +5496,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Pose of the depth camera on the headset: T_H_D.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The camera in the position of the wearer&apos;s eye.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Left display</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Projection and position of the left eye&apos;s display.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5375,11 +5504,23 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Projection and position of the right eye&apos;s display.</source>
+        <source>Take images of the board with both cameras, and solve where the depth camera is on the headset.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The whole rig: check, compare and save it.</source>
+        <source>Take images of the board with the camera that later takes the eye&apos;s place, and solve its lens.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the viewpoint camera behind the left display, take images of its grid and of the board, and solve.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The same behind the right display: images of its grid and of the board, and solve.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name the rig, look at what is doubtful, save it, and use it.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -26,7 +26,7 @@ def test_a_rig_does_not_differ_from_itself() -> None:
 def test_a_moved_depth_camera_moves_what_it_tracks() -> None:
     T_H_D = rigid(None, [0.001, 0.0, 0.0]) @ RIG.T_H_D
     found = differences(replace(RIG, T_H_D=T_H_D))
-    assert found.pop("T_H_D: moved") == pytest.approx(1.0)
+    assert found.pop("depth camera (T_H_D): moved") == pytest.approx(1.0)
     # 1 mm at 0.4, 0.5 and 0.6 m.
     arcmin = 60.0 * np.degrees(np.mean([0.001 / z for z in (0.4, 0.5, 0.6)]))
     for eye in ("left", "right"):
@@ -36,7 +36,9 @@ def test_a_moved_depth_camera_moves_what_it_tracks() -> None:
 
 def test_a_turned_depth_camera_is_reported_in_degrees() -> None:
     T_H_D = RIG.T_H_D @ rigid([0.0, np.radians(0.3), 0.0])
-    assert differences(replace(RIG, T_H_D=T_H_D))["T_H_D: turned"] == pytest.approx(0.3)
+    assert differences(replace(RIG, T_H_D=T_H_D))["depth camera (T_H_D): turned"] == pytest.approx(
+        0.3
+    )
 
 
 def test_a_display_differs_by_pixels_place_and_distance() -> None:
@@ -47,8 +49,8 @@ def test_a_display_differs_by_pixels_place_and_distance() -> None:
     )
     found = differences(replace(RIG, eyes={**RIG.eyes, "left": changed}))
     assert found["left: largest move of a display pixel"] == pytest.approx(5.0)
-    assert found["left: z(C0→S)"] == pytest.approx(2.0)
-    assert found["left: C0 in V"] == pytest.approx(2.0)
+    assert found["left: distance of the virtual screen"] == pytest.approx(2.0)
+    assert found["left: viewpoint in the rendering camera"] == pytest.approx(2.0)
     assert all(name.startswith("left") for name in found)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from handcal.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.report import missing_parts, report_rig
-from handcal.rig_types import RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
+from handcal.rig_types import PART_NAMES, RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
 from handcal.types import CameraIdentity, HeadsetIdentity
 
 RIG = example_rig()
@@ -37,13 +37,16 @@ def test_a_depth_camera_that_looks_away_is_reported() -> None:
 def test_a_display_too_near_and_a_viewpoint_too_far_are_told() -> None:
     left = replace(RIG.eyes["left"], z_C0_S_m=0.2, t_C0_V_m=np.array([0.0, 0.0, 0.03]))
     found = doubtful(replace(RIG, eyes={**RIG.eyes, "left": left}))
-    assert {"left: z(C0→S)", "left: C0 from V"} <= set(found)
+    assert {
+        "left: distance of the virtual screen",
+        "left: viewpoint from the rendering camera",
+    } <= set(found)
 
 
 def test_a_part_that_was_not_good_is_reported_with_its_reason() -> None:
     origin = Origin("grid", "today", 3, 0.2, "bad", "the camera moved", ("x_m",), np.eye(1))
     found = doubtful(replace(RIG, origins={"left": origin}))
-    assert found == {"Calibration of left": "bad: the camera moved (grid, today)"}
+    assert found == {"Calibration of the left display": "bad: the camera moved (grid, today)"}
 
 
 def depth_check(offset_m: float, sigma_m: float = 0.0005) -> DepthCheck:
@@ -96,5 +99,5 @@ def test_missing_parts_are_told_one_line_each() -> None:
 def test_what_the_file_does_not_tell_is_neither_fine_nor_doubtful() -> None:
     bare = replace(RIG, headset=None, depth_check=None, display_check=None, origins={})
     unknown = [one.what for one in report_rig(bare) if not one.is_known]
-    parts = [f"Calibration of {part}" for part in RIG_PARTS]
+    parts = [f"Calibration of the {PART_NAMES[part]}" for part in RIG_PARTS]
     assert unknown == ["Headset", "Depth check", "Display check", *parts]

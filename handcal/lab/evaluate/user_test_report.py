@@ -183,9 +183,9 @@ def _table(of: str, groups: Mapping[str, GroupErrors]) -> Table:
         Column("corners"),
         Column("mean ± SD, px"),
         Column("mean ± SD, arcmin"),
-        Column("95 % interval"),
-        Column("median (quartiles)"),
-        Column("min–max"),
+        Column("95 % interval, arcmin"),
+        Column("median (quartiles), arcmin"),
+        Column("min–max, arcmin"),
     ]
     rows = [
         [
@@ -200,7 +200,7 @@ def _table(of: str, groups: Mapping[str, GroupErrors]) -> Table:
         ]
         for name, group in groups.items()
     ]
-    return Table(columns, rows, "Interval of the mean, median, quartiles and extremes in arcmin.")
+    return Table(columns, rows, "The interval is that of the mean.")
 
 
 def _wearer_rows(shown: Mapping[str, GroupErrors]) -> Iterator[FigureRow]:

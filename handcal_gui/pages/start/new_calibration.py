@@ -116,10 +116,14 @@ class NewCalibration(Card):
 
     def show_preferences(self, preferences: Preferences) -> None:
         """Show the preferences, for the next wearer."""
-        self._form.show_settings(preferences.station)
-        self._given = self.settings
+        self.show_settings(preferences.station)
         self._wearer.setCurrentIndex(-1)
         self._wearer.clearEditText()
+
+    def show_settings(self, settings: StationSettings) -> None:
+        """Show other settings; a wearer's name that has been typed stays."""
+        self._form.show_settings(settings)
+        self._given = self.settings
 
     def show_wearers(self, names: Sequence[str]) -> None:
         """Offer the names of earlier wearers; what has been typed stays."""

@@ -15,7 +15,7 @@ from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.new_calibration import Check, NewCalibration
 from handcal_gui.pages.start.session_entries import KnownSessions, find_sessions
 from handcal_gui.pages.start.session_list import SessionList
-from handcal_gui.preferences import Preferences
+from handcal_gui.preferences import CurrentPreferences, Preferences
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
@@ -129,6 +129,11 @@ class StartPage(QWidget):
         self._recent = tuple(map(Path, preferences.sessions))
         self.new.show_preferences(preferences)
         self.look_for_sessions()
+
+    def keep_entries(self, current: CurrentPreferences) -> None:
+        """Remember the entries, also those with which nothing was started."""
+        if self.new.is_changed:
+            current.change(station=self.new.settings)
 
     def set_rig(self, path: Path) -> None:
         """Show another rig file; other entries stay as they are."""

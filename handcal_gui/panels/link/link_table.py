@@ -24,12 +24,24 @@ _OUT, _IN, _BOTH = 1, 2, 3
 _PLACES = {_OUT: (0, 1, 1), _IN: (2, 3, 1), _BOTH: (0, 1, 3)}
 """Columns of the caption and of the number, and how many the number spans."""
 _WIDEST = {_OUT: "999.9 kB/s", _IN: "999.9 kB/s", _BOTH: "−999999.999 s ± 9.9 ms"}
+_CAPTIONS = {
+    "data": tr("Data"),
+    "lost": tr("Lost"),
+    "resent": tr("Resent"),
+    "poses": tr("Poses"),
+    "in-flight": tr("In flight"),
+    "latency": tr("Latency"),
+    "failed": tr("Failed"),
+    "rejected": tr("Rejected"),
+    "clock": tr("Clock"),
+    "clock-drift": tr("Clock drift"),
+}
 _ROWS = {
-    tr("Data"): {
+    "data": {
         _OUT: tr("Kilobytes per second to the headset, over {:g} s").format(RATES_S),
         _IN: tr("Kilobytes per second from the headset, over {:g} s").format(RATES_S),
     },
-    tr("Lost"): {
+    "lost": {
         _OUT: tr("Share of the datagrams to the headset that did not arrive, over {:g} s").format(
             RATES_S
         ),
@@ -37,27 +49,25 @@ _ROWS = {
             RATES_S
         ),
     },
-    tr("Resent"): {
+    "resent": {
         _OUT: tr("Fragments of messages retransmitted because they were not acknowledged in time")
     },
-    tr("Poses"): {_IN: tr("Poses received from the headset per second")},
-    tr("In flight"): {_OUT: tr("Messages that the headset has not acknowledged yet")},
-    tr("Latency"): {
-        _IN: tr("Half the median time of a round trip to the headset, in milliseconds")
-    },
-    tr("Failed"): {_OUT: tr("Messages that the headset did not acknowledge in time")},
-    tr("Rejected"): {_IN: tr("Datagrams that were not accepted, for the reasons below")},
-    tr("Clock"): {
+    "poses": {_IN: tr("Poses received from the headset per second")},
+    "in-flight": {_OUT: tr("Messages that the headset has not acknowledged yet")},
+    "latency": {_IN: tr("Half the median time of a round trip to the headset, in milliseconds")},
+    "failed": {_OUT: tr("Messages that the headset did not acknowledge in time")},
+    "rejected": {_IN: tr("Datagrams that were not accepted, for the reasons below")},
+    "clock": {
         _BOTH: tr(
             "Headset's clock minus this computer's, in seconds, and its uncertainty, "
             "in milliseconds"
         )
     },
-    tr("Clock drift"): {
+    "clock-drift": {
         _BOTH: tr("Drift of the headset's clock, in parts per million; positive is fast")
     },
 }
-"""Captions, and what the numbers mean by half."""
+"""Meaning of the numbers of each row, by half."""
 REJECTIONS = {
     Rejection.UNPAIRED: tr("Signed with another pairing key: enter the key above in the headset"),
     Rejection.CORRUPT: tr("Damaged in transit, or not meant for handcal"),
@@ -87,12 +97,14 @@ class LinkTable(QWidget):
             self._grid.addWidget(QLabel(heading), 0, number, Qt.AlignmentFlag.AlignRight)
         self._rows = dict.fromkeys((_OUT, _IN), 1)  # the next free ones
         self._numbers = {
-            (caption, half): self._add_number(caption, half, meaning)[1]
-            for caption, meanings in _ROWS.items()
+            (name, half): self._add_number(name, _CAPTIONS[name], half, meaning)[1]
+            for name, meanings in _ROWS.items()
             for half, meaning in meanings.items()
         }
         self._rejections = {
-            reason: self._add_number(f"    {reason.replace('_', ' ')}", _IN, meaning)
+            reason: self._add_number(
+                reason.replace("_", "-"), f"    {reason.replace('_', ' ')}", _IN, meaning
+            )
             for reason, meaning in REJECTIONS.items()
         }
         self._show_rejections({})
@@ -110,15 +122,16 @@ class LinkTable(QWidget):
             caption.setVisible(count > 0)
             number.setVisible(count > 0)
 
-    def _add_number(self, text: str, half: int, meaning: str) -> tuple[QLabel, NumberLabel]:
+    def _add_number(
+        self, name: str, text: str, half: int, meaning: str
+    ) -> tuple[QLabel, NumberLabel]:
         """Append a number to a half; return its caption, and the number."""
         row = max(self._rows.values()) if half == _BOTH else self._rows[half]
         self._rows |= {one: row + 1 for one in self._rows if half in (one, _BOTH)}
         caption = ElidedLabel()
         caption.setText(text)
         caption.setToolTip(f"{text.strip()}: {meaning}")
-        name = f"link-{text.strip().lower().replace(' ', '-')}-{half}"
-        number = NumberLabel(name, _WIDEST[half], meaning)
+        number = NumberLabel(f"link-{name}-{half}", _WIDEST[half], meaning)
         caption_column, number_column, columns = _PLACES[half]
         self._grid.addWidget(caption, row, caption_column)
         self._grid.addWidget(number, row, number_column, 1, columns)
@@ -126,24 +139,24 @@ class LinkTable(QWidget):
 
 
 def _texts(link: LinkStatistics, rates: LinkRates | None) -> dict[tuple[str, int], str]:
-    """Return the texts of the numbers above, by caption and half."""
+    """Return the texts of the numbers above, by name and half."""
     drift_ppm = link.clock_drift_ppm
     texts = {
-        (tr("Latency"), _IN): _text(link.latency_ms, "ms"),
-        (tr("Clock"), _BOTH): _clock(link),
-        (tr("Clock drift"), _BOTH): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
-        (tr("Poses"), _IN): _text(link.pose_rate_hz, "Hz"),
-        (tr("Resent"), _OUT): str(link.resent),
-        (tr("In flight"), _OUT): str(link.unacked),
-        (tr("Failed"), _OUT): str(link.failed),
-        (tr("Rejected"), _IN): str(sum(link.rejected.values())),
+        ("latency", _IN): _text(link.latency_ms, "ms"),
+        ("clock", _BOTH): _clock(link),
+        ("clock-drift", _BOTH): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
+        ("poses", _IN): _text(link.pose_rate_hz, "Hz"),
+        ("resent", _OUT): str(link.resent),
+        ("in-flight", _OUT): str(link.unacked),
+        ("failed", _OUT): str(link.failed),
+        ("rejected", _IN): str(sum(link.rejected.values())),
     }
     if rates is not None:
         texts |= {
-            (tr("Data"), _OUT): _text(rates.sent_bytes_s / 1e3, "kB/s"),
-            (tr("Data"), _IN): _text(rates.received_bytes_s / 1e3, "kB/s"),
-            (tr("Lost"), _OUT): _text(rates.lost, "%", 100.0),
-            (tr("Lost"), _IN): _text(rates.lost_inbound, "%", 100.0),
+            ("data", _OUT): _text(rates.sent_bytes_s / 1e3, "kB/s"),
+            ("data", _IN): _text(rates.received_bytes_s / 1e3, "kB/s"),
+            ("lost", _OUT): _text(rates.lost, "%", 100.0),
+            ("lost", _IN): _text(rates.lost_inbound, "%", 100.0),
         }
     return texts
 

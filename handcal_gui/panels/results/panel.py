@@ -78,7 +78,12 @@ class ResultsPanel(QWidget):
             self.show_results(procedure.results, record.alignments, record.rig)
 
     def show_results(
-        self, results: Results | None, alignments: Mapping[int, Alignment], rig: Rig
+        self,
+        results: Results | None,
+        alignments: Mapping[int, Alignment],
+        rig: Rig,
+        *,
+        has_verdicts: bool = True,
     ) -> None:
         """Show results, or a hint if there are none.
 
@@ -89,6 +94,8 @@ class ResultsPanel(QWidget):
             By number. A solved alignment that is missing here has no residual map, such as one
             that could not be written to a full disk.
         rig : Rig
+        has_verdicts : bool
+            False if the page beside the panel shows the verdicts.
         """
         self._results = results
         self._copy.setEnabled(results is not None)
@@ -97,6 +104,7 @@ class ResultsPanel(QWidget):
             return
         for eye, card in self._cards.items():
             card.show_verdict(results.verdicts.get(eye))
+            card.setVisible(has_verdicts)
         eyes = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(eyes, result_rows(results, rig))
         self._convergence.show_results(results)

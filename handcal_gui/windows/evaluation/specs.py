@@ -113,6 +113,9 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
 
 
 def _missing_captures(entries: CubeEntries) -> str:
+    for file in filter(None, (entries.cube, entries.camera, entries.rig)):
+        if not Path(file).expanduser().is_file():
+            return tr("there is no file {}: choose another, or leave the field empty").format(file)
     if not entries.captures:
         return ""
     folder = Path(entries.captures).expanduser()
@@ -123,11 +126,20 @@ def _missing_captures(entries: CubeEntries) -> str:
 
 
 def _missing_sessions(entries: UserEntries) -> str:
-    return "" if entries.sessions else tr("choose a session, or a folder of sessions")
+    return _missing_folder(entries.sessions, tr("choose a session, or a folder of sessions"))
 
 
 def _missing_frames(entries: SegmentationTestSettings) -> str:
-    return "" if entries.folder else tr("choose a folder of frames with true masks")
+    return _missing_folder(entries.folder, tr("choose a folder of frames with true masks"))
+
+
+def _missing_folder(folder: str, request: str) -> str:
+    """Return a request to choose a folder; empty if there is the one entered."""
+    if not folder:
+        return request
+    if not Path(folder).expanduser().is_dir():
+        return tr("there is no folder {}: {}").format(folder, request)
+    return ""
 
 
 def _noise_form() -> EntriesForm:

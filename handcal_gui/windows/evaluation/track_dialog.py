@@ -21,7 +21,7 @@ from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice
+from handcal_gui.widgets.fields import button, choice, main_button
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.job_bar import JobBar
@@ -85,9 +85,10 @@ class TrackDialog(PreparationDialog):
         self._view.show_text(message=tr("No image yet"))
         self._pose = NumberTable("pose-of-the-cube", tr("Pose of the cube"))
         self._pose.setMinimumWidth(44 * SPACING_PX)
+        self._pose.hide()
         self._found = FindingLine("track")
         self._bar = JobBar(tr("Stop"))
-        self._start = button("start", tr("Start"))
+        self._start = main_button("start", tr("Start"))
         self._close = button("close", tr("Close"))
         self._timer = QTimer(self, interval=_POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -114,7 +115,7 @@ class TrackDialog(PreparationDialog):
         self._sight = self._shown = None
         self._view.show_image(None)
         self._view.show_text(message=tr("No image yet"))
-        self._pose.show_rows(_AXES, ())
+        self._pose.hide()
         doing = tr("Waiting for the headset") if by == "network" else tr("Opening the camera")
         self._bar.run(doing, work, lambda _: self._refresh())
 
@@ -137,6 +138,7 @@ class TrackDialog(PreparationDialog):
         self._view.show_image(sight.frame.color)
         self._view.show_overlay(partial(_draw_edges, sight.corners_px))
         self._pose.show_rows(_AXES, _pose_rows(sight))
+        self._pose.show()
         self._found.show_finding(_finding(sight))
 
     def _show_failure(self, why: str) -> None:

@@ -164,6 +164,7 @@ class TrialsDialog(PreparationDialog):
         self._next.setMinimumWidth(self._next.sizeHint().width())
         self._close = button("close", tr("Close"))
         self._table = NumberTable("trials-recorded", tr("Trials recorded"))
+        self._table.hide()
         self._moves = {
             name: button(name, text, help_text=tr("{} ({:g} mm of φ)").format(text, 1e3 * STEP_M))
             for name, (text, *_) in _MOVES.items()
@@ -196,7 +197,7 @@ class TrialsDialog(PreparationDialog):
             self._desk = desk = _Desk(self.told.emit, progress)
             return self._record(order, connect, depth_camera, desk.leader, progress)
 
-        self._table.show_rows(("px", "′"), ())
+        self._table.hide()
         self._bar.run(tr("Waiting for the headset"), work, self._show_trials)
 
     def done(self, result: int) -> None:
@@ -229,6 +230,7 @@ class TrialsDialog(PreparationDialog):
                 for trial in trials
             ],
         )
+        self._table.show()
         self._found.show_finding(
             Finding("", Health.GOOD, tr("trials stored: {}").format(len(trials)))
         )

@@ -61,6 +61,7 @@ class AcceptDialog(QDialog):
         self._counts = {eye: QLabel() for eye in EYES}
         self._found = FindingLine("accepted")
         self._table = NumberTable("drawn-against-seen", tr("Drawn and seen corners"))
+        self._table.hide()
         self._bar = JobBar()
         self._run = main_button("runAcceptance", tr("Accept"))
         self._open = button("openPage", tr("Open page"))
@@ -74,7 +75,13 @@ class AcceptDialog(QDialog):
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
         self._refresh()
-        self._found.show_finding(Finding("", Health.LIMITED, tr("not accepted yet")))
+        self._found.show_finding(
+            Finding(
+                "",
+                Health.LIMITED,
+                tr("not accepted yet: take images of the grid for one eye at least"),
+            )
+        )
 
     def run(self) -> None:
         """Evaluate the eyes that have images."""
@@ -142,6 +149,7 @@ class AcceptDialog(QDialog):
             for depth_m, *numbers in view_rows(one)
         ]
         self._table.show_rows(_COLUMNS, rows)
+        self._table.show()
         if found.cause:
             finding = Finding("", Health.BROKEN, tr("the rig fails: {}").format(found.cause))
         else:

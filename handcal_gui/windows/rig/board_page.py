@@ -20,12 +20,12 @@ from handcal.io.images import write_png
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
 from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.print_page import Paper
+from handcal.rig_types import PART_NAMES
 from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (
     button,
     choice,
@@ -87,7 +87,7 @@ class BoardPage(QWidget):
             "savePicture", tr("Save image…"), help_text=tr("PNG, to show on a screen")
         )
         self._begin = button("begin", tr("Use another initial rig…"))
-        self._rig = ElidedLabel()
+        self._rig, self._state = paragraph("initialRig"), paragraph("initialRigState")
         self._found = FindingLine("board")
         self._preview = ImageView(tr("Preview of the board"))
         self._draw = LatestJob(_draw, self)
@@ -198,15 +198,16 @@ class BoardPage(QWidget):
 
     def _show_rig(self) -> None:
         rig = self._project.rig
-        calibrated = tr("calibrated: {}").format(", ".join(rig.origins))
-        state = calibrated if rig.origins else tr("not calibrated yet")
-        self._rig.setText(f"{rig.name} ({state})")
+        parts = ", ".join(PART_NAMES[part] for part in rig.origins)
+        self._rig.setText(rig.name)
+        self._state.setText(
+            tr("Calibrated: {}.").format(parts) if parts else tr("Not calibrated yet.")
+        )
 
     def _lay_out(self) -> None:
-        squares, paper, rig = QWidget(), QWidget(), QWidget()
+        squares, paper = QWidget(), QWidget()
         fill_row(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
         fill_row(paper, self._paper, self._pdf, self._picture, grows=self._picture)
-        fill_row(rig, self._rig, self._begin, grows=self._rig)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
@@ -230,7 +231,8 @@ class BoardPage(QWidget):
                 )
             )
         )
-        left.addWidget(rig)
+        left.addWidget(self._rig)
+        left.addLayout(hbox((self._state, 1), self._begin, spacing=SPACING_PX))
         left.addStretch(1)
         hbox((left, 1), (self._preview, 1), on=self, margins=0, spacing=3 * SPACING_PX)
 

@@ -54,13 +54,26 @@ class DisplayPage(StepPage):
             tr("Distance of the virtual screen"),
             _DISTANCES,
             tr(
-                "z(C0→S): measured, for example by the camera's focus, or solved from the angle "
-                "that a square subtends at the nominal distance."
+                "Distance of the virtual screen from the eye, z(C0→S): measured, for example by "
+                "the camera's focus, or solved from the angle that a square subtends at the "
+                "nominal distance."
             ),
         )
-        distance_m = number("distanceM", 0.1, 100.0, 0.01, " m", tr("Measured z(C0→S)."))
+        distance_m = number(
+            "distanceM",
+            0.1,
+            100.0,
+            0.01,
+            " m",
+            tr("Measured distance of the virtual screen, in metres."),
+        )
         arcmin = number(
-            "arcmin", 1.0, 1e4, 0.1, "′", tr("Angle that a square of the grid subtends.")
+            "arcmin",
+            1.0,
+            1e4,
+            0.1,
+            "′",
+            tr("Angle that a square of the grid subtends, in arcminutes."),
         )
         nominal = number(
             "nominal",
@@ -68,7 +81,7 @@ class DisplayPage(StepPage):
             100.0,
             0.01,
             " m",
-            tr("Nominal distance for this angle, from the manufacturer."),
+            tr("Nominal distance for this angle, from the manufacturer, in metres."),
         )
         square = whole_number(
             "gridSquare", 20, 2000, tr("Side length of the grid's squares, in pixels.")
@@ -81,7 +94,10 @@ class DisplayPage(StepPage):
             ).format('{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}')
         )
         stereo = PathField(
-            tr("Stereo calibration"), "file", tr("Stereo calibrations (*.json)"), tr("Not needed")
+            tr("Stereo calibration"),
+            "file",
+            tr("Stereo calibrations (*.json)"),
+            tr("Instead of the images of the board"),
         )
         stereo.setToolTip(
             tr(
@@ -93,9 +109,9 @@ class DisplayPage(StepPage):
         view = PathField(tr("Rendering camera"), "file", files, tr("As in the rig"))
         view.setToolTip(
             tr(
-                "T_V_H, from the headset rig to this eye's rendering camera, as the headset "
-                "reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, "
-                "that of the initial rig is used."
+                "Pose of this eye's rendering camera relative to the headset, T_V_H, as the "
+                "headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. "
+                "If empty, that of the initial rig is used."
             )
         )
         form = EntriesForm(
@@ -106,13 +122,13 @@ class DisplayPage(StepPage):
                     tr("Images of the board"),
                     PathField(tr("Board images"), "folder"),
                 ),
-                "tracked": (tr("Board poses"), tracked),
-                "stereo": (tr("or a stereo calibration"), stereo),
-                "view": (tr("Rendering camera T_V_H"), view),
-                "distance": (tr("Distance z(C0→S)"), distance),
-                "distance_m": (tr("measured"), distance_m),
+                "tracked": (tr("Poses of the board"), tracked),
+                "stereo": (tr("Stereo calibration"), stereo),
+                "view": (tr("Rendering camera's pose"), view),
+                "distance": (tr("Screen's distance"), distance),
+                "distance_m": (tr("Measured distance"), distance_m),
                 "square_arcmin": (tr("Angle of a square"), arcmin),
-                "nominal_m": (tr("at nominal distance"), nominal),
+                "nominal_m": (tr("Nominal distance"), nominal),
             }
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QIcon, QPixmap
 from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
 
 from handcal.rig.report import RigFinding
-from handcal_gui.theme import colors, flat_header, follow_theme, icon
+from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.translation import tr
 
 
@@ -26,6 +28,7 @@ class FindingList(QTreeWidget):
         self.setAccessibleName(name)
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
+        self.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self.setHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
         flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
@@ -42,11 +45,13 @@ class FindingList(QTreeWidget):
     def _refresh(self) -> None:
         self.clear()
         good, doubtful = icon("check", colors().good), icon("warning", colors().warning)
+        blank = QPixmap(self.iconSize())  # or the texts of rows without an icon stand apart
+        blank.fill(Qt.GlobalColor.transparent)
         for one in self._findings:
             expected = "" if one.is_fine else one.expected
             item = QTreeWidgetItem([one.what, one.found, expected])
-            if one.is_known:
-                item.setIcon(0, good if one.is_fine else doubtful)
+            known = good if one.is_fine else doubtful
+            item.setIcon(0, known if one.is_known else QIcon(blank))
             for column in range(3):
                 item.setToolTip(column, item.text(column))
             self.addTopLevelItem(item)

@@ -21,7 +21,7 @@ from handcal.errors import FileError, HandcalError
 from handcal.rig.check import MAX_TEXT
 from handcal.rig.report import report_rig
 from handcal.rig.rig_file import read_rig, write_rig
-from handcal.rig_types import RIG_PARTS
+from handcal.rig_types import PART_NAMES, RIG_PARTS
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
@@ -91,7 +91,9 @@ class ResultPage(QWidget):
         if not doubtful:
             text = tr("no doubtful findings")
         if missing:
-            text += tr("; still as in the initial rig: {}").format(", ".join(missing))
+            text += tr("; not calibrated here, as in the initial rig: {}").format(
+                ", ".join(PART_NAMES[part] for part in missing)
+            )
         health = Health.LIMITED if doubtful or missing else Health.GOOD
         self._end.show_finding(Finding("", health, text))
         self._saved = None

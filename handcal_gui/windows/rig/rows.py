@@ -20,11 +20,27 @@ from handcal_gui.widgets.number_table import Row
 
 COLUMNS = (tr("Value"), "± σ")
 _LENSES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_INTRINSICS = {
+    "fx": tr("Focal length fx"),
+    "fy": tr("Focal length fy"),
+    "cx": tr("Centre cx"),
+    "cy": tr("Centre cy"),
+}
 _SIDES: dict[Eye, str] = {"left": tr("Left"), "right": tr("Right")}
-_TURN = tr("Rotation vector of the depth camera in the headset camera: axis times angle.")
-_SHIFT = tr("Position of the depth camera in the headset camera: x right, y down, z forward.")
-_T_C0_V = tr("From the headset's rendering camera V to the offline viewpoint C0, in the axes of V.")
-_Z_C0_S = tr("Distance of the virtual screen S from the offline viewpoint C0.")
+_TURN = tr(
+    "Rotation of the depth camera relative to the headset's camera, from T_H_D: axis times angle."
+)
+_SHIFT = tr(
+    "Position of the depth camera relative to the headset's camera, from T_H_D: x right, y down, "
+    "z forward."
+)
+_T_C0_V = tr(
+    "Position of the headset's rendering camera relative to the viewpoint of the offline "
+    "calibration, t(C0→V): x right, y down, z forward."
+)
+_Z_C0_S = tr(
+    "Distance of the virtual screen from the viewpoint of the offline calibration, z(C0→S)."
+)
 
 
 def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
@@ -34,10 +50,17 @@ def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
     values = (solved.fx, solved.fy, solved.cx, solved.cy)
     rows = [
         _row(name, value, sigma, "px", 2, tr("In pixels; σ from the residuals."))
-        for name, value, sigma in zip(("fx", "fy", "cx", "cy"), values, sigmas, strict=False)
+        for name, value, sigma in zip(_INTRINSICS.values(), values, sigmas, strict=False)
     ]
     rows += [
-        _row(name, value, sigma, "", 5, tr("Distortion coefficient of OpenCV's model."))
+        _row(
+            tr("Distortion {}").format(name),
+            value,
+            sigma,
+            "",
+            5,
+            tr("Distortion coefficient of OpenCV's model."),
+        )
         for name, value, sigma in zip(_LENSES, solved.distortion, sigmas[4:], strict=False)
     ]
     rows.append(
@@ -76,7 +99,9 @@ def display_rows(result: DisplayCalibration) -> tuple[Row, ...]:
         ),
         *_display_rows(display.t_C0_V_m, display.z_C0_S_m, sigmas),
         Row(
-            "f", (f"{display.K[0, 0]:.1f} px", ""), tr("Focal length of K, on the display's axis.")
+            tr("Focal length"),
+            (f"{display.K[0, 0]:.1f} px", ""),
+            tr("Focal length of K, on the display's axis."),
         ),
         Row(
             tr("Rotation"),
@@ -106,18 +131,19 @@ def _rig_rows(rig: Rig) -> Iterator[Row]:
         for row in _display_rows(display.t_C0_V_m, display.z_C0_S_m, sigmas):
             yield Row(f"{_SIDES[eye]}: {row.label}", row.cells, row.tooltip)
         yield Row(
-            f"{_SIDES[eye]}: f",
+            f"{_SIDES[eye]}: {tr('Focal length')}",
             (f"{display.K[0, 0]:.1f} px", UNKNOWN),
             tr("Focal length of K, on the display's axis."),
         )
     origin = rig.origins.get("T_H_D")
     sigmas = _sigmas(origin.covariance if origin else None, len(STEREO_PARAMETERS))
-    yield from _place_rows(rig.T_H_D, sigmas)
+    for row in _place_rows(rig.T_H_D, sigmas):
+        yield Row(tr("Depth camera: {}").format(row.label), row.cells, row.tooltip)
     camera = rig.depth_intrinsics
-    for name in ("fx", "fy", "cx", "cy"):
+    for name, label in _INTRINSICS.items():
         value = f"{getattr(camera, name):.2f} px"
         yield Row(
-            tr("Depth camera: {}").format(name),
+            tr("Depth camera: {}").format(label),
             (value, UNKNOWN),
             tr("From the depth camera's intrinsics."),
         )
@@ -125,16 +151,18 @@ def _rig_rows(rig: Rig) -> Iterator[Row]:
 
 def _display_rows(t_C0_V_m: Float64, z_C0_S_m: float, sigmas: Sequence[float]) -> Iterator[Row]:
     for axis, value, sigma in zip("xyz", t_C0_V_m, sigmas, strict=False):
-        yield _row(f"t(C0→V) {axis}", 1e3 * value, 1e3 * sigma, "mm", 2, _T_C0_V)
-    yield _row("z(C0→S)", z_C0_S_m, sigmas[3], "m", 3, _Z_C0_S)
+        yield _row(
+            tr("Rendering camera {}").format(axis), 1e3 * value, 1e3 * sigma, "mm", 2, _T_C0_V
+        )
+    yield _row(tr("Screen's distance"), z_C0_S_m, sigmas[3], "m", 3, _Z_C0_S)
 
 
 def _place_rows(T_H_D: Float64, sigmas: Sequence[float]) -> Iterator[Row]:
     turn_deg = np.degrees(Rotation.from_matrix(T_H_D[:3, :3]).as_rotvec())
     for axis, value, sigma in zip("xyz", turn_deg, np.degrees(sigmas[:3]), strict=True):
-        yield _row(tr("T_H_D rotation {}").format(axis), value, sigma, "°", 3, _TURN)
+        yield _row(tr("Rotation {}").format(axis), value, sigma, "°", 3, _TURN)
     for axis, value, sigma in zip("xyz", T_H_D[:3, 3], sigmas[3:], strict=True):
-        yield _row(f"T_H_D {axis}", 1e3 * value, 1e3 * sigma, "mm", 2, _SHIFT)
+        yield _row(tr("Position {}").format(axis), 1e3 * value, 1e3 * sigma, "mm", 2, _SHIFT)
 
 
 def _sigmas(covariance: Float64 | None, count: int) -> list[float]:

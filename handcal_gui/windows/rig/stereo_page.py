@@ -51,7 +51,7 @@ class StereoPage(StepPage):
                     PathField(tr("Depth images"), "folder"),
                 ),
                 "depth_intrinsics": (
-                    tr("its intrinsics"),
+                    tr("Its intrinsics"),
                     intrinsics_field(tr("Depth intrinsics")),
                 ),
                 "imager_intrinsics": (tr("Depth imager's intrinsics"), imager),
@@ -61,7 +61,7 @@ class StereoPage(StepPage):
                     PathField(tr("Headset images"), "folder"),
                 ),
                 "headset_intrinsics": (
-                    tr("its intrinsics"),
+                    tr("Its intrinsics"),
                     intrinsics_field(tr("Headset intrinsics")),
                 ),
                 "depth_to_color": (tr("Pose from depth to colour"), pose),

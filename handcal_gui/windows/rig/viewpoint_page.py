@@ -36,7 +36,7 @@ class ViewpointPage(StepPage):
                     PathField(tr("Viewpoint images"), "folder"),
                 ),
                 "lens": (tr("Lens"), lens_field()),
-                "intrinsics": (tr("or its intrinsics"), given),
+                "intrinsics": (tr("Its intrinsics"), given),
             }
         )
         form.show_entries(project.inputs.viewpoint)

@@ -8,7 +8,6 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QDialog,
-    QHBoxLayout,
     QLabel,
     QListWidget,
     QListWidgetItem,
@@ -21,7 +20,7 @@ from handcal.rig_types import RIG_PARTS, RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.fields import button, with_name
+from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
@@ -38,13 +37,31 @@ _BOARD, _VIEWPOINT = tr("Board"), tr("Viewpoint camera")
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
     _BOARD: (tr("Print the board at 100 %, measure a square and enter its size."), None),
     tr("Depth and headset camera"): (
-        tr("Pose of the depth camera on the headset: T_H_D."),
+        tr(
+            "Take images of the board with both cameras, and solve where the depth camera is on "
+            "the headset."
+        ),
         "T_H_D",
     ),
-    _VIEWPOINT: (tr("The camera in the position of the wearer's eye."), None),
-    tr("Left display"): (tr("Projection and position of the left eye's display."), "left"),
-    tr("Right display"): (tr("Projection and position of the right eye's display."), "right"),
-    tr("Result"): (tr("The whole rig: check, compare and save it."), None),
+    _VIEWPOINT: (
+        tr(
+            "Take images of the board with the camera that later takes the eye's place, and solve "
+            "its lens."
+        ),
+        None,
+    ),
+    tr("Left display"): (
+        tr(
+            "Put the viewpoint camera behind the left display, take images of its grid and of the "
+            "board, and solve."
+        ),
+        "left",
+    ),
+    tr("Right display"): (
+        tr("The same behind the right display: images of its grid and of the board, and solve."),
+        "right",
+    ),
+    tr("Result"): (tr("Name the rig, look at what is doubtful, save it, and use it."), None),
 }
 """By title: the step's purpose, and the part of the rig that it calibrates."""
 
@@ -90,7 +107,7 @@ class RigWizard(QDialog):
         self.project = RigProject(folder, realsense or RealSenseSettings(), self)
         self._banner = Banner()
         self._rail = with_name(QListWidget(), "rigRail", tr("Steps"))
-        self._title, self._purpose = QLabel(), QLabel()
+        self._title, self._purpose = QLabel(), paragraph("rigPurpose")
         self._stack = QStackedWidget()
         result = ResultPage(self.project)
         self._pages: list[RigPage] = []
@@ -188,11 +205,7 @@ class RigWizard(QDialog):
         self._rail.setSpacing(SPACING_PX // 2)
         self._rail.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self._rail.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        head = QHBoxLayout()
-        head.setSpacing(2 * SPACING_PX)
-        head.addWidget(self._title)
-        head.addWidget(self._purpose, 1, Qt.AlignmentFlag.AlignBottom)
         foot = hbox(1, self._back, self._next, self._close, spacing=SPACING_PX)
-        right = vbox(head, (self._stack, 1), foot, spacing=SPACING_PX)
+        right = vbox(self._title, self._purpose, (self._stack, 1), foot, spacing=SPACING_PX)
         row = hbox(self._rail, (right, 1), spacing=2 * SPACING_PX)
         vbox(self._banner, (row, 1), on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)

@@ -19,6 +19,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.solve_again import stored_solve_settings
 from handcal_gui.control.review import _Stored
 from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
@@ -108,6 +109,9 @@ def test_a_session_is_shown_and_closed_again(
     card = child(program, ReviewPage, "reviewPage").findChild(QLabel, "card-verdict-left")
     assert isinstance(card, QLabel)
     assert card.text().startswith("Left eye: ")
+    cards = program.window.panels.results.findChildren(VerdictCard)
+    assert cards
+    assert all(one.isHidden() for one in cards), "the page says it"
     assert program.preferences.sessions == (str(record.path),)
     child(program, QPushButton, "reviewClose").click()
     assert program.window.page == "start"

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QSpinBox
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QLabel,
+    QScrollArea,
+    QSpinBox,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.bridge.bridges import BridgeSettings
@@ -13,6 +22,7 @@ from handcal.station.settings import StationSettings
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.preferences import Preferences
 from handcal_gui.widgets.path_field import PathField
+from tests.gui.helpers import child, show
 
 BEFORE = Preferences(
     station=StationSettings(source="realsense", port=50_000, sessions="/a"),
@@ -73,3 +83,23 @@ def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
     assert replace(after, theme="light", station=station, bridges=BEFORE.bridges) == BEFORE
     folder.set_path("")  # no folder is no choice
     assert dialog.preferences().station.sessions == "/a"
+
+
+def test_every_field_is_explained_in_sight_on_a_small_screen(qtbot: QtBot) -> None:
+    dialog = PreferencesDialog(BEFORE)
+    qtbot.addWidget(dialog)
+    size = dialog.size()
+    assert size == size.boundedTo(QSize(960, 480))
+    show(qtbot, dialog, size.width(), size.height())
+    texts = [one for one in dialog.findChildren(QLabel) if one.text()]
+    assert all(one.width() >= one.sizeHint().width() for one in texts), "cut off"
+    assert not child(dialog, QScrollArea).verticalScrollBar().isVisible()
+    for name in ("guard", "gateNear", "roi", "method", "target", "learnPrior", "slicer", "lsl"):
+        field = child(dialog, QWidget, name)
+        assert field.toolTip()
+        rows = [one for one in texts if abs(_middle(one, dialog) - _middle(field, dialog)) < 8]
+        assert len(rows) == 2, f"{name}: its label, and what it means"
+
+
+def _middle(widget: QWidget, dialog: QWidget) -> int:
+    return widget.mapTo(dialog, widget.rect().center()).y()

@@ -8,13 +8,16 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QByteArray
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtWidgets import QComboBox, QMainWindow, QSpinBox
 from pytestqt.qtbot import QtBot
 
 from handcal.station.settings import StationSettings
+from handcal_gui import separate_windows
+from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.window import MainWindow
+from tests.gui.helpers import child
 
 
 def test_layouts_are_restored_before_the_window_is_maximized(
@@ -48,6 +51,38 @@ def test_settings_for_one_run_are_not_remembered(qtbot: QtBot, tmp_path: Path) -
     program = Program(file)
     qtbot.addWidget(program.window)
     for_once = replace(program.preferences.station, seed=7)  # as by --seed 7
-    program.start.show_preferences(replace(program.preferences, station=for_once))
+    program.use_for_one_run(for_once)
+    program.show_start()
+    assert program.start.new.settings.seed == 7
     program.close()
     assert file.load()[0].station.seed == 1
+
+
+def test_the_preferences_keep_what_is_typed_and_the_settings_of_one_run(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def use_dark_theme(dialog: PreferencesDialog) -> bool:
+        theme = child(dialog, QComboBox, "theme")
+        theme.setCurrentIndex(theme.findData("dark"))
+        return True
+
+    monkeypatch.setattr(PreferencesDialog, "exec", use_dark_theme)
+    monkeypatch.setattr(separate_windows, "use_theme", lambda _theme: None)
+    file = PreferencesFile(tmp_path / "preferences.json")
+    file.save(Preferences(station=StationSettings(seed=1)))
+    program = Program(file)
+    qtbot.addWidget(program.window)
+    program.use_for_one_run(replace(program.preferences.station, seed=7))
+    wearer = child(program.start, QComboBox, "wearer")
+    wearer.setEditText("P 07")
+    program.start.set_rig(tmp_path / "rig.yaml")
+    program.windows.edit_preferences()
+    shown = program.start.new.settings
+    assert (shown.seed, shown.rig) == (7, str(tmp_path / "rig.yaml"))
+    assert wearer.currentText() == "P 07"
+    stored = file.load()[0]
+    assert (stored.theme, stored.station.seed) == ("dark", 1)
+    assert stored.station.rig == str(tmp_path / "rig.yaml")
+    child(program.start, QSpinBox, "seed").setValue(8)
+    program.close()
+    assert file.load()[0].station.seed == 8

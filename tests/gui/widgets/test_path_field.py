@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.path_field import PathField
+from tests.gui.helpers import child, show
 
 
 def test_a_file_or_a_folder_is_chosen_in_a_dialog(
@@ -58,3 +60,25 @@ def test_blanks_around_a_typed_path_do_not_count(qtbot: QtBot) -> None:
     with qtbot.waitSignal(field.changed):
         line.setText("  /a b ")
     assert field.path == "/a b"
+
+
+def test_a_path_that_does_not_fit_shows_beginning_and_end(qtbot: QtBot) -> None:
+    def picture(path: str) -> QImage:
+        field.set_path(path)
+        return field.grab().toImage()
+
+    field = PathField("Rig file", "file", empty="Example")
+    field.setToolTip("Of this headset")
+    show(qtbot, field, 320, 40).setFocus()
+    line = child(field, QLineEdit)
+    line.clearFocus()
+    middle = 100 * "m"
+    path = f"/begin/{middle}/end"
+    shown = picture(path)
+    assert shown == picture(f"/begin/{middle}m/end"), "the middle is left out"
+    assert shown != picture(f"/other/{middle}/end")
+    assert shown != picture(f"/begin/{middle}/other")
+    field.set_path(path)
+    assert line.toolTip() == f"{path}\nOf this headset"
+    field.set_path("")
+    assert line.toolTip() == "Of this headset"

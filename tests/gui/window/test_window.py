@@ -8,6 +8,7 @@ from typing import Literal
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QScrollArea, QTabBar, QToolButton
 from pytestqt.qtbot import QtBot
@@ -17,7 +18,7 @@ from handcal.station.states import State
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.result_card import ResultCard
-from handcal_gui.window import MainWindow
+from handcal_gui.window import MainWindow, Page
 from tests.gui.views import all_views
 from tests.gui.window.conftest import Maker, main_button, press, say
 
@@ -37,6 +38,17 @@ def test_every_page_has_its_docks(window: MainWindow) -> None:
     assert not window.docks["camera"].toggleViewAction().isEnabled()
     window.show_page("start")
     assert shown(window) == set()
+
+
+def test_only_panels_of_the_page_are_offered_to_go_to(window: MainWindow) -> None:
+    actions = {one.text(): one for one in window.findChildren(QAction)}
+    pages: tuple[Page, ...] = ("start", "review", "live")
+    for page in pages:
+        window.show_page(page)
+        assert actions["Camera"].isEnabled() == (page == "live")
+        assert actions["Results"].isEnabled() == (page != "start")
+    window.use_arrangement("station")
+    assert not actions["Results"].isEnabled()
 
 
 def test_a_dock_closed_stays_closed_on_its_page_until_the_layout_is_reset(

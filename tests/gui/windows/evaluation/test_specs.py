@@ -59,6 +59,10 @@ def test_studies_are_those_of_the_commands() -> None:
 def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
     entries = UserEntries(str(tmp_path / "none"), str(tmp_path / "results"))
     evaluation = make_specs()["users"].evaluation
+    readiness = evaluation.readiness(entries)
+    assert not readiness.can_run
+    assert readiness.finding.found.startswith(f"there is no folder {tmp_path / 'none'}: choose")
+    (tmp_path / "none").mkdir()
     assert evaluation.readiness(entries).can_run
     with pytest.raises(FileError, match=r"no trial .*none"):
         evaluation.run(entries, Progress())
@@ -76,6 +80,8 @@ def test_frames_are_chosen_before_the_segmentation_is_tested(tmp_path: Path) -> 
     entries = SegmentationTestSettings("", output=str(tmp_path / "results"))
     assert not evaluation.readiness(entries).can_run
     entries = replace(entries, folder=str(tmp_path / "none"))
+    assert "there is no folder" in evaluation.readiness(entries).finding.found
+    (tmp_path / "none").mkdir()
     assert evaluation.readiness(entries).can_run
     with pytest.raises(FileError, match=r"meta\.json"):
         evaluation.run(entries, Progress())
@@ -87,6 +93,9 @@ def test_a_cube_test_is_run_once_there_are_captures_to_look_at(tmp_path: Path) -
     entries = CubeEntries(output=str(tmp_path / "results"))
     assert spec.evaluation.readiness(entries).can_run
     assert not capture.is_possible(entries)
+    absent = spec.evaluation.readiness(replace(entries, rig=str(tmp_path / "rig.yaml")))
+    assert not absent.can_run
+    assert "there is no file" in absent.finding.found
     entries = replace(entries, captures=str(tmp_path / "captures"))
     assert capture.is_possible(entries)
     readiness = spec.evaluation.readiness(entries)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -174,7 +175,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     assert marks(wizard) == ["not done yet"] * 6
     wizard.show_step(RESULT)
     found = child(wizard, QLabel, "savedRigFound").text()
-    assert "still as in the initial rig: left, right, T_H_D" in found
+    assert "as in the initial rig: left display, right display, depth camera's pose" in found
 
 
 def test_a_low_screen_shows_the_buttons_below(wizard: RigWizard) -> None:
@@ -218,3 +219,12 @@ def test_a_grid_that_has_no_room_is_reported(qtbot: QtBot, wizard: RigWizard) ->
     square.setValue(80)
     wait(qtbot, wizard)
     assert "2 of 2 used" in child(wizard, QLabel, "count").text()
+
+
+def test_labels_are_words_and_the_name_of_the_rig_is_whole(wizard: RigWizard) -> None:
+    texts = [one.text() for one in wizard.findChildren(QLabel)]
+    assert [text for text in texts if re.search("T_|→", text)] == []
+    wizard.resize(900, 500)
+    name = child(wizard, QLabel, "initialRig")
+    assert name.text() == example_rig().name
+    assert name.height() >= name.heightForWidth(name.width()) > 0

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,17 +29,18 @@ def test_a_rig_in_a_persons_units() -> None:
         origins={"T_H_D": ORIGIN},
     )
     cells = {row.label: row.cells for row in rig_rows(rig)}
-    assert cells["Left: t(C0→V) x"] == ("-0.50 mm", "–")
-    assert cells["Right: z(C0→S)"] == ("2.000 m", "–")
-    assert cells["T_H_D rotation x"] == ("-15.000°", "0.057°")
-    assert cells["T_H_D y"] == ("-30.00 mm", "0.20 mm")
-    assert cells["Depth camera: fx"][0] == "1005.00 px"
+    assert cells["Left: Rendering camera x"] == ("-0.50 mm", "–")
+    assert cells["Right: Screen's distance"] == ("2.000 m", "–")
+    assert cells["Depth camera: Rotation x"] == ("-15.000°", "0.057°")
+    assert cells["Depth camera: Position y"] == ("-30.00 mm", "0.20 mm")
+    assert cells["Depth camera: Focal length fx"][0] == "1005.00 px"
+    assert not any(re.search("_|→", row.label) for row in rig_rows(rig)), "symbols are in tooltips"
 
 
 def test_the_same_rig_does_not_differ() -> None:
     ours = example_rig()
     theirs = replace(ours, T_H_D=ours.T_H_D @ rigid(None, [0.001, 0.0, 0.0]))
     moved = {row.label: row.cells[0] for row in difference_rows(ours, theirs)}
-    assert moved["T_H_D: moved"] == "1.000 mm"
-    assert moved["T_H_D: turned"] == "0.000°"
+    assert moved["depth camera (T_H_D): moved"] == "1.000 mm"
+    assert moved["depth camera (T_H_D): turned"] == "0.000°"
     assert moved["left: target is drawn elsewhere"].endswith("′")

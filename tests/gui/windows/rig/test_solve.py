@@ -72,7 +72,7 @@ def test_the_viewpoint_camera_is_kept_in_a_file(photographs: Any, tmp_path: Path
     assert solved.verdict.name != "bad"
     assert solved.add_to is None
     assert read_intrinsics(output).fx == pytest.approx(photographs.viewpoint.fx, rel=0.003)
-    assert solved.rows[1].label == "fx"
+    assert solved.rows[1].label == "Focal length fx"
     (uncertainty,) = solved.uncertainties
     assert uncertainty is not None
     compared = solve_viewpoint(
