@@ -24,7 +24,8 @@ from handcal.session.record import (
     replay,
     sha256,
 )
-from handcal.session.state import SessionEvent, SessionState
+from handcal.session.session import Session
+from handcal.session.state import SessionEvent, SessionState, clean_wearer
 from handcal.session.trial import Trial
 from handcal.types import EYES, Eye
 
@@ -56,6 +57,8 @@ class LibraryEntry:
     started: str = ""
     """UTC, ISO 8601."""
     wearer: str = ""
+    former_wearers: tuple[str, ...] = ()
+    """Names before each correction."""
     rig: str = ""
     headset: str = ""
     """Names; empty if unknown."""
@@ -103,6 +106,21 @@ def read_library(
         stamp = status.st_mtime_ns, status.st_size
         entries.append(before.get((journal.parent, stamp)) or _read(journal.parent, stamp))
     return tuple(sorted(entries, key=lambda one: (one.started, one.path.name), reverse=True))
+
+
+def correct_wearer(path: Path, name: str) -> None:
+    """Replace the name of a session's wearer; the journal keeps the former one.
+
+    Raises
+    ------
+    FileError
+        If the session is open in a program, damaged, or cannot be written.
+    ValueError
+        If the name is invalid.
+    """
+    clean_wearer(name)  # before anything is written
+    with Session(path) as session:
+        session.correct_wearer(name)
 
 
 def delete_session(path: Path) -> Path:
@@ -165,6 +183,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         stamp,
         started=replayed.journal.events[0].time,
         wearer=state.wearer,
+        former_wearers=tuple(state.former_wearers),
         rig=_rig_name(path, state),
         headset=state.facts.headset.name if state.facts.headset else "",
         eyes=MappingProxyType(eye_outcomes(path, replayed)),
