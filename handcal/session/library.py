@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -74,6 +74,8 @@ class LibraryEntry:
     """True for the sound parts of a session, copied by a repair."""
     damaged: int = 0
     """Damaged parts of the journal, and alignments or a rig file other than those it records."""
+    repaired_as: str = ""
+    """Name of a repaired copy of this damaged session, in the same folder; empty without one."""
 
 
 def read_library(
@@ -105,6 +107,12 @@ def read_library(
             continue
         stamp = status.st_mtime_ns, status.st_size
         entries.append(before.get((journal.parent, stamp)) or _read(journal.parent, stamp))
+    copies = {entry.started: entry.path.name for entry in entries if entry.is_repaired}
+    for i, entry in enumerate(entries):
+        is_original = bool(entry.damaged) and not entry.is_repaired
+        copy = copies.get(entry.started, "") if is_original else ""
+        if copy != entry.repaired_as:
+            entries[i] = replace(entry, repaired_as=copy)
     return tuple(sorted(entries, key=lambda one: (one.started, one.path.name), reverse=True))
 
 

@@ -3600,6 +3600,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Damaged, repaired in {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Damaged: {}</source>
         <translation type="unfinished"></translation>
     </message>

@@ -171,6 +171,8 @@ def test_a_repaired_copy_keeps_the_names(make: Callable[..., Path], tmp_path: Pa
     (path / "alignments" / "1.npz").unlink()
     repair_session(path, tmp_path / "copy")
     copy = next(entry for entry in read_library(tmp_path) if entry.is_repaired)
+    names = {entry.path.name: entry.repaired_as for entry in read_library(tmp_path)}
+    assert names == {"one": "copy", "copy": ""}
     assert (copy.wearer, copy.former_wearers, copy.damaged) == ("Ada", ("Adda",), 0)
 
 

@@ -67,6 +67,8 @@ def worst_arcmin(entry: LibraryEntry, kind: Literal["measured", "expected"]) -> 
 def _state(entry: LibraryEntry) -> str:
     if entry.problem:
         return tr("Unreadable")
+    if entry.repaired_as:
+        return tr("Damaged, repaired in {}").format(entry.repaired_as)
     if entry.damaged:
         return tr("Damaged: {}").format(pluralize(entry.damaged, tr("part"), tr("parts")))
     if entry.is_repaired:

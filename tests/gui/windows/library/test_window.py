@@ -171,7 +171,9 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
     qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
     assert (folder / "cid-repaired").is_dir()
     assert not Session.open(folder / "cid-repaired").damaged
-    assert [row[8] for row in rows(window)].count("Unfinished, repaired copy") == 1
+    states = [row[8] for row in rows(window)]
+    assert states.count("Unfinished, repaired copy") == 1
+    assert states.count("Damaged, repaired in cid-repaired") == 1
     assert [entry.path.name for entry in window.chosen] == ["cid-repaired"]
 
 
