@@ -6,35 +6,22 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QItemSelectionModel, Qt, Signal
-from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QDialog,
-    QHeaderView,
-    QLineEdit,
-    QSplitter,
-    QTableView,
-    QWidget,
-)
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QDialog, QLineEdit, QSplitter, QWidget
 
 from handcal.session.library import LibraryEntry, deleted_sessions, read_library
 from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.keys import add_action
-from handcal_gui.theme import SPACING_PX, flat_header
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import button, choice, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.windows.library.sessions_model import (
-    COLUMNS,
-    FILTERS,
-    SessionsFilter,
-    SessionsModel,
-)
+from handcal_gui.windows.library.sessions_model import FILTERS, SessionsFilter, SessionsModel
+from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
     check_sessions,
     delete_sessions,
@@ -43,9 +30,6 @@ from handcal_gui.windows.library.tasks import (
 )
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
-_MOST_SHOWN_PX = 300
-_LONG_NAMES_PX = {tr("Rig"): 60, tr("Headset"): 60, tr("Wearer"): 120}
-"""Widths that remain of columns with long texts, in the order in which they are cut."""
 _TREND_PX = 20 * SPACING_PX
 
 
@@ -83,7 +67,7 @@ class LibraryWindow(QDialog):
         self._search.setPlaceholderText(tr("Search wearer, date, rig, headset"))
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
-        self._table = _table(self._filter)
+        self._table = SessionsTable(self._sessions, self._filter)
         self._count = paragraph("count")
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(_TREND_PX)
@@ -106,9 +90,7 @@ class LibraryWindow(QDialog):
     @property
     def chosen(self) -> list[LibraryEntry]:
         """The sessions that are selected, in the order shown."""
-        rows = self._table.selectionModel().selectedRows()
-        sources = (self._filter.mapToSource(one).row() for one in sorted(rows, key=_row))
-        return [self._sessions.entries[row] for row in sources]
+        return self._table.chosen
 
     def reload(self) -> None:
         """Read the folder again."""
@@ -127,11 +109,6 @@ class LibraryWindow(QDialog):
         self._begin_search()
         self.reload()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give the columns the room there is."""
-        super().resizeEvent(event)
-        self._fit_columns()
-
     def _read(
         self, known: Sequence[LibraryEntry]
     ) -> tuple[tuple[LibraryEntry, ...], tuple[Path, ...]]:
@@ -144,34 +121,9 @@ class LibraryWindow(QDialog):
         self._deleted, self._is_read = deleted, True
         if entries != self._sessions.entries:
             self._sessions.show_entries(entries)
-            self._choose(chosen)
-            self._fit_columns()
+            self._table.choose(chosen)
+            self._table.fit_columns()
         self._refresh()
-
-    def _choose(self, paths: set[Path]) -> None:
-        flags = QItemSelectionModel.SelectionFlag
-        for row, entry in enumerate(self._sessions.entries):
-            if entry.path in paths:
-                place = self._filter.mapFromSource(self._sessions.index(row, 0))
-                self._table.selectionModel().select(place, flags.Select | flags.Rows)
-
-    def _fit_columns(self) -> None:
-        """Show every column's contents; long names are cut as far as the room demands."""
-        across = self._table.horizontalHeader()
-        wanted_px = {
-            column.title: min(
-                max(self._table.sizeHintForColumn(number), across.sectionSizeHint(number)),
-                _MOST_SHOWN_PX,
-            )
-            for number, column in enumerate(COLUMNS)
-        }
-        excess_px = sum(wanted_px.values()) - self._table.viewport().width()
-        for title, least_px in _LONG_NAMES_PX.items():
-            cut_px = max(min(excess_px, wanted_px[title] - least_px), 0)
-            wanted_px[title] -= cut_px
-            excess_px -= cut_px
-        for number, width_px in enumerate(wanted_px.values()):
-            self._table.setColumnWidth(number, width_px)
 
     def _begin_search(self) -> None:
         self._search.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -355,32 +307,3 @@ class LibraryWindow(QDialog):
             spacing=SPACING_PX,
         )
         self.resize(130 * SPACING_PX, 84 * SPACING_PX)
-
-
-def _table(model: SessionsFilter) -> QTableView:
-    table = with_name(QTableView(), "sessionTable", tr("Sessions"))
-    table.setModel(model)
-    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-    table.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-    table.setTabKeyNavigation(False)
-    table.setWordWrap(False)
-    table.setShowGrid(False)
-    table.setAlternatingRowColors(True)
-    table.setSortingEnabled(True)
-    table.sortByColumn(1, Qt.SortOrder.DescendingOrder)
-    table.setMinimumHeight(12 * SPACING_PX)
-    table.verticalHeader().hide()
-    table.setIconSize(PICTURE_PX)
-    row_px = max(table.fontMetrics().height(), PICTURE_PX.height()) + SPACING_PX // 2
-    table.verticalHeader().setDefaultSectionSize(row_px)
-    across = table.horizontalHeader()
-    flat_header(across)
-    across.setHighlightSections(False)
-    across.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
-    across.setStretchLastSection(True)
-    return table
-
-
-def _row(index: object) -> int:
-    return index.row()  # type: ignore[attr-defined,no-any-return]
