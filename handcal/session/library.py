@@ -139,6 +139,8 @@ def delete_session(path: Path) -> Path:
     FileError
         If it is open in a program, or cannot be moved.
     """
+    if not path.exists():
+        raise FileError(f"{path} is no longer there: another program moved or deleted it")
     if not (path / JOURNAL).is_file():
         raise FileError(f"{path} is not a session; nothing was deleted")
     FileLock(path / "lock").release()  # only a test, or another program would lose its folder

@@ -3985,7 +3985,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Name before: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} (Ctrl+Z)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{}: {} calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Correct the name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name or code of the wearer of {}:</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Review it (Return)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4017,7 +4037,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Review the selected session</source>
+        <source>Correcting {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name corrected in {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4026,6 +4050,22 @@ one turns out.</source>
     </message>
     <message>
         <source>Export the selected sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Correct the wearer&apos;s name or code in the selected sessions (F2)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy path</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4038,14 +4078,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Restore</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Restore the deleted session</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Delete sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4070,14 +4102,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Delete the selected sessions (Del)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Restore the last deleted session (Ctrl+Z)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Open the session</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

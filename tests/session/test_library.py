@@ -196,3 +196,5 @@ def test_an_open_session_is_not_deleted(make: Callable[..., Path], tmp_path: Pat
     assert len(read_library(tmp_path)) == 1
     with pytest.raises(FileError, match="not a session"):
         delete_session(tmp_path)
+    with pytest.raises(FileError, match="no longer there: another program moved or deleted it"):
+        delete_session(tmp_path / "gone")
