@@ -232,6 +232,7 @@ class LibraryWindow(QDialog):
         dialog.setLabelText(tr("Name or code of the wearer of {}:").format(count))
         dialog.setComboBoxEditable(True)
         dialog.setComboBoxItems(list(names))
+        dialog.setTextValue(chosen[0].wearer)
         box = dialog.findChildren(QComboBox)[0]
         field, completer = box.lineEdit(), box.completer()
         assert field is not None
