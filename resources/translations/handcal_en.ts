@@ -3600,7 +3600,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Damaged, repaired in {}</source>
+        <source>Damaged, has a copy</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3674,6 +3674,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Check lists what is damaged; Repair copies the rest</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Repaired in {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5430,6 +5434,16 @@ one turns out.</source>
     </message>
     <message>
         <source>handcal hit an unexpected error ({})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bars: error before, after</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bars of the small picture: the left eye above the right one, each with its error before
+the calibration (grey) and after it (coloured; full if the eye is accepted). The whole
+width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
