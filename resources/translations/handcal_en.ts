@@ -416,6 +416,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} not exported, see below.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Open folder</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2880,10 +2884,6 @@ and record which fits the hand better. The report says which was which.</source>
     </message>
     <message>
         <source>There is no alignment to export yet.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{} sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
