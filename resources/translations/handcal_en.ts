@@ -3361,11 +3361,6 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>φ1, φ2 and φ3 of the {} from this alignment alone: distance of the eye to the right of,
-below and in front of the rig&apos;s viewpoint, in millimetres</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>No.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3383,22 +3378,6 @@ below and in front of the rig&apos;s viewpoint, in millimetres</source>
     </message>
     <message>
         <source>Angle between hand and cursor at the confirmation, in degrees</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Left φ mm</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>left eye</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Right φ mm</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>right eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3467,6 +3446,15 @@ below and in front of the rig&apos;s viewpoint, in millimetres</source>
     </message>
     <message>
         <source>Mean ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ1, φ2 and φ3 of the eye from this alignment alone: its distance to the right of, below
+and in front of the rig&apos;s viewpoint, in millimetres; the left eye above the right one</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
