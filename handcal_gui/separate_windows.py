@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
 
 from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings, export_session
-from handcal.export.many import export_sessions
+from handcal.export.many import Exported, export_sessions
 from handcal.link.server import HeadsetServer
 from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
-from handcal.session.session import Session, SessionRecord
+from handcal.session.session import SessionRecord
 from handcal.station.support import SupportSettings
 from handcal_gui.control.inspection import Inspection
 from handcal_gui.control.live import CalibrationController
@@ -30,6 +30,7 @@ from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import CurrentPreferences
 from handcal_gui.theme import use_theme
 from handcal_gui.translation import tr
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow
 
@@ -101,14 +102,19 @@ class SeparateWindows(QObject):
         Parameters
         ----------
         folder : Path, optional
-            Proposed folder; by default that of the last export.
+            Proposed folder; by default that of the last export, or one beside the session folder.
         """
         record = self.record
         if record is None or not record.alignments:
             self._window.banner.show_message(tr("There is no alignment to export yet."))
             return None
-        folder = folder or Path(self._current.now.export_folder or record.path.parent)
-        return self._open_export(record, folder, self._window, export_session, "")
+
+        def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
+            return Exported(export_session(record, target, settings, progress))
+
+        name, wearer = record.path.absolute().name, record.wearer
+        folder = folder or self._export_folder(record.path.parent)
+        return self._open_export(name, folder, export, wearer, self._window)
 
     def show_library(self, folder: Path | None = None) -> LibraryWindow:
         """Show the sessions of a folder, by default of the session folder."""
@@ -123,23 +129,15 @@ class SeparateWindows(QObject):
         self._open(window, window.stop)
         return window
 
-    def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog | None:
+    def export_many(self, paths: Sequence[Path], parent: QWidget) -> ExportDialog:
         """Open the export dialog for several sessions, each to a folder of its own."""
-        try:
-            first = Session.open(paths[0])
-        except FileError as error:
-            self._window.banner.show_message(str(error))
-            return None
 
-        def export(
-            _: SessionRecord, target: Path, settings: ExportSettings, progress: Progress
-        ) -> tuple[Path, ...]:
+        def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
             return export_sessions(paths, target, settings, progress)
 
-        folder = Path(self._current.now.export_folder or paths[0].parent)
-        return self._open_export(
-            first, folder, parent, export, tr("{} sessions").format(len(paths))
-        )
+        name = pluralize(len(paths), tr("session"), tr("sessions"))
+        folder = self._export_folder(paths[0].parent)
+        return self._open_export(name, folder, export, "", parent)
 
     def inspect(self) -> None:
         """Show the alignments of the session shown in a 3D window."""
@@ -221,10 +219,15 @@ class SeparateWindows(QObject):
             use_theme(self._current.now.theme)
             self._start.new.show_settings(self._current.now.station)
 
+    def _export_folder(self, sessions: Path) -> Path:
+        """Return the folder of the last export, or one beside a folder of sessions."""
+        beside = sessions.absolute().parent / "handcal exports"
+        return Path(self._current.now.export_folder or beside)
+
     def _open_export(
-        self, record: SessionRecord, folder: Path, parent: QWidget, export: Export, name: str
+        self, name: str, folder: Path, export: Export, title: str, parent: QWidget
     ) -> ExportDialog:
-        dialog = ExportDialog(record, self._current.now.export, folder, parent, export, name)
+        dialog = ExportDialog(name, self._current.now.export, folder, export, title, parent)
         dialog.remembered.connect(self._remember_export)
         self._open(dialog, dialog.stop)
         return dialog

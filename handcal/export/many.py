@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.errors import CancelledError, FileError
 from handcal.export.export import ExportSettings, export_session
 from handcal.progress import Progress
 from handcal.session.session import Session
 
 
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """Result of an export of one or several sessions."""
+
+    files: tuple[Path, ...]
+    missing: tuple[str, ...] = ()
+    """Sessions that were not exported, each with the reason."""
+
+
 def export_sessions(
     paths: Sequence[Path], folder: Path, settings: ExportSettings, progress: Progress = Progress()
-) -> tuple[Path, ...]:
-    """Export sessions, each into a folder of its name, and return the files.
+) -> Exported:
+    """Export sessions, each into a folder of its name.
 
-    A session that cannot be exported does not keep the others from it.
+    A session that cannot be exported does not keep the others from it. If it is cancelled, the
+    sessions exported before stay.
 
     Parameters
     ----------
@@ -26,26 +37,37 @@ def export_sessions(
         Created if needed.
     settings : ExportSettings
     progress : Progress
+        Its activity begins with the session's number and wearer.
 
     Raises
     ------
     CancelledError
-        If it was cancelled; the sessions exported before stay.
-    FileError
-        After all others are exported, if one could not be; it names each with the reason.
+        If it was cancelled before the first session was exported.
     """
     files: list[Path] = []
-    failed: list[str] = []
+    missing: list[str] = []
     for done, path in enumerate(paths):
-        part = progress.part(done / len(paths), (done + 1) / len(paths))
         try:
-            record = Session.open(path)
-            if not record.alignments:
-                raise FileError("it has no alignments")
-            files += export_session(record, folder / path.name, settings, part)
+            files += _export(path, folder, settings, progress, done, len(paths))
         except FileError as error:
-            failed.append(f"{path.name}: {error}")
-    if failed:
-        count = len(paths) - len(failed)
-        raise FileError(f"{count} of {len(paths)} exported; not exported: {'; '.join(failed)}")
-    return tuple(files)
+            missing.append(f"{path.name}: {error}")
+        except CancelledError:
+            if not files:
+                raise
+            missing += (f"{one.name}: cancelled" for one in paths[done:])
+            break
+    return Exported(tuple(files), tuple(missing))
+
+
+def _export(
+    path: Path, folder: Path, settings: ExportSettings, progress: Progress, done: int, count: int
+) -> tuple[Path, ...]:
+    name = f"{done + 1} of {count}: {path.name}"
+    progress.at(done / count, name)
+    record = Session.open(path)
+    if not record.alignments:
+        raise FileError("it has no alignments")
+    name = f"{done + 1} of {count}: {record.wearer or path.name}"
+    named = replace(progress, report=lambda what, share: progress.report(f"{name}, {what}", share))
+    part = named.part(done / count, (done + 1) / count)
+    return export_session(record, folder / path.name, settings, part)

@@ -51,8 +51,10 @@ class FileLock:
             file.seek(0)
             holder = (file.read(20) or b"").decode(errors="replace") or "unknown"
             file.close()
+            whose = "this program" if holder == str(os.getpid()) else "another program"
             raise FileError(
-                f"{path.parent} is in use by process {holder}; close it there first"
+                f"{path.parent} is in use by process {holder}, {whose}; close it there, then "
+                "try again"
             ) from error
         with suppress(OSError):  # only for people to read: a full disk locks nobody out
             file.truncate(0)

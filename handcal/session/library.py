@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -24,7 +24,8 @@ from handcal.session.record import (
     replay,
     sha256,
 )
-from handcal.session.state import SessionEvent, SessionState
+from handcal.session.session import Session
+from handcal.session.state import SessionEvent, SessionState, clean_wearer
 from handcal.session.trial import Trial
 from handcal.types import EYES, Eye
 
@@ -56,6 +57,8 @@ class LibraryEntry:
     started: str = ""
     """UTC, ISO 8601."""
     wearer: str = ""
+    former_wearers: tuple[str, ...] = ()
+    """Names before each correction."""
     rig: str = ""
     headset: str = ""
     """Names; empty if unknown."""
@@ -71,6 +74,8 @@ class LibraryEntry:
     """True for the sound parts of a session, copied by a repair."""
     damaged: int = 0
     """Damaged parts of the journal, and alignments or a rig file other than those it records."""
+    repaired_as: str = ""
+    """Name of a repaired copy of this damaged session, in the same folder; empty without one."""
 
 
 def read_library(
@@ -102,7 +107,28 @@ def read_library(
             continue
         stamp = status.st_mtime_ns, status.st_size
         entries.append(before.get((journal.parent, stamp)) or _read(journal.parent, stamp))
+    copies = {entry.started: entry.path.name for entry in entries if entry.is_repaired}
+    for i, entry in enumerate(entries):
+        is_original = bool(entry.damaged) and not entry.is_repaired
+        copy = copies.get(entry.started, "") if is_original else ""
+        if copy != entry.repaired_as:
+            entries[i] = replace(entry, repaired_as=copy)
     return tuple(sorted(entries, key=lambda one: (one.started, one.path.name), reverse=True))
+
+
+def correct_wearer(path: Path, name: str) -> None:
+    """Replace the name of a session's wearer; the journal keeps the former one.
+
+    Raises
+    ------
+    FileError
+        If the session is open in a program, damaged, or cannot be written.
+    ValueError
+        If the name is invalid.
+    """
+    clean_wearer(name)  # before anything is written
+    with Session(path) as session:
+        session.correct_wearer(name)
 
 
 def delete_session(path: Path) -> Path:
@@ -113,6 +139,8 @@ def delete_session(path: Path) -> Path:
     FileError
         If it is open in a program, or cannot be moved.
     """
+    if not path.exists():
+        raise FileError(f"{path} is no longer there: another program moved or deleted it")
     if not (path / JOURNAL).is_file():
         raise FileError(f"{path} is not a session; nothing was deleted")
     FileLock(path / "lock").release()  # only a test, or another program would lose its folder
@@ -165,6 +193,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         stamp,
         started=replayed.journal.events[0].time,
         wearer=state.wearer,
+        former_wearers=tuple(state.former_wearers),
         rig=_rig_name(path, state),
         headset=state.facts.headset.name if state.facts.headset else "",
         eyes=MappingProxyType(eye_outcomes(path, replayed)),

@@ -279,6 +279,21 @@ class Session(Closable):
         write_atomic(self.path / "notes.txt", data)
         self._notes_sha256 = sha256(data)
 
+    def correct_wearer(self, name: str) -> None:
+        """Replace the wearer's name or code; the journal keeps the former one.
+
+        Raises
+        ------
+        FileError
+            If the journal cannot be written.
+        ValueError
+            If the name is invalid.
+        """
+        wearer, before = clean_wearer(name), self._state.wearer
+        if wearer != before:
+            data = {"wearer": wearer, "before": before}
+            self._append(SessionEvent.WEARER_CORRECTED, data)
+
     def save_facts(self, **facts: Any) -> None:
         """Record facts by their names in `SessionFacts`; each replaces an earlier one.
 

@@ -36,6 +36,7 @@ class SessionEvent(StrEnum):
     REPAIRED = "repaired"
     """In a copy of a damaged session: its numbers have gaps."""
     NOTES_SAVED = "notes_saved"
+    WEARER_CORRECTED = "wearer_corrected"
     FACTS_SAVED = "facts_saved"
     ALIGNMENT_SAVED = "alignment_saved"
     ALIGNMENT_DROPPED = "alignment_dropped"
@@ -51,7 +52,7 @@ class SessionEvent(StrEnum):
     FINISHED = "finished"
 
 
-ASIDE = (SessionEvent.NOTES_SAVED, SessionEvent.UPGRADED)
+ASIDE = (SessionEvent.NOTES_SAVED, SessionEvent.WEARER_CORRECTED, SessionEvent.UPGRADED)
 """Events after which a finished session stays finished."""
 
 
@@ -130,6 +131,8 @@ class SessionState:
     settings : dict or None
         None before version 3.
     wearer : str
+    former_wearers : list of str
+        Names before each correction.
     notes_sha256 : tuple of str or None
         Checksums of the notes that may be stored: the newest, and those before; an empty text if
         there are none. Empty before version 3.
@@ -150,6 +153,7 @@ class SessionState:
 
     def __init__(self) -> None:
         self.rig = self.rig_sha256 = self.wearer = ""
+        self.former_wearers: list[str] = []
         self.settings: dict[str, Any] | None = None
         self.notes_sha256: tuple[str | None, ...] = ()
         self.results: dict[str, Any] | None = None
@@ -200,6 +204,10 @@ class SessionState:
                 self.alignments.has_gaps = self.trials.has_gaps = True
             case SessionEvent.NOTES_SAVED:
                 self.notes_sha256 = data["sha256"], data["before_sha256"]
+            case SessionEvent.WEARER_CORRECTED:
+                former = clean_wearer(data["before"])
+                self.wearer = clean_wearer(data["wearer"])
+                self.former_wearers.append(former)
             case SessionEvent.FACTS_SAVED:
                 before, self.facts = self.facts, with_facts(self.facts, data)
                 is_known = self.facts.eye_distance == before.eye_distance

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.io.lock import FileLock
-from handcal.session.journal import read_journal
+from handcal.session.journal import JOURNAL, Event, read_journal
 from handcal.session.session import Session
 from handcal.session.state import ASIDE, SessionEvent
 
@@ -27,12 +28,19 @@ class UnfinishedSession:
     """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
     """Reason why it cannot be resumed, such as another program; empty if it can."""
+    is_repaired: bool = False
+    """True if a repaired copy of this damaged session is in the same folder."""
 
 
 def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
     """Return the unfinished sessions among the folders in `parent`, the newest first."""
-    journals = parent.glob("*/journal.jsonl")
-    found = [_inspect(journal.parent) for journal in journals]
+    journals = {journal.parent: _events(journal) for journal in parent.glob(f"*/{JOURNAL}")}
+    copied = {
+        events[0].time
+        for events in journals.values()
+        if any(event.name == SessionEvent.REPAIRED for event in events)
+    }
+    found = [_inspect(path, events, copied) for path, events in journals.items()]
     return sorted(
         (session for session in found if session is not None),
         key=lambda session: (session.started, session.path.name),
@@ -40,19 +48,27 @@ def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
     )
 
 
-def _inspect(path: Path) -> UnfinishedSession | None:
-    started = ""
+def _events(journal: Path) -> tuple[Event, ...]:
+    """Return the events of a journal; none if it cannot be read, for which `_inspect` says why."""
     try:
-        events = read_journal(path / "journal.jsonl").events
-        if events:
-            started = events[0].time
-            last = [event.name for event in events if event.name not in ASIDE][-1:]
-            if last == [SessionEvent.FINISHED]:
-                return None
+        return read_journal(journal).events
+    except FileError:
+        return ()
+
+
+def _inspect(
+    path: Path, events: tuple[Event, ...], copied: Collection[str]
+) -> UnfinishedSession | None:
+    names = [event.name for event in events]
+    if [name for name in names if name not in ASIDE][-1:] == [SessionEvent.FINISHED]:
+        return None
+    started = events[0].time if events else ""
+    try:
         FileLock(path / "lock").release()  # only a test: reading takes too long to hold it
         record = Session.open(path)
     except FileError as error:
         return UnfinishedSession(path, started, problem=str(error))
+    is_original = bool(record.damaged) and SessionEvent.REPAIRED not in names
     return UnfinishedSession(
         path,
         started,
@@ -60,4 +76,5 @@ def _inspect(path: Path) -> UnfinishedSession | None:
         len(record.alignments),
         len(record.trials),
         len(record.damaged),
+        is_repaired=is_original and started in copied,
     )

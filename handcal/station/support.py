@@ -116,7 +116,8 @@ def known_names(settings: SupportSettings) -> frozenset[str]:
     names = {one for one in wearers if isinstance(one, str)} if isinstance(wearers, list) else set()
     names |= set(settings.names)
     for folder in settings.sessions:
-        names |= {entry.wearer for entry in read_library(folder)}
+        for entry in read_library(folder):
+            names |= {entry.wearer, *entry.former_wearers}
     return frozenset(names - {""})
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
-from handcal.export.export import ExportSettings, export_session
+from handcal.export.export import ExportSettings
+from handcal.export.many import Exported
 from handcal.progress import Progress
-from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export_choices import ExportChoices
 from handcal_gui.dialogs.export_progress import ExportProgress
 from handcal_gui.engine.jobs import Job
@@ -19,23 +19,24 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.layouts import hbox, vbox
 
-Export = Callable[..., tuple[Path, ...]]
+Export = Callable[[Path, ExportSettings, Progress], Exported]
 
 
 class ExportDialog(QDialog):
-    """Exports a session in a job; closing the dialog cancels it.
+    """Exports one or several sessions in a job; closing the dialog cancels it.
 
     Parameters
     ----------
-    record : SessionRecord
+    name : str
+        Of the session, or the number of sessions; the name of the export's folder begins with it.
     settings : ExportSettings
         Initial choice.
     folder : Path
         Parent of the export's folder.
     export : callable
-        As `export_session`.
-    name : str
-        Subject of the export, and name of its folder; by default those of the session.
+        Given the export's folder, the settings and the progress.
+    title : str
+        Subject of the export; by default the name.
 
     Attributes
     ----------
@@ -52,21 +53,20 @@ class ExportDialog(QDialog):
 
     def __init__(
         self,
-        record: SessionRecord,
+        name: str,
         settings: ExportSettings,
         folder: Path,
+        export: Export,
+        title: str = "",
         parent: QWidget | None = None,
-        export: Export = export_session,
-        name: str = "",
     ) -> None:
         super().__init__(parent)
         self.setObjectName("exportDialog")
-        self.setWindowTitle(tr("Export {}").format(name or record.wearer or record.path.name))
-        self._record = record
-        self._export_session = export
+        self.setWindowTitle(tr("Export {}").format(title or name))
+        self._export_to = export
         self._job: Job | None = None
         self._is_closing = False
-        self._choices = ExportChoices(settings, folder, f"{name or record.path.name}-export")
+        self._choices = ExportChoices(settings, folder, f"{name}-export")
         self._progress = ExportProgress()
         self._pages = QStackedWidget()
         self._pages.addWidget(self._choices)
@@ -86,15 +86,10 @@ class ExportDialog(QDialog):
         """Start the export."""
         settings, target = self._choices.settings, self._choices.target
         self.remembered.emit(settings, self._choices.folder)
-        export, record = self._export_session, self._record
-
-        def work(progress: Progress) -> object:
-            return export(record, target, settings, progress)
-
         self._progress.begin()
         self._pages.setCurrentWidget(self._progress)
         # Without a parent: the job's thread keeps it alive if the dialog is destroyed.
-        self._job = Job(work)
+        self._job = Job(lambda progress: self._export_to(target, settings, progress))
         self._job.progressed.connect(self._progress.show_progress)
         self._job.succeeded.connect(self._succeed)
         self._job.failed.connect(self._fail)
@@ -126,10 +121,10 @@ class ExportDialog(QDialog):
             self._progress.show_cancelling()
             self._close.setEnabled(False)
 
-    def _succeed(self, files: tuple[Path, ...]) -> None:
-        self._progress.show_files(self._choices.target, files)
+    def _succeed(self, made: Exported) -> None:
+        self._progress.show_files(self._choices.target, made)
         self._end()
-        self.succeeded.emit(files)
+        self.succeeded.emit(made.files)
 
     def _fail(self, why: str) -> None:
         self._progress.show_failure(why)

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QLabel, QListWidget, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QProgressBar,
+    QVBoxLayout,
+    QWidget,
+)
 
+from handcal.export.many import Exported
 from handcal.station.doctor import Finding, Health
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.finding_line import FindingLine
@@ -50,17 +57,25 @@ class ExportProgress(QWidget):
         self._doing.setText(f"{doing}…")
         self._bar.setValue(round(_WHOLE * share))
 
-    def show_files(self, folder: Path, files: Sequence[Path]) -> None:
-        """Show the files written."""
-        self._doing.setText(tr("Done."))
+    def show_files(self, folder: Path, made: Exported) -> None:
+        """Show the files written, below the sessions that were not exported."""
         self._bar.setValue(_WHOLE)
-        self._files.addItems([str(path.relative_to(folder)) for path in files])
+        for missing in made.missing:
+            item = QListWidgetItem(icon("warning"), missing)
+            item.setToolTip(missing)
+            self._files.addItem(item)
+        self._files.addItems([str(path.relative_to(folder)) for path in made.files])
         self._files.show()
-        count = tr("{} in {}").format(pluralize(len(files), tr("file"), tr("files")), folder)
+        count = tr("{} in {}").format(pluralize(len(made.files), tr("file"), tr("files")), folder)
+        if made.missing:
+            lost = pluralize(len(made.missing), tr("session"), tr("sessions"))
+            self._doing.setText(tr("{} not exported, see below.").format(lost))
+        else:
+            self._doing.setText(tr("Done."))
         url = QUrl.fromLocalFile(str(folder))
         self._end.show_finding(
-            Finding("", Health.GOOD, count),
-            tr("Open folder"),
+            Finding("", Health.LIMITED if made.missing else Health.GOOD, count),
+            tr("Open folder") if made.files else "",
             lambda: QDesktopServices.openUrl(url),
         )
         self._end.show()

@@ -21,6 +21,14 @@ _SCALE_ARCMIN = 30.0
 """Error of a bar as wide as the picture, the same for all sessions; larger ones are cut."""
 
 
+PICTURE_LEGEND = tr("Bars: error before, after")
+PICTURE_HELP = tr(
+    "Bars of the small picture: the left eye above the right one, each with its error before\n"
+    "the calibration (grey) and after it (coloured; full if the eye is accepted). The whole\n"
+    "width is {:.0f}′."
+).format(_SCALE_ARCMIN)
+
+
 def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
     """Return a picture of two bars for each eye; an after bar is full if the eye is accepted."""
     bars = tuple(eyes.get(eye) for eye in EYES)
@@ -35,6 +43,11 @@ def error_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
         )
         for eye, one in eyes.items()
     )
+
+
+def picture_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
+    """Return the same as text, with what the bars mean; empty if there is no picture."""
+    return f"{error_text(eyes)}\n{PICTURE_HELP}" if eyes else ""
 
 
 def _after(one: EyeOutcome) -> float | None:

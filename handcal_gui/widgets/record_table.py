@@ -13,7 +13,7 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from handcal_gui.keys import add_action
@@ -23,6 +23,8 @@ from handcal_gui.translation import tr
 _EMPTY_MARGINS = QMargins(*4 * (2 * SPACING_PX,))
 _NO_INDEX = QModelIndex()
 _MEASURED_ROWS = 20
+_LINES = " / "
+"""Between the lines of a cell where they are in one line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +107,11 @@ class RecordTable(QTableView):
         before, numbers = self._records.numbers, list(rows)
         chosen, row = self.chosen_number(), self.currentIndex().row()
         self._records.replace(rows)
+        line_px = QFontMetrics(number_font()).lineSpacing() + 1  # rounded up: else it is elided
+        least_px = self.verticalHeader().defaultSectionSize()
+        for row, cells in enumerate(rows.values()):
+            more = max(cell.count("\n") for cell in cells)
+            self.setRowHeight(row, least_px + more * line_px)
         if chosen is not None and numbers:
             is_there = chosen in rows
             self.selectRow(numbers.index(chosen) if is_there else min(row, len(numbers) - 1))
@@ -205,8 +212,9 @@ class _Records(QAbstractTableModel):
             return self._font
         if role == Qt.ItemDataRole.ToolTipRole and self.hidden:
             cells = self._cells[index.row()]
-            titles = ((self._columns[i].title, cells[i]) for i in sorted(self.hidden))
-            return "\n".join((column.tooltip, "", *(f"{title}: {cell}" for title, cell in titles)))
+            hidden = ((self._columns[i].title, cells[i]) for i in sorted(self.hidden))
+            lines = (f"{title}: {_LINES.join(cell.splitlines())}" for title, cell in hidden)
+            return "\n".join((column.tooltip, "", *lines))
         return _look(column, role)
 
     def headerData(

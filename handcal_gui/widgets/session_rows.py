@@ -21,8 +21,8 @@ from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time
 
 _PHI = tr(
-    "φ1, φ2 and φ3 of the {} from this alignment alone: distance of the eye to the right of,\n"
-    "below and in front of the rig's viewpoint, in millimetres"
+    "φ1, φ2 and φ3 of the eye from this alignment alone: its distance to the right of, below\n"
+    "and in front of the rig's viewpoint, in millimetres; the left eye above the right one"
 )
 ALIGNMENT_COLUMNS = (
     RecordColumn(tr("No."), tr("Number of the alignment")),
@@ -30,21 +30,20 @@ ALIGNMENT_COLUMNS = (
     RecordColumn(
         tr("Rotation °"),
         tr("Angle between hand and cursor at the confirmation, in degrees"),
-        rank=1,
+        rank=2,
     ),
-    RecordColumn(tr("Left φ mm"), _PHI.format(tr("left eye")), rank=5),
-    RecordColumn(tr("Right φ mm"), _PHI.format(tr("right eye")), rank=6),
+    RecordColumn(tr("φ mm"), _PHI, rank=1),
     RecordColumn(
         tr("RMS mm"),
         tr("Distance between hand and cursor after registration, in millimetres"),
-        rank=2,
+        rank=3,
     ),
     RecordColumn(
         tr("Inliers %"),
         tr("Percentage of the hand's points with a partner on the cursor"),
-        rank=3,
+        rank=4,
     ),
-    RecordColumn(tr("Time"), tr("Time of the confirmation"), rank=4),
+    RecordColumn(tr("Time"), tr("Time of the confirmation"), rank=5),
 )
 TRIAL_COLUMNS = (
     RecordColumn(tr("No."), tr("Number of the trial")),
@@ -104,7 +103,7 @@ def deletions(record: SessionRecord) -> list[Deletion]:
 
 
 def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, tuple[str, ...]]:
-    """Return cells for `ALIGNMENT_COLUMNS`, by the alignment's number.
+    """Return cells for `ALIGNMENT_COLUMNS`, by the alignment's number; a line for each open eye.
 
     Parameters
     ----------
@@ -117,20 +116,19 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
         solved = {}
     saved = SessionEvent.ALIGNMENT_SAVED
     times = {event.data["number"]: event.time for event in record.events if event.name == saved}
-    rows = {}
+    rows: dict[int, tuple[str, ...]] = {}
     for number, alignment in record.alignments.items():
         shifts = solved.get(number, {})
         angle_deg = np.degrees(np.linalg.norm(alignment.rotation_rad))
         alone = [shifts[eye] for eye in EYES if eye in shifts]
-        rms = [f"{1e3 * shift.rms_m:.2f}" for shift in alone]
-        inliers = [f"{100 * shift.inlier_ratio:.0f}" for shift in alone]
+        rms = (f"{1e3 * shift.rms_m:.2f}" for shift in alone)
+        inliers = (f"{100 * shift.inlier_ratio:.0f}" for shift in alone)
+        measured = ("\n".join(lines) for lines in (map(_phi_text, alone), rms, inliers))
         rows[number] = (
             str(number),
             _eyes_text(alignment.eyes),
             f"{angle_deg:.1f}",
-            *(_phi_text(shifts.get(eye)) for eye in EYES),
-            " / ".join(rms) or NOTHING,
-            " / ".join(inliers) or NOTHING,
+            *(text or NOTHING for text in measured),
             local_time(times[number], _CLOCK),
         )
     return rows
@@ -209,7 +207,5 @@ def _eyes_text(eyes: Sequence[Eye]) -> str:
     return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
 
 
-def _phi_text(shift: EyeShift | None) -> str:
-    if shift is None:
-        return NOTHING
+def _phi_text(shift: EyeShift) -> str:
     return " ".join(f"{signed(1e3 * value_m, 2):>6}" for value_m in shift.shift_m)

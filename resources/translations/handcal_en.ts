@@ -416,6 +416,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} not exported, see below.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Open folder</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2934,10 +2938,6 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} sessions</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>There is no alignment to inspect yet.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3464,11 +3464,6 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>φ1, φ2 and φ3 of the {} from this alignment alone: distance of the eye to the right of,
-below and in front of the rig&apos;s viewpoint, in millimetres</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>No.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3486,22 +3481,6 @@ below and in front of the rig&apos;s viewpoint, in millimetres</source>
     </message>
     <message>
         <source>Angle between hand and cursor at the confirmation, in degrees</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Left φ mm</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>left eye</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Right φ mm</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>right eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3570,6 +3549,15 @@ below and in front of the rig&apos;s viewpoint, in millimetres</source>
     </message>
     <message>
         <source>Mean ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ1, φ2 and φ3 of the eye from this alignment alone: its distance to the right of, below
+and in front of the rig&apos;s viewpoint, in millimetres; the left eye above the right one</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3703,6 +3691,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Damaged, has a copy</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Damaged: {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3773,6 +3765,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Check lists what is damaged; Repair copies the rest</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Repaired in {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4092,7 +4088,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Name before: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} (Ctrl+Z)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{}: {} calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Correct the name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name or code of the wearer of {}:</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Review it (Return)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4124,7 +4140,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Review the selected session</source>
+        <source>Correcting {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name corrected in {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4133,6 +4153,22 @@ one turns out.</source>
     </message>
     <message>
         <source>Export the selected sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Name…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Correct the wearer&apos;s name or code in the selected sessions (F2)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copy path</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4145,14 +4181,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Restore</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Restore the deleted session</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Delete sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4177,14 +4205,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Delete the selected sessions (Del)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Restore the last deleted session (Ctrl+Z)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Open the session</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5541,6 +5561,16 @@ one turns out.</source>
     </message>
     <message>
         <source>handcal hit an unexpected error ({})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bars: error before, after</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Bars of the small picture: the left eye above the right one, each with its error before
+the calibration (grey) and after it (coloured; full if the eye is accepted). The whole
+width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

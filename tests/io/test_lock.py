@@ -22,7 +22,7 @@ time.sleep(60)
 def test_only_one_can_hold_it_and_the_holder_is_named(tmp_path: Path) -> None:
     path = tmp_path / "lock"
     lock = FileLock(path)
-    with pytest.raises(FileError, match=f"in use by process {os.getpid()};"):
+    with pytest.raises(FileError, match=f"in use by process {os.getpid()}, this program;"):
         FileLock(path)
     lock.release()
     lock.release()
@@ -37,7 +37,7 @@ def test_a_killed_holder_leaves_it_free(tmp_path: Path) -> None:
     ) as holder:
         assert holder.stdout is not None
         assert holder.stdout.readline() == b"held\n"
-        with pytest.raises(FileError, match=f"in use by process {holder.pid};"):
+        with pytest.raises(FileError, match=f"in use by process {holder.pid}, another program;"):
             FileLock(path)
         holder.send_signal(signal.SIGKILL)
         holder.wait()

@@ -12,11 +12,13 @@ from handcal.errors import FileError
 from handcal.rig.example import example_rig
 from handcal.session.library import (
     DELETED,
+    correct_wearer,
     delete_session,
     deleted_sessions,
     read_library,
     restore_session,
 )
+from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.types import Alignment, HeadsetIdentity
@@ -143,6 +145,50 @@ def test_a_deleted_session_can_be_restored(make: Callable[..., Path], tmp_path: 
         restore_session(tmp_path / "one")
 
 
+def test_a_wearers_name_is_corrected_and_the_former_one_kept(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = make("one", "Adda")
+    (known,) = read_library(tmp_path)
+    correct_wearer(path, " Ada ")
+    correct_wearer(path, "Ada")  # nothing to correct
+    (entry,) = read_library(tmp_path, [known])
+    assert (entry.wearer, entry.former_wearers, entry.damaged) == ("Ada", ("Adda",), 0)
+    assert entry.is_finished
+    assert entry.eyes
+    assert Session.open(path).events[-1].data == {"wearer": "Ada", "before": "Adda"}
+    correct_wearer(path, entry.former_wearers[-1])  # undone
+    assert Session.open(path).wearer == "Adda"
+    with pytest.raises(ValueError, match="line breaks"):
+        correct_wearer(path, "A\nB")
+    with Session(path), pytest.raises(FileError, match="in use by process"):
+        correct_wearer(path, "Ada")
+
+
+def test_a_repaired_copy_keeps_the_names(make: Callable[..., Path], tmp_path: Path) -> None:
+    path = make("one", "Adda")
+    correct_wearer(path, "Ada")
+    (path / "alignments" / "1.npz").unlink()
+    repair_session(path, tmp_path / "copy")
+    copy = next(entry for entry in read_library(tmp_path) if entry.is_repaired)
+    names = {entry.path.name: entry.repaired_as for entry in read_library(tmp_path)}
+    assert names == {"one": "copy", "copy": ""}
+    assert (copy.wearer, copy.former_wearers, copy.damaged) == ("Ada", ("Adda",), 0)
+
+
+def test_a_crash_leaves_the_former_or_the_corrected_name(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    journal = make("one", "Adda") / "journal.jsonl"
+    begun = len(journal.read_bytes())
+    correct_wearer(journal.parent, "Ada")
+    complete = journal.read_bytes()
+    for length in range(begun, len(complete) + 1):
+        journal.write_bytes(complete[:length])
+        record = Session.open(journal.parent)
+        assert record.wearer == ("Ada" if length == len(complete) else "Adda")
+
+
 def test_an_open_session_is_not_deleted(make: Callable[..., Path], tmp_path: Path) -> None:
     path = make("one", "Ada")
     with Session(path), pytest.raises(FileError):
@@ -150,3 +196,5 @@ def test_an_open_session_is_not_deleted(make: Callable[..., Path], tmp_path: Pat
     assert len(read_library(tmp_path)) == 1
     with pytest.raises(FileError, match="not a session"):
         delete_session(tmp_path)
+    with pytest.raises(FileError, match="no longer there: another program moved or deleted it"):
+        delete_session(tmp_path / "gone")

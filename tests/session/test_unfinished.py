@@ -2,6 +2,7 @@ import json
 from pathlib import Path
 
 from handcal.rig.example import example_rig
+from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.session.unfinished import unfinished_sessions
 from handcal.types import Alignment
@@ -53,6 +54,23 @@ def test_a_session_that_cannot_be_resumed_gives_the_reason(
     assert "has version 9" in problems["foreign"]
     assert "does not begin" in problems["empty"]
     assert "in use by process" in problems["running"]
+
+
+def test_a_damaged_session_knows_of_its_repaired_copy(tmp_path: Path, alignment: Alignment) -> None:
+    with make(tmp_path, "one") as session:
+        session.save_alignment(alignment)
+        session.save_alignment(alignment)
+    with make(tmp_path, "other") as other:
+        other.save_alignment(alignment)
+    for name in ("one", "other"):
+        (tmp_path / name / "alignments" / "1.npz").unlink()
+    repair_session(tmp_path / "one", tmp_path / "copy")
+    found = {session.path.name: session.is_repaired for session in unfinished_sessions(tmp_path)}
+    assert found == {"one": True, "copy": False, "other": False}
+    with Session(tmp_path / "copy") as copy:
+        copy.finish()
+    found = {session.path.name: session.is_repaired for session in unfinished_sessions(tmp_path)}
+    assert found == {"one": True, "other": False}
 
 
 def test_a_folder_that_is_not_there_has_none(tmp_path: Path) -> None:

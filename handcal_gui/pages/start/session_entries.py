@@ -61,7 +61,8 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
         unfinished=tuple(
             _unfinished(session)
             for session in unfinished
-            if session.problem or session.alignments or session.trials
+            if (session.problem or session.alignments or session.trials)
+            and not session.is_repaired  # its copy is resumed; the library names both
         ),
         recent=tuple(islice((entry for entry in offered if entry is not None), MOST_RECENT)),
     )

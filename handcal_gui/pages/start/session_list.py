@@ -17,7 +17,14 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.pages.start.session_entries import Entry
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
-from handcal_gui.widgets.error_bars import PICTURE_PX, error_bars, error_text
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.error_bars import (
+    PICTURE_HELP,
+    PICTURE_LEGEND,
+    PICTURE_PX,
+    error_bars,
+    picture_text,
+)
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
 
@@ -62,8 +69,12 @@ class SessionList(QWidget):
         layout = vbox(
             (self._empty, 1), (self._list, 1), on=self, margins=0, spacing=SPACING_PX // 2
         )
+        self._legend = with_name(ElidedLabel(), "legend")
+        self._legend.setText(PICTURE_LEGEND)
+        self._legend.setToolTip(PICTURE_HELP)
         self._buttons = QHBoxLayout()
-        self._buttons.addStretch(1)
+        self._buttons.addWidget(self._legend, 1)
+        self._buttons.addStretch()
         self._buttons.addWidget(self._button)
         layout.addLayout(self._buttons)
         self._entries: Sequence[Entry] = ()
@@ -78,10 +89,12 @@ class SessionList(QWidget):
         self._list.clear()
         self._list.setVisible(bool(entries))
         self._empty.setVisible(not entries)
+        self._legend.setVisible(has_pictures)
         for entry in entries:
             item = QListWidgetItem(entry.text)
             item.setData(Qt.ItemDataRole.UserRole, entry.path)
-            item.setToolTip("\n".join(filter(None, (str(entry.path), error_text(entry.eyes)))))
+            item.setToolTip("\n".join(filter(None, (str(entry.path), picture_text(entry.eyes)))))
+            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, picture_text(entry.eyes))
             if has_pictures:
                 item.setIcon(QIcon(error_bars(entry.eyes)))
             if not entry.is_enabled:
@@ -94,7 +107,7 @@ class SessionList(QWidget):
 
     def add_button(self, added: QPushButton) -> None:
         """Add a button before the list's own."""
-        self._buttons.insertWidget(1, added)
+        self._buttons.insertWidget(2, added)
 
     def _choose(self) -> None:
         item = self._list.currentItem()

@@ -18,7 +18,7 @@ from handcal.session.library import LibraryEntry
 from handcal.types import EYES, VerdictName
 from handcal_gui.theme import number_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.error_bars import error_bars, error_text
+from handcal_gui.widgets.error_bars import error_bars, error_text, picture_text
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.times import local_time
@@ -67,6 +67,8 @@ def worst_arcmin(entry: LibraryEntry, kind: Literal["measured", "expected"]) -> 
 def _state(entry: LibraryEntry) -> str:
     if entry.problem:
         return tr("Unreadable")
+    if entry.repaired_as:
+        return tr("Damaged, has a copy")
     if entry.damaged:
         return tr("Damaged: {}").format(pluralize(entry.damaged, tr("part"), tr("parts")))
     if entry.is_repaired:
@@ -196,10 +198,15 @@ class SessionsModel(QAbstractTableModel):
                 return column.text(entry)
             case Qt.ItemDataRole.DecorationRole if index.column() == 0:
                 return error_bars(entry.eyes)
+            case Qt.ItemDataRole.AccessibleDescriptionRole if index.column() == 0:
+                return picture_text(entry.eyes)
             case Qt.ItemDataRole.UserRole:
                 return column.key(entry)
             case Qt.ItemDataRole.ToolTipRole:
-                lines = column.text(entry), entry.problem or str(entry.path), error_text(entry.eyes)
+                copy = tr("Repaired in {}").format(entry.repaired_as) if entry.repaired_as else ""
+                path = entry.problem or str(entry.path)
+                errors = (error_text if index.column() else picture_text)(entry.eyes)
+                lines = column.text(entry), copy, path, errors
                 return "\n".join(filter(None, lines))  # the cell's text may be elided
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from handcal.errors import FileError
 from handcal.progress import Progress
-from handcal.session.library import delete_session, restore_session
+from handcal.session.library import correct_wearer, delete_session, restore_session
 from handcal.session.repair import check_session, repair_session
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
@@ -46,10 +47,32 @@ def repair_beside(path: Path, progress: Progress) -> str:
 
 def delete_sessions(paths: Sequence[Path], progress: Progress) -> str:
     """Delete some sessions, each of which can be restored; return a message."""
+    failed = _each(paths, delete_session, tr("Deleting {}"), progress)
+    count = pluralize(len(paths) - len(failed), tr("session"), tr("sessions"))
+    return "\n".join((tr("{} deleted.").format(count), *failed))
+
+
+def correct_names(names: Mapping[Path, str], progress: Progress) -> str:
+    """Correct the names of the wearers of some sessions; return a message."""
+    failed = _each(
+        list(names), lambda path: correct_wearer(path, names[path]), tr("Correcting {}"), progress
+    )
+    count = pluralize(len(names) - len(failed), tr("session"), tr("sessions"))
+    return "\n".join((tr("Name corrected in {}.").format(count), *failed))
+
+
+def _each(
+    paths: Sequence[Path], do: Callable[[Path], object], doing: str, progress: Progress
+) -> list[str]:
+    """Do something to each session; return those for which it failed, with the reasons."""
+    failed = []
     for done, path in enumerate(paths):
-        progress.at(done / len(paths), tr("Deleting {}").format(path.name))
-        delete_session(path)
-    return tr("{} deleted.").format(pluralize(len(paths), tr("session"), tr("sessions")))
+        progress.at(done / len(paths), doing.format(path.name))
+        try:
+            do(path)
+        except (FileError, ValueError) as error:  # a name may be invalid
+            failed.append(f"{path.name}: {error}")
+    return failed
 
 
 def restore_deleted(path: Path, _progress: Progress) -> str:

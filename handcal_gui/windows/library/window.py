@@ -6,46 +6,41 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QItemSelectionModel, Qt, Signal
-from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QShowEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
+    QComboBox,
     QDialog,
-    QHeaderView,
+    QInputDialog,
     QLineEdit,
+    QPushButton,
     QSplitter,
-    QTableView,
     QWidget,
 )
 
 from handcal.session.library import LibraryEntry, deleted_sessions, read_library
+from handcal.session.state import MAX_WEARER_CHARACTERS
 from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.keys import add_action
-from handcal_gui.theme import SPACING_PX, flat_header
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import button, choice, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.windows.library.sessions_model import (
-    COLUMNS,
-    FILTERS,
-    SessionsFilter,
-    SessionsModel,
-)
+from handcal_gui.widgets.result_rows import NOTHING
+from handcal_gui.windows.library.sessions_model import FILTERS, SessionsFilter, SessionsModel
+from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
     check_sessions,
+    correct_names,
     delete_sessions,
     repair_beside,
     restore_deleted,
 )
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
-_MOST_SHOWN_PX = 300
-_LONG_NAMES_PX = {tr("Rig"): 60, tr("Headset"): 60, tr("Wearer"): 120}
-"""Widths that remain of columns with long texts, in the order in which they are cut."""
 _TREND_PX = 20 * SPACING_PX
 
 
@@ -75,6 +70,7 @@ class LibraryWindow(QDialog):
         self.setWindowTitle(tr("Sessions"))
         self._folder = folder
         self._deleted: tuple[Path, ...] = ()
+        self._former_names: dict[Path, str] = {}
         self._is_read = False
         self._job: Job | None = None
         self._sessions = SessionsModel()
@@ -83,7 +79,7 @@ class LibraryWindow(QDialog):
         self._search.setPlaceholderText(tr("Search wearer, date, rig, headset"))
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
-        self._table = _table(self._filter)
+        self._table = SessionsTable(self._sessions, self._filter)
         self._count = paragraph("count")
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(_TREND_PX)
@@ -91,7 +87,7 @@ class LibraryWindow(QDialog):
         self._message = paragraph("message")
         self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._message.hide()  # until there is one
-        self._make_buttons()
+        self._make_actions()
         self._lay_out()
         self._find = LatestJob(lambda known: self._read(known), self)
         self._find.answered.connect(lambda _, found: self._show(*found))
@@ -99,16 +95,14 @@ class LibraryWindow(QDialog):
         self._search.textChanged.connect(self._search_again)
         self._kind.currentIndexChanged.connect(self._search_again)
         self._table.selectionModel().selectionChanged.connect(self._refresh)
-        self._table.doubleClicked.connect(self._open_chosen)
+        self._table.doubleClicked.connect(self._open.trigger)
         self.finished.connect(self.stop)
         self._refresh()
 
     @property
     def chosen(self) -> list[LibraryEntry]:
         """The sessions that are selected, in the order shown."""
-        rows = self._table.selectionModel().selectedRows()
-        sources = (self._filter.mapToSource(one).row() for one in sorted(rows, key=_row))
-        return [self._sessions.entries[row] for row in sources]
+        return self._table.chosen
 
     def reload(self) -> None:
         """Read the folder again."""
@@ -127,11 +121,6 @@ class LibraryWindow(QDialog):
         self._begin_search()
         self.reload()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give the columns the room there is."""
-        super().resizeEvent(event)
-        self._fit_columns()
-
     def _read(
         self, known: Sequence[LibraryEntry]
     ) -> tuple[tuple[LibraryEntry, ...], tuple[Path, ...]]:
@@ -144,34 +133,9 @@ class LibraryWindow(QDialog):
         self._deleted, self._is_read = deleted, True
         if entries != self._sessions.entries:
             self._sessions.show_entries(entries)
-            self._choose(chosen)
-            self._fit_columns()
+            self._table.choose(chosen)
+            self._table.fit_columns()
         self._refresh()
-
-    def _choose(self, paths: set[Path]) -> None:
-        flags = QItemSelectionModel.SelectionFlag
-        for row, entry in enumerate(self._sessions.entries):
-            if entry.path in paths:
-                place = self._filter.mapFromSource(self._sessions.index(row, 0))
-                self._table.selectionModel().select(place, flags.Select | flags.Rows)
-
-    def _fit_columns(self) -> None:
-        """Show every column's contents; long names are cut as far as the room demands."""
-        across = self._table.horizontalHeader()
-        wanted_px = {
-            column.title: min(
-                max(self._table.sizeHintForColumn(number), across.sectionSizeHint(number)),
-                _MOST_SHOWN_PX,
-            )
-            for number, column in enumerate(COLUMNS)
-        }
-        excess_px = sum(wanted_px.values()) - self._table.viewport().width()
-        for title, least_px in _LONG_NAMES_PX.items():
-            cut_px = max(min(excess_px, wanted_px[title] - least_px), 0)
-            wanted_px[title] -= cut_px
-            excess_px -= cut_px
-        for number, width_px in enumerate(wanted_px.values()):
-            self._table.setColumnWidth(number, width_px)
 
     def _begin_search(self) -> None:
         self._search.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -189,13 +153,13 @@ class LibraryWindow(QDialog):
         can_resume = len(readable) == 1 and not readable[0].is_finished
         self._resume.setEnabled(can_resume)
         self._export.setEnabled(any(entry.alignments for entry in readable))
+        self._correct.setEnabled(is_free and bool(chosen) and chosen == readable)
+        self._show_folder.setEnabled(len(chosen) == 1)
+        self._copy.setEnabled(bool(chosen))
         self._check.setEnabled(is_free and bool(chosen))
         self._repair.setEnabled(is_free and len(chosen) == 1)
         self._delete.setEnabled(is_free and bool(chosen))
-        self._undo.setVisible(bool(self._deleted))
-        self._undo.setEnabled(is_free and bool(self._deleted))
-        last = self._deleted[-1].name if self._deleted else ""
-        self._deleted_text.setText(tr("Last deleted: {}").format(last) if last else "")
+        self._refresh_undo()
         shown, total = self._filter.rowCount(), self._sessions.rowCount()
         count = (
             pluralize(total, tr("session"), tr("sessions"))
@@ -209,6 +173,20 @@ class LibraryWindow(QDialog):
         )
         self._show_trend(chosen[0].wearer if chosen else "")
 
+    def _refresh_undo(self) -> None:
+        """Offer to undo the correction made in this window, else the last deletion."""
+        if self._former_names:
+            names = ", ".join(sorted({name or NOTHING for name in self._former_names.values()}))
+            verb, text = tr("Undo"), tr("Name before: {}").format(names)
+        else:
+            last = self._deleted[-1].name if self._deleted else ""
+            verb, text = tr("Restore"), tr("Last deleted: {}").format(last) if last else ""
+        self._undo.setText(verb)
+        self._undo.setToolTip(tr("{} (Ctrl+Z)").format(text))
+        self._undo.setVisible(bool(text))
+        self._undo.setEnabled(bool(text) and self._job is None)
+        self._change_text.setText(text)
+
     def _show_trend(self, wearer: str) -> None:
         found = calibrations_of(wearer, self._sessions.entries)
         self._trend.setVisible(len(found) > 1)
@@ -221,9 +199,8 @@ class LibraryWindow(QDialog):
             )
 
     def _open_chosen(self) -> None:
-        if self._open.isEnabled():
-            self.open_requested.emit(self.chosen[0].path)
-            self.accept()
+        self.open_requested.emit(self.chosen[0].path)
+        self.accept()
 
     def _resume_chosen(self) -> None:
         self.resume_requested.emit(self.chosen[0].path)
@@ -240,10 +217,49 @@ class LibraryWindow(QDialog):
         self._start(partial(repair_beside, self.chosen[0].path))
 
     def _delete_chosen(self) -> None:
+        self._former_names = {}
         self._start(partial(delete_sessions, [entry.path for entry in self.chosen]))
 
-    def _restore_last(self) -> None:
-        self._start(partial(restore_deleted, self._deleted[-1]))
+    def _ask_name(self) -> None:
+        """Let the user correct the name of the chosen sessions' wearer."""
+        chosen = self.chosen
+        known = {entry.wearer for entry in self._sessions.entries} - {""}
+        former = [name for entry in chosen for name in entry.former_wearers]
+        names = dict.fromkeys([chosen[0].wearer, *former, *sorted(known, key=str.casefold)])
+        dialog = QInputDialog(self)
+        dialog.setWindowTitle(tr("Correct the name"))
+        count = pluralize(len(chosen), tr("session"), tr("sessions"))
+        dialog.setLabelText(tr("Name or code of the wearer of {}:").format(count))
+        dialog.setComboBoxEditable(True)
+        dialog.setComboBoxItems(list(names))
+        dialog.setTextValue(chosen[0].wearer)
+        box = dialog.findChildren(QComboBox)[0]
+        field, completer = box.lineEdit(), box.completer()
+        assert field is not None
+        assert completer is not None
+        field.setMaxLength(MAX_WEARER_CHARACTERS)
+        completer.setCaseSensitivity(Qt.CaseSensitivity.CaseSensitive)  # p7 may become P7
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.textValueSelected.connect(lambda name: self._correct_names(chosen, name))
+        dialog.open()
+
+    def _correct_names(self, entries: Sequence[LibraryEntry], name: str) -> None:
+        self._former_names = {entry.path: entry.wearer for entry in entries}
+        self._start(partial(correct_names, {entry.path: name for entry in entries}))
+
+    def _show_folder_of_chosen(self) -> None:
+        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.chosen[0].path.absolute())))
+
+    def _copy_paths(self) -> None:
+        paths = (str(entry.path.absolute()) for entry in self.chosen)
+        QGuiApplication.clipboard().setText("\n".join(paths))
+
+    def _undo_last(self) -> None:
+        if self._former_names:
+            self._start(partial(correct_names, self._former_names))
+            self._former_names = {}
+        else:
+            self._start(partial(restore_deleted, self._deleted[-1]))
 
     def _start(self, work: Work) -> None:
         if self._job is not None:
@@ -269,61 +285,50 @@ class LibraryWindow(QDialog):
         self._message.setText(message)
         self._message.setVisible(bool(message))
 
-    def _make_buttons(self) -> None:
-        made: list[tuple[str, str, str, Callable[[], None]]] = [
-            ("openSession", tr("Open"), tr("Review the selected session"), self._open_chosen),
-            (
-                "resumeSession",
-                tr("Resume"),
-                tr("Continue the selected session"),
-                self._resume_chosen,
-            ),
-            (
-                "exportSessions",
-                tr("Export…"),
-                tr("Export the selected sessions"),
-                self._export_chosen,
-            ),
-            (
-                "checkSessions",
-                tr("Check"),
-                tr("Read every file of the selected sessions"),
-                self._check_chosen,
-            ),
-            (
-                "repairSession",
-                tr("Repair"),
-                tr("Copy what is sound to a new session"),
-                self._repair_chosen,
-            ),
-            (
-                "deleteSessions",
-                tr("Delete"),
-                tr("Delete the selected sessions (Del)"),
-                self._delete_chosen,
-            ),
-            (
-                "restoreSession",
-                tr("Restore"),
-                tr("Restore the last deleted session (Ctrl+Z)"),
-                self._restore_last,
-            ),
-        ]
-        found = []
-        for name, text, help_text, do in made:
-            one = button(name, text, help_text=help_text)
-            one.setAutoDefault(False)
-            one.clicked.connect(do)
-            found.append(one)
-        self._open, self._resume, self._export, self._check, self._repair = found[:5]
-        self._delete, self._undo = found[5:]
-        add_action(self._table, tr("Delete sessions"), "Del", self._delete.click)
-        add_action(self._table, tr("Open the session"), "Return", self._open_chosen)
+    def _make_actions(self) -> None:
+        """Make the actions of the context menu, most of which have a button and some a key."""
+        self._open = self._act(tr("Open"), "Return", self._open_chosen, tr("Review it (Return)"))
+        self._resume = self._act(
+            tr("Resume"), "", self._resume_chosen, tr("Continue the selected session")
+        )
+        self._export = self._act(
+            tr("Export…"), "", self._export_chosen, tr("Export the selected sessions")
+        )
+        self._separate()
+        self._correct = self._act(
+            tr("Name…"),
+            "F2",
+            self._ask_name,
+            tr("Correct the wearer's name or code in the selected sessions (F2)"),
+        )
+        self._show_folder = self._act(tr("Show folder"), "", self._show_folder_of_chosen)
+        self._copy = self._act(tr("Copy path"), "Ctrl+C", self._copy_paths)
+        self._separate()
+        self._check = self._act(
+            tr("Check"), "", self._check_chosen, tr("Read every file of the selected sessions")
+        )
+        self._repair = self._act(
+            tr("Repair"), "", self._repair_chosen, tr("Copy what is sound to a new session")
+        )
+        self._delete = self._act(
+            tr("Delete"), "Del", self._delete_chosen, tr("Delete the selected sessions (Del)")
+        )
+        self._table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+        self._undo = _button("restoreSession", tr("Restore"))
+        self._undo.clicked.connect(self._undo_last)
         add_action(self, tr("Search"), "Ctrl+F", self._begin_search)
-        add_action(self, tr("Restore the deleted session"), "Ctrl+Z", self._undo.click)
+        add_action(self, tr("Undo the last change"), "Ctrl+Z", self._undo.click)
+
+    def _act(self, text: str, keys: str, do: Callable[[], None], help_text: str = "") -> QAction:
+        return add_action(self._table, text, keys, do, tooltip=help_text)
+
+    def _separate(self) -> None:
+        line = QAction(self._table)
+        line.setSeparator(True)
+        self._table.addAction(line)
 
     def _lay_out(self) -> None:
-        self._deleted_text = ElidedLabel()
+        self._change_text = ElidedLabel()
         below = QWidget()
         vbox(self._trend_title, (self._trend, 1), on=below, margins=0, spacing=0)
         halves = QSplitter(Qt.Orientation.Vertical)
@@ -333,17 +338,19 @@ class LibraryWindow(QDialog):
         halves.setStretchFactor(1, 1)
         halves.setChildrenCollapsible(False)
         top = hbox((self._search, 1), self._kind, spacing=SPACING_PX)
-        actions = hbox(
-            (self._deleted_text, 1),
-            self._undo,
-            self._delete,
-            self._repair,
-            self._check,
-            self._export,
-            self._resume,
-            self._open,
-            spacing=SPACING_PX,
+        buttons = (
+            _button_of(name, action)
+            for name, action in {
+                "correctName": self._correct,
+                "deleteSessions": self._delete,
+                "repairSession": self._repair,
+                "checkSessions": self._check,
+                "exportSessions": self._export,
+                "resumeSession": self._resume,
+                "openSession": self._open,
+            }.items()
         )
+        actions = hbox((self._change_text, 1), self._undo, *buttons, spacing=SPACING_PX)
         vbox(
             top,
             (halves, 1),
@@ -357,30 +364,17 @@ class LibraryWindow(QDialog):
         self.resize(130 * SPACING_PX, 84 * SPACING_PX)
 
 
-def _table(model: SessionsFilter) -> QTableView:
-    table = with_name(QTableView(), "sessionTable", tr("Sessions"))
-    table.setModel(model)
-    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-    table.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-    table.setTabKeyNavigation(False)
-    table.setWordWrap(False)
-    table.setShowGrid(False)
-    table.setAlternatingRowColors(True)
-    table.setSortingEnabled(True)
-    table.sortByColumn(1, Qt.SortOrder.DescendingOrder)
-    table.setMinimumHeight(12 * SPACING_PX)
-    table.verticalHeader().hide()
-    table.setIconSize(PICTURE_PX)
-    row_px = max(table.fontMetrics().height(), PICTURE_PX.height()) + SPACING_PX // 2
-    table.verticalHeader().setDefaultSectionSize(row_px)
-    across = table.horizontalHeader()
-    flat_header(across)
-    across.setHighlightSections(False)
-    across.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
-    across.setStretchLastSection(True)
-    return table
+def _button(name: str, text: str) -> QPushButton:
+    made = button(name, text)
+    made.setAutoDefault(False)
+    return made
 
 
-def _row(index: object) -> int:
-    return index.row()  # type: ignore[attr-defined,no-any-return]
+def _button_of(name: str, action: QAction) -> QPushButton:
+    """Return a button that triggers an action, and is enabled while the action is."""
+    made = _button(name, action.text())
+    made.setToolTip(action.toolTip())
+    made.setEnabled(action.isEnabled())
+    made.clicked.connect(action.trigger)
+    action.enabledChanged.connect(made.setEnabled)
+    return made

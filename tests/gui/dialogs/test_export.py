@@ -19,7 +19,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
-from handcal.export.export import ExportSettings
+from handcal.export.export import ExportSettings, export_session
+from handcal.export.many import Exported
 from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
@@ -33,16 +34,11 @@ class Exporter:
     def __init__(self) -> None:
         self.may_end = threading.Event()
         self.failure = ""
+        self.missing: tuple[str, ...] = ()
         self.folders: list[Path] = []
         self.settings: list[ExportSettings] = []
 
-    def __call__(
-        self,
-        _: SessionRecord,
-        folder: Path,
-        settings: ExportSettings,
-        progress: Progress,
-    ) -> tuple[Path, ...]:
+    def __call__(self, folder: Path, settings: ExportSettings, progress: Progress) -> Exported:
         self.folders.append(folder)
         self.settings.append(settings)
         progress.at(0.25, "Report (PDF)")
@@ -50,7 +46,7 @@ class Exporter:
             progress.check()
         if self.failure:
             raise FileError(self.failure)
-        return folder / "a.csv", folder / "clouds" / "b.ply"
+        return Exported((folder / "a.csv", folder / "clouds" / "b.ply"), self.missing)
 
 
 @pytest.fixture
@@ -65,7 +61,7 @@ def dialog(
     qtbot: QtBot, record: SessionRecord, tmp_path: Path, exporter: Exporter
 ) -> Iterator[ExportDialog]:
     settings = ExportSettings(("report", "csv"))
-    dialog = ExportDialog(record, settings, tmp_path / "out", export=exporter)
+    dialog = ExportDialog(record.path.name, settings, tmp_path / "out", exporter)
     qtbot.addWidget(dialog)
     dialog.show()
     yield dialog
@@ -157,6 +153,16 @@ def test_a_failure_is_reported_and_can_be_tried_again(
     qtbot.waitUntil(lambda: len(files(dialog)) == 2)
 
 
+def test_sessions_that_were_not_exported_are_named_above_the_files(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
+) -> None:
+    exporter.missing = ("bea: it has no alignments",)
+    exporter.may_end.set()
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: text(dialog, "doing") == "1 session not exported, see below.")
+    assert files(dialog)[:2] == ["bea: it has no alignments", "a.csv"]
+
+
 def test_cancel_stops_the_export_and_keeps_the_dialog(
     qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
 ) -> None:
@@ -180,7 +186,13 @@ def test_closing_while_it_runs_cancels_and_then_closes(
 
 
 def test_a_real_session_is_exported(qtbot: QtBot, record: SessionRecord, tmp_path: Path) -> None:
-    dialog = ExportDialog(record, ExportSettings(("csv", "unity", "yaml")), tmp_path / "out")
+    settings = ExportSettings(("csv", "unity", "yaml"))
+    dialog = ExportDialog(
+        record.path.name,
+        settings,
+        tmp_path / "out",
+        lambda *where: Exported(export_session(record, *where)),
+    )
     qtbot.addWidget(dialog)
     dialog.start()
     qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.", timeout=20_000)

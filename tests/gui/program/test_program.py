@@ -24,12 +24,14 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.errors import LinkError
+from handcal.export.export import ExportSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile
+from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, text
 from tests.gui.program.technician import (
     PATIENCE_MS,
@@ -48,6 +50,20 @@ def test_damaged_pairing_keys_are_said_and_left_alone(
     path.write_bytes(b'{"devices": [')
     assert "pairing.key are damaged" in open_program().banner
     assert path.read_bytes() == b'{"devices": ['
+
+
+def test_exports_go_beside_the_session_folder_or_to_the_last_one(
+    technician: Technician, tmp_path: Path
+) -> None:
+    program = technician.program
+    paths = [tmp_path / "sessions" / "a", tmp_path / "sessions" / "b"]
+
+    first = program.windows.export_many(paths, program.window)
+    assert first.windowTitle() == "Export 2 sessions"
+    assert child(first, PathField).path == str(tmp_path / "handcal exports")
+    first.remembered.emit(ExportSettings(), tmp_path / "chosen")
+    second = program.windows.export_many(paths, program.window)
+    assert child(second, PathField).path == str(tmp_path / "chosen")
 
 
 def test_the_dialogs_of_the_menus_end_with_the_program(

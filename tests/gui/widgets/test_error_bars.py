@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QImage
 from handcal.session.library import EyeOutcome
 from handcal.types import Eye
 from handcal_gui.theme import colors
-from handcal_gui.widgets.error_bars import PICTURE_PX, error_bars, error_text
+from handcal_gui.widgets.error_bars import PICTURE_PX, error_bars, error_text, picture_text
 
 pytestmark = pytest.mark.usefixtures("qtbot")
 
@@ -61,3 +61,6 @@ def test_the_text_says_the_same() -> None:
         "Left eye: 20.0′ before, 5.0′ after",
         "Right eye: – before, 12.0′ after",
     ]
+    assert picture_text(eyes).startswith(f"{error_text(eyes)}\nBars of the small picture: the left")
+    assert "The whole\nwidth is 30′." in picture_text(eyes)
+    assert picture_text({}) == ""

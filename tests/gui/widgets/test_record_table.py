@@ -103,3 +103,10 @@ def test_columns_that_do_not_fit_are_in_the_tooltip_of_the_row(qtbot: QtBot) -> 
     table.resize(no + name + 10, 200)
     tooltip = table.model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
     assert tooltip == "Number\n\nSize mm: 1.25"
+
+
+def test_a_row_with_two_lines_is_higher(table: RecordTable) -> None:
+    table.show_rows({1: ("1", "left\nright"), 2: ("2", "left")})
+    assert table.rowHeight(0) >= table.rowHeight(1) + table.fontMetrics().height()
+    table.show_rows({1: ("1", "left"), 2: ("2", "left")})
+    assert table.rowHeight(0) == table.rowHeight(1)

@@ -10,7 +10,7 @@ from handcal.register.results import Results
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial
-from handcal.types import Alignment, Eye
+from handcal.types import EYES, Alignment, Eye
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
     STATISTICS_COLUMNS,
@@ -44,19 +44,19 @@ def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
         assert float(cells[column(ALIGNMENT_COLUMNS, "Rotation °")]) == pytest.approx(
             angle_deg, abs=0.05
         )
-        shown_mm = cells[column(ALIGNMENT_COLUMNS, "Left φ mm")].replace("−", "-").split()
-        np.testing.assert_allclose(
-            [float(value) for value in shown_mm], 1e3 * shifts["left"].shift_m, atol=0.005
-        )
-        assert cells[column(ALIGNMENT_COLUMNS, "RMS mm")] == " / ".join(
+        lines = cells[column(ALIGNMENT_COLUMNS, "φ mm")].replace("−", "-").splitlines()
+        for eye, line in zip(EYES, lines, strict=True):
+            shown_mm = [float(value) for value in line.split()]
+            np.testing.assert_allclose(shown_mm, 1e3 * shifts[eye].shift_m, atol=0.005)
+        assert cells[column(ALIGNMENT_COLUMNS, "RMS mm")] == "\n".join(
             f"{1e3 * shift.rms_m:.2f}" for shift in shifts.values()
         )
 
 
 def test_results_of_other_alignments_are_left_out(record: SessionRecord, results: Results) -> None:
     shorter = replace(record, alignments={1: record.alignments[1]})
-    assert alignment_rows(shorter, results)[1][3:7] == ("–",) * 4
-    assert alignment_rows(record, None)[2][3:7] == ("–",) * 4
+    assert alignment_rows(shorter, results)[1][3:6] == ("–",) * 3
+    assert alignment_rows(record, None)[2][3:6] == ("–",) * 3
 
 
 def test_one_eye_alone(
@@ -69,8 +69,13 @@ def test_one_eye_alone(
     )
     cells = alignment_rows(replace(record, alignments={1: one, 2: alignments[1]}), alone)[1]
     assert cells[1] == "Right eye"
-    assert cells[column(ALIGNMENT_COLUMNS, "Left φ mm")] == "–"
-    assert "/" not in cells[column(ALIGNMENT_COLUMNS, "RMS mm")]
+    [shown] = cells[column(ALIGNMENT_COLUMNS, "φ mm")].replace("−", "-").splitlines()
+    np.testing.assert_allclose(
+        [float(value) for value in shown.split()],
+        1e3 * results.alignments[1]["right"].shift_m,
+        atol=0.005,
+    )
+    assert "\n" not in cells[column(ALIGNMENT_COLUMNS, "RMS mm")]
 
 
 def test_trials_as_text(record: SessionRecord) -> None:

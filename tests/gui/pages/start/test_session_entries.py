@@ -9,6 +9,7 @@ from pathlib import Path
 
 from handcal.rig.example import example_rig
 from handcal.session.library import EyeOutcome
+from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import Alignment
 from handcal_gui.pages.start.session_entries import find_sessions
@@ -48,6 +49,17 @@ def test_a_damaged_session_is_reported_with_the_reason(
     (entry,) = find_sessions(tmp_path, ()).unfinished
     assert not entry.is_enabled
     assert "does not begin as the journal" in entry.text
+
+
+def test_of_a_repaired_session_only_the_copy_is_resumed(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    path = make(tmp_path, "Ada", [alignment, alignment], is_done=False)
+    (path / "alignments" / "1.npz").unlink()
+    repair_session(path, tmp_path / "copy")
+    found = find_sessions(tmp_path, ())
+    assert [entry.path.name for entry in found.unfinished] == ["copy"]
+    assert found.recent == ()
 
 
 def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(

@@ -8,12 +8,13 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLineEdit, QPushButton, QTableView
+from PySide6.QtWidgets import QComboBox, QInputDialog, QLineEdit, QPushButton, QTableView
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
-from handcal.session.library import read_library
+from handcal.session.library import delete_session, read_library
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import Alignment
@@ -171,7 +172,10 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
     qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
     assert (folder / "cid-repaired").is_dir()
     assert not Session.open(folder / "cid-repaired").damaged
-    assert [row[8] for row in rows(window)].count("Unfinished, repaired copy") == 1
+    states = [row[8] for row in rows(window)]
+    assert states.count("Unfinished, repaired copy") == 1
+    state = table(window).model().index(states.index("Damaged, has a copy"), 8)
+    assert "Repaired in cid-repaired" in state.data(Qt.ItemDataRole.ToolTipRole)
     assert [entry.path.name for entry in window.chosen] == ["cid-repaired"]
 
 
@@ -216,6 +220,74 @@ def test_an_open_session_stays(qtbot: QtBot, window: LibraryWindow, folder: Path
         press(window, "deleteSessions")
         wait_for(qtbot, window, "is in use by process")
     assert (folder / "bea").is_dir()
+
+
+def test_one_that_is_gone_does_not_keep_the_others_from_being_deleted(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Bea", "Cid")
+    delete_session(folder / "bea")  # by another program
+    press(window, "deleteSessions")
+    wait_for(qtbot, window, "1 session deleted.\nbea: ")
+    assert "is no longer there" in text(window, "message")
+    qtbot.waitUntil(lambda: wearers(window) == ["Ada", "Ada"], timeout=PATIENCE_MS)
+
+
+def answer_name(window: LibraryWindow, name: str) -> list[str]:
+    """Press F2 and type a name; return the names that were offered."""
+    table(window).setFocus()
+    QTest.keyClick(table(window), Qt.Key.Key_F2)
+    dialog = child(window, QInputDialog)
+    typed = child(dialog, QComboBox).lineEdit()
+    assert typed is not None
+    assert typed.text() == window.chosen[0].wearer
+    typed.selectAll()
+    QTest.keyClicks(typed, name)
+    offered = dialog.comboBoxItems()
+    QTest.keyClick(typed, Qt.Key.Key_Return)
+    return offered
+
+
+def test_a_name_is_corrected_and_brought_back(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Ada")
+    assert answer_name(window, "ada") == ["Ada", "Bea", "Cid"]
+    qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "ada", "ada"], timeout=PATIENCE_MS)
+    wait_for(qtbot, window, "Name corrected in 2 sessions.")
+    assert [entry.wearer for entry in window.chosen] == ["ada", "ada"]
+    window.activateWindow()  # which a window manager does when a dialog ends
+    qtbot.waitUntil(window.isActiveWindow, timeout=PATIENCE_MS)
+    QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "Ada", "Ada"], timeout=PATIENCE_MS)
+    assert Session.open(folder / "ada-1").wearer == "Ada"
+    qtbot.waitUntil(child(window, QPushButton, "correctName").isEnabled, timeout=PATIENCE_MS)
+    assert child(window, QPushButton, "restoreSession").isHidden()
+    assert answer_name(window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
+
+
+def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    choose(window, "Bea", "Cid")
+    with Session(folder / "bea"):
+        answer_name(window, "Eve")
+        wait_for(qtbot, window, "Name corrected in 1 session.\nbea: ")
+        assert "is in use by process" in text(window, "message")
+    qtbot.waitUntil(lambda: wearers(window)[:2] == ["Eve", "Bea"], timeout=PATIENCE_MS)
+
+
+def test_the_context_menu_has_every_action(window: LibraryWindow, folder: Path) -> None:
+    assert table(window).contextMenuPolicy() == Qt.ContextMenuPolicy.ActionsContextMenu
+    actions = {one.text(): one for one in table(window).actions() if not one.isSeparator()}
+    assert set(actions) == {
+        "Open", "Resume", "Export…", "Name…", "Show folder", "Copy path", "Check", "Repair",
+        "Delete",
+    }  # fmt: skip
+    choose(window, "Ada")
+    assert not actions["Show folder"].isEnabled()
+    actions["Copy path"].trigger()
+    assert QGuiApplication.clipboard().text() == f"{folder / 'ada-2'}\n{folder / 'ada-1'}"
+    table(window).clearSelection()
+    assert not any(action.isEnabled() for action in actions.values())
 
 
 def test_an_empty_folder(qtbot: QtBot, tmp_path_factory: pytest.TempPathFactory) -> None:
