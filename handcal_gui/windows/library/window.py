@@ -142,7 +142,10 @@ class LibraryWindow(QDialog):
         self._search.selectAll()
 
     def _search_again(self) -> None:
+        chosen = {entry.path for entry in self.chosen}
+        self._table.clearSelection()  # else it changes, and all is refreshed, with every row
         self._filter.search(self._search.text(), self._kind.currentData())
+        self._table.choose(chosen)
         self._refresh()
 
     def _refresh(self) -> None:
