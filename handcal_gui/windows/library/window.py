@@ -131,6 +131,12 @@ class LibraryWindow(QDialog):
         made = {entry.path for entry in entries} - shown if self._is_read else set()
         chosen = made or {entry.path for entry in self.chosen}  # a copy or what was restored
         self._deleted, self._is_read = deleted, True
+        wearers = {entry.path: entry.wearer for entry in entries}
+        self._former_names = {
+            path: name
+            for path, name in self._former_names.items()
+            if wearers.get(path, name) != name  # else it was not corrected, or is undone
+        }
         if entries != self._sessions.entries:
             self._sessions.show_entries(entries)
             self._table.choose(chosen)
@@ -260,7 +266,6 @@ class LibraryWindow(QDialog):
     def _undo_last(self) -> None:
         if self._former_names:
             self._start(partial(correct_names, self._former_names))
-            self._former_names = {}
         else:
             self._start(partial(restore_deleted, self._deleted[-1]))
 

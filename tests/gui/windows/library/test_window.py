@@ -273,6 +273,9 @@ def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, fol
         wait_for(qtbot, window, "Name corrected in 1 session.\nbea: ")
         assert "is in use by process" in text(window, "message")
     qtbot.waitUntil(lambda: wearers(window)[:2] == ["Eve", "Bea"], timeout=PATIENCE_MS)
+    press(window, "restoreSession")  # only Cid's name was corrected
+    wait_for(qtbot, window, "Name corrected in 1 session.")
+    qtbot.waitUntil(lambda: wearers(window)[0] == "Cid", timeout=PATIENCE_MS)
 
 
 def test_the_context_menu_has_every_action(window: LibraryWindow, folder: Path) -> None:
