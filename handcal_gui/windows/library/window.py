@@ -58,11 +58,14 @@ class LibraryWindow(QDialog):
         A session to open, or to resume.
     export_requested : Signal(object)
         The sessions to export, a list of Path.
+    changed : Signal()
+        Sessions may have been changed: names corrected, sessions deleted, restored or repaired.
     """
 
     open_requested = Signal(object)
     resume_requested = Signal(object)
     export_requested = Signal(object)
+    changed = Signal()
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -286,6 +289,7 @@ class LibraryWindow(QDialog):
         self._job.wait()
         self._job = None
         self._say(str(said))
+        self.changed.emit()
         self.reload()
         self._refresh()
 
