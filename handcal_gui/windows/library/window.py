@@ -165,7 +165,7 @@ class LibraryWindow(QDialog):
         can_resume = len(readable) == 1 and not readable[0].is_finished
         self._resume.setEnabled(can_resume)
         self._export.setEnabled(any(entry.alignments for entry in readable))
-        self._correct.setEnabled(is_free and bool(chosen) and chosen == readable)
+        self._correct.setEnabled(is_free and bool(readable))
         self._show_folder.setEnabled(len(chosen) == 1)
         self._copy.setEnabled(bool(chosen))
         self._check.setEnabled(is_free and bool(chosen))
@@ -219,8 +219,7 @@ class LibraryWindow(QDialog):
         self.accept()
 
     def _export_chosen(self) -> None:
-        paths = [entry.path for entry in self.chosen if entry.alignments and not entry.problem]
-        self.export_requested.emit(paths)
+        self.export_requested.emit([entry.path for entry in self.chosen])
 
     def _check_chosen(self) -> None:
         self._start(partial(check_sessions, [entry.path for entry in self.chosen]))
@@ -234,7 +233,7 @@ class LibraryWindow(QDialog):
 
     def _ask_name(self) -> None:
         """Let the user correct the name of the chosen sessions' wearer."""
-        chosen = self.chosen
+        chosen = [entry for entry in self.chosen if not entry.problem]
         known = {entry.wearer for entry in self._sessions.entries} - {""}
         former = [name for entry in chosen for name in entry.former_wearers]
         names = dict.fromkeys([chosen[0].wearer, *former, *sorted(known, key=str.casefold)])

@@ -155,6 +155,20 @@ def test_open_and_export_ask_for_what_is_chosen(
     assert opened.args == [folder / "bea"]
 
 
+def test_an_unreadable_one_among_others_is_left_to_the_export_and_keeps_its_name(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    (folder / "cid" / "journal.jsonl").write_text("nonsense\n")
+    window.reload()
+    qtbot.waitUntil(lambda: "–" in wearers(window), timeout=PATIENCE_MS)
+    choose(window, "Bea", "–")
+    with qtbot.waitSignal(window.export_requested) as asked:
+        press(window, "exportSessions")
+    assert set(asked.args[0]) == {folder / "bea", folder / "cid"}  # which names it with the reason
+    answer_name(qtbot, window, "Eve")
+    wait_for(qtbot, window, "Name corrected in 1 session.")
+
+
 def wait_for(qtbot: QtBot, window: LibraryWindow, said: str) -> None:
     qtbot.waitUntil(lambda: said in text(window, "message"), timeout=PATIENCE_MS)
 
