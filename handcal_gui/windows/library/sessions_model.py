@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, cast
 
 from PySide6.QtCore import (
     QAbstractTableModel,
@@ -169,6 +169,8 @@ class SessionsModel(QAbstractTableModel):
     Attributes
     ----------
     entries : tuple of LibraryEntry
+    keys : list of tuple
+        By which each column is sorted.
     searched : list of str
         The text of each session in which words are searched.
     """
@@ -178,7 +180,7 @@ class SessionsModel(QAbstractTableModel):
         self.entries: tuple[LibraryEntry, ...] = ()
         self.searched: list[str] = []
         self._texts: list[tuple[str, ...]] = []
-        self._keys: list[tuple[object, ...]] = []
+        self.keys: list[tuple[Any, ...]] = []
         self._font = number_font()
 
     def show_entries(self, entries: Sequence[LibraryEntry]) -> None:
@@ -187,7 +189,7 @@ class SessionsModel(QAbstractTableModel):
         self.entries = tuple(entries)
         # Made once: Qt asks for a cell many times while it sorts and draws.
         self._texts = [tuple(column.text(one) for column in COLUMNS) for one in entries]
-        self._keys = [tuple(column.key(one) for column in COLUMNS) for one in entries]
+        self.keys = [tuple(column.key(one) for column in COLUMNS) for one in entries]
         self.searched = [
             " ".join(
                 (one.wearer, local_time(one.started), one.rig, one.headset, one.path.name)
@@ -209,7 +211,7 @@ class SessionsModel(QAbstractTableModel):
         return 0 if parent.isValid() else len(COLUMNS)
 
     def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        """Return a cell's text, key for sorting, tooltip, font or alignment."""
+        """Return a cell's text, picture, tooltip, font or alignment."""
         entry, column = self.entries[index.row()], COLUMNS[index.column()]
         match role:
             case Qt.ItemDataRole.DisplayRole:
@@ -218,8 +220,6 @@ class SessionsModel(QAbstractTableModel):
                 return error_bars(entry.eyes)
             case Qt.ItemDataRole.AccessibleDescriptionRole if index.column() == 0:
                 return picture_text(entry.eyes)
-            case Qt.ItemDataRole.UserRole:
-                return self._keys[index.row()][index.column()]
             case Qt.ItemDataRole.ToolTipRole:
                 copy = tr("Repaired in {}").format(entry.repaired_as) if entry.repaired_as else ""
                 path = entry.problem or str(entry.path)
@@ -259,7 +259,6 @@ class SessionsFilter(QSortFilterProxyModel):
         self._words: tuple[str, ...] = ()
         self._filter: Filter = "all"
         self.setSourceModel(sessions)
-        self.setSortRole(Qt.ItemDataRole.UserRole)
 
     def search(self, text: str, kind: Filter) -> None:
         """Show other sessions."""
@@ -272,6 +271,11 @@ class SessionsFilter(QSortFilterProxyModel):
         text = self._sessions.searched[row]
         is_shown = _is_of(self._sessions.entries[row], self._filter)
         return is_shown and all(word in text for word in self._words)
+
+    def lessThan(self, left: _Index, right: _Index) -> bool:
+        """Compare two sessions by the keys of a column."""
+        keys, column = self._sessions.keys, left.column()
+        return bool(keys[left.row()][column] < keys[right.row()][column])
 
 
 def _is_of(entry: LibraryEntry, kind: Filter) -> bool:
