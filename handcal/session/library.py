@@ -168,7 +168,14 @@ def restore_session(path: Path) -> Path:
 def deleted_sessions(folder: Path) -> tuple[Path, ...]:
     """Return the deleted sessions of a folder, the most recently deleted one last."""
     found = [journal.parent for journal in (folder / DELETED).glob(f"*/{JOURNAL}")]
-    return tuple(sorted(found, key=lambda path: (path.stat().st_ctime_ns, path.name)))
+    return tuple(sorted(found, key=lambda path: (_changed_ns(path), path.name)))
+
+
+def _changed_ns(path: Path) -> int:
+    try:
+        return path.stat().st_ctime_ns
+    except OSError:  # another program has just restored it
+        return 0
 
 
 def _move(path: Path, target: Path) -> Path:

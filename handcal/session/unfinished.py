@@ -8,7 +8,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.io.lock import FileLock
-from handcal.session.journal import JOURNAL, Event, read_journal
+from handcal.session.journal import JOURNAL, read_journal
 from handcal.session.session import Session
 from handcal.session.state import ASIDE, SessionEvent
 
@@ -34,13 +34,9 @@ class UnfinishedSession:
 
 def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
     """Return the unfinished sessions among the folders in `parent`, the newest first."""
-    journals = {journal.parent: _events(journal) for journal in parent.glob(f"*/{JOURNAL}")}
-    copied = {
-        events[0].time
-        for events in journals.values()
-        if any(event.name == SessionEvent.REPAIRED for event in events)
-    }
-    found = [_inspect(path, events, copied) for path, events in journals.items()]
+    outlines = {journal.parent: _outline(journal) for journal in parent.glob(f"*/{JOURNAL}")}
+    copied = {began for began, names in outlines.values() if SessionEvent.REPAIRED in names}
+    found = [_inspect(path, *outline, copied) for path, outline in outlines.items()]
     return sorted(
         (session for session in found if session is not None),
         key=lambda session: (session.started, session.path.name),
@@ -48,21 +44,20 @@ def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
     )
 
 
-def _events(journal: Path) -> tuple[Event, ...]:
-    """Return the events of a journal; none if it cannot be read, for which `_inspect` says why."""
+def _outline(journal: Path) -> tuple[str, tuple[str, ...]]:
+    """Return the beginning of a session and the names of its events; empty if unreadable."""
     try:
-        return read_journal(journal).events
-    except FileError:
-        return ()
+        events = read_journal(journal).events
+    except FileError:  # `_inspect` says why
+        return "", ()
+    return events[0].time, tuple(event.name for event in events)
 
 
 def _inspect(
-    path: Path, events: tuple[Event, ...], copied: Collection[str]
+    path: Path, started: str, names: tuple[str, ...], copied: Collection[str]
 ) -> UnfinishedSession | None:
-    names = [event.name for event in events]
     if [name for name in names if name not in ASIDE][-1:] == [SessionEvent.FINISHED]:
         return None
-    started = events[0].time if events else ""
     try:
         FileLock(path / "lock").release()  # only a test: reading takes too long to hold it
         record = Session.open(path)

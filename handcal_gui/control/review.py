@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
+from handcal.errors import FileError
 from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
+from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import Eye
@@ -88,6 +91,16 @@ class ReviewController(QObject):
             self._job = None
         self._end_progress()
         self.record = None
+
+    def read_wearer(self) -> None:
+        """Show, and export, the wearer's name as it is stored now: the library corrects it."""
+        if self.record is None:
+            return
+        with suppress(FileError):  # deleted meanwhile: what is shown stays
+            wearer = replay(self.record.path).state.wearer
+            self.record = replace(self.record, wearer=wearer)
+            self._window.panels.session.show_record(self.record, self._results)
+            self._page.show_wearer(wearer)
 
     def _show_progress(self, job: Job) -> None:
         """Show a dialog with the progress if opening takes long, with a Cancel button."""

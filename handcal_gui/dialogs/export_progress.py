@@ -59,7 +59,6 @@ class ExportProgress(QWidget):
 
     def show_files(self, folder: Path, made: Exported) -> None:
         """Show the files written, below the sessions that were not exported."""
-        self._bar.setValue(_WHOLE)
         for missing in made.missing:
             item = QListWidgetItem(icon("warning"), missing)
             item.setToolTip(missing)
@@ -72,6 +71,7 @@ class ExportProgress(QWidget):
             self._doing.setText(tr("{} not exported, see below.").format(lost))
         else:
             self._doing.setText(tr("Done."))
+            self._bar.setValue(_WHOLE)
         url = QUrl.fromLocalFile(str(folder))
         self._end.show_finding(
             Finding("", Health.LIMITED if made.missing else Health.GOOD, count),

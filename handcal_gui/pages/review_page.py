@@ -103,7 +103,7 @@ class ReviewPage(QWidget):
         note : str
             The current activity, or the reason why there are no results.
         """
-        self._title.setText(record.wearer or tr("Session without a name"))
+        self.show_wearer(record.wearer)
         self._export.setEnabled(bool(record.alignments))
         self._again.setEnabled(results is not None)
         self._task.setText(_EXPORT if record.alignments else _RESUME)
@@ -119,6 +119,10 @@ class ReviewPage(QWidget):
             text = paragraph(f"review{name}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._facts.addRow(QLabel(caption, alignment=Qt.AlignmentFlag.AlignTop), text)
+
+    def show_wearer(self, wearer: str) -> None:
+        """Show the wearer's name as the title."""
+        self._title.setText(wearer or tr("Session without a name"))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Show the residual map only where it fits below the rest."""

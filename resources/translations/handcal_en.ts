@@ -4148,6 +4148,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>and {} more</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Continue the selected session</source>
         <translation type="unfinished"></translation>
     </message>

@@ -189,6 +189,21 @@ def test_a_crash_leaves_the_former_or_the_corrected_name(
         assert record.wearer == ("Ada" if length == len(complete) else "Adda")
 
 
+def test_a_deleted_session_that_vanishes_while_listed_is_no_obstacle(
+    make: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = delete_session(make("one", "Ada"))
+    stat = Path.stat
+
+    def vanished(path: Path, **options: bool) -> object:
+        if path == gone:
+            raise FileNotFoundError(path)
+        return stat(path, **options)
+
+    monkeypatch.setattr(Path, "stat", vanished)
+    assert deleted_sessions(tmp_path) == (gone,)
+
+
 def test_an_open_session_is_not_deleted(make: Callable[..., Path], tmp_path: Path) -> None:
     path = make("one", "Ada")
     with Session(path), pytest.raises(FileError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, cast
 
 from PySide6.QtCore import (
     QAbstractTableModel,
@@ -169,18 +169,38 @@ class SessionsModel(QAbstractTableModel):
     Attributes
     ----------
     entries : tuple of LibraryEntry
+    keys : list of tuple
+        By which each column is sorted.
+    searched : list of str
+        The text of each session in which words are searched.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.entries: tuple[LibraryEntry, ...] = ()
+        self.searched: list[str] = []
+        self._texts: list[tuple[str, ...]] = []
+        self.keys: list[tuple[Any, ...]] = []
         self._font = number_font()
 
     def show_entries(self, entries: Sequence[LibraryEntry]) -> None:
         """Replace the rows."""
         self.beginResetModel()
         self.entries = tuple(entries)
+        # Made once: Qt asks for a cell many times while it sorts and draws.
+        self._texts = [tuple(column.text(one) for column in COLUMNS) for one in entries]
+        self.keys = [tuple(column.key(one) for column in COLUMNS) for one in entries]
+        self.searched = [
+            " ".join(
+                (one.wearer, local_time(one.started), one.rig, one.headset, one.path.name)
+            ).casefold()
+            for one in entries
+        ]
         self.endResetModel()
+
+    def longest_text(self, column: int) -> str:
+        """Return the longest text in a column; empty without sessions."""
+        return max((texts[column] for texts in self._texts), key=len, default="")
 
     def rowCount(self, parent: _Index = _NO_INDEX) -> int:
         """Return the number of sessions."""
@@ -191,22 +211,20 @@ class SessionsModel(QAbstractTableModel):
         return 0 if parent.isValid() else len(COLUMNS)
 
     def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        """Return a cell's text, key for sorting, tooltip, font or alignment."""
+        """Return a cell's text, picture, tooltip, font or alignment."""
         entry, column = self.entries[index.row()], COLUMNS[index.column()]
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return column.text(entry)
+                return self._texts[index.row()][index.column()]
             case Qt.ItemDataRole.DecorationRole if index.column() == 0:
                 return error_bars(entry.eyes)
             case Qt.ItemDataRole.AccessibleDescriptionRole if index.column() == 0:
                 return picture_text(entry.eyes)
-            case Qt.ItemDataRole.UserRole:
-                return column.key(entry)
             case Qt.ItemDataRole.ToolTipRole:
                 copy = tr("Repaired in {}").format(entry.repaired_as) if entry.repaired_as else ""
                 path = entry.problem or str(entry.path)
                 errors = (error_text if index.column() else picture_text)(entry.eyes)
-                lines = column.text(entry), copy, path, errors
+                lines = self._texts[index.row()][index.column()], copy, path, errors
                 return "\n".join(filter(None, lines))  # the cell's text may be elided
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font
@@ -241,20 +259,23 @@ class SessionsFilter(QSortFilterProxyModel):
         self._words: tuple[str, ...] = ()
         self._filter: Filter = "all"
         self.setSourceModel(sessions)
-        self.setSortRole(Qt.ItemDataRole.UserRole)
 
     def search(self, text: str, kind: Filter) -> None:
         """Show other sessions."""
+        self.beginFilterChange()
         self._words, self._filter = tuple(text.casefold().split()), kind
-        self.invalidate()
+        self.endFilterChange(QSortFilterProxyModel.Direction.Rows)
 
     def filterAcceptsRow(self, row: int, _parent: _Index) -> bool:
         """Return whether a session is shown."""
-        entry = self._sessions.entries[row]
-        text = " ".join(
-            (entry.wearer, entry.rig, entry.headset, entry.path.name, local_time(entry.started))
-        )
-        return _is_of(entry, self._filter) and all(word in text.casefold() for word in self._words)
+        text = self._sessions.searched[row]
+        is_shown = _is_of(self._sessions.entries[row], self._filter)
+        return is_shown and all(word in text for word in self._words)
+
+    def lessThan(self, left: _Index, right: _Index) -> bool:
+        """Compare two sessions by the keys of a column."""
+        keys, column = self._sessions.keys, left.column()
+        return bool(keys[left.row()][column] < keys[right.row()][column])
 
 
 def _is_of(entry: LibraryEntry, kind: Filter) -> bool:

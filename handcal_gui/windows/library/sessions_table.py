@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-from PySide6.QtCore import QItemSelectionModel, Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, Qt
+from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from handcal.session.library import LibraryEntry
-from handcal_gui.theme import SPACING_PX, flat_header
+from handcal_gui.theme import SPACING_PX, flat_header, number_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import with_name
@@ -64,20 +64,18 @@ class SessionsTable(QTableView):
 
     def choose(self, paths: Collection[Path]) -> None:
         """Select sessions too, by their folders."""
-        flags = QItemSelectionModel.SelectionFlag
+        wanted = QItemSelection()
         for row, entry in enumerate(self._sessions.entries):
-            if entry.path in paths:
-                place = self._shown.mapFromSource(self._sessions.index(row, 0))
-                self.selectionModel().select(place, flags.Select | flags.Rows)
+            place = self._shown.mapFromSource(self._sessions.index(row, 0))
+            if entry.path in paths and place.isValid():
+                wanted.select(place, place)
+        flags = QItemSelectionModel.SelectionFlag
+        self.selectionModel().select(wanted, flags.Select | flags.Rows)
 
     def fit_columns(self) -> None:
         """Show every column's contents; long names are cut as far as the room demands."""
-        across = self.horizontalHeader()
         wanted_px = {
-            column.title: min(
-                max(self.sizeHintForColumn(number), across.sectionSizeHint(number)),
-                _MOST_SHOWN_PX,
-            )
+            column.title: min(self._width_px(number), _MOST_SHOWN_PX)
             for number, column in enumerate(COLUMNS)
         }
         excess_px = sum(wanted_px.values()) - self.viewport().width()
@@ -87,6 +85,14 @@ class SessionsTable(QTableView):
             excess_px -= cut_px
         for number, width_px in enumerate(wanted_px.values()):
             self.setColumnWidth(number, width_px)
+
+    def _width_px(self, column: int) -> int:
+        """Return the width of a column by its longest text: Qt would measure every cell."""
+        font = number_font() if COLUMNS[column].is_number else self.font()
+        text_px = QFontMetrics(font).horizontalAdvance(self._sessions.longest_text(column))
+        picture_px = PICTURE_PX.width() + SPACING_PX if column == 0 else 0
+        title_px = self.horizontalHeader().sectionSizeHint(column)
+        return max(text_px + picture_px + 2 * SPACING_PX, title_px)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give the columns the room there is."""

@@ -13,6 +13,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 
 _MOST_NAMED = 3
+_MOST_LINES = 8
 
 
 def check_sessions(paths: Sequence[Path], progress: Progress) -> str:
@@ -23,13 +24,15 @@ def check_sessions(paths: Sequence[Path], progress: Progress) -> str:
         found = check_session(path)
         if found.state == "sound":
             continue
-        named = "; ".join(map(str, found.damaged[:_MOST_NAMED]))
+        damaged = found.damaged[:_MOST_NAMED]
+        # Where nothing can be read, the reason names the folder itself.
+        named = "; ".join(one.what if found.state == "none" else str(one) for one in damaged)
         more = len(found.damaged) - _MOST_NAMED
         others = tr(" (and {} more)").format(more) if more > 0 else ""
         lines.append(f"{path.name}: {named}{others}")
     sound = len(paths) - len(lines)
     count = pluralize(sound, tr("session"), tr("sessions"))
-    return "\n".join((tr("{} sound, every file read.").format(count), *lines))
+    return _with_lines(tr("{} sound, every file read.").format(count), lines)
 
 
 def repair_beside(path: Path, progress: Progress) -> str:
@@ -49,7 +52,7 @@ def delete_sessions(paths: Sequence[Path], progress: Progress) -> str:
     """Delete some sessions, each of which can be restored; return a message."""
     failed = _each(paths, delete_session, tr("Deleting {}"), progress)
     count = pluralize(len(paths) - len(failed), tr("session"), tr("sessions"))
-    return "\n".join((tr("{} deleted.").format(count), *failed))
+    return _with_lines(tr("{} deleted.").format(count), failed)
 
 
 def correct_names(names: Mapping[Path, str], progress: Progress) -> str:
@@ -58,7 +61,7 @@ def correct_names(names: Mapping[Path, str], progress: Progress) -> str:
         list(names), lambda path: correct_wearer(path, names[path]), tr("Correcting {}"), progress
     )
     count = pluralize(len(names) - len(failed), tr("session"), tr("sessions"))
-    return "\n".join((tr("Name corrected in {}.").format(count), *failed))
+    return _with_lines(tr("Name corrected in {}.").format(count), failed)
 
 
 def _each(
@@ -78,6 +81,13 @@ def _each(
 def restore_deleted(path: Path, _progress: Progress) -> str:
     """Restore a deleted session; return a message."""
     return tr("{} restored.").format(restore_session(path).name)
+
+
+def _with_lines(said: str, lines: Sequence[str]) -> str:
+    """Return a message with a line for each session, as many as the window has room for."""
+    more = len(lines) - _MOST_LINES
+    others = [tr("and {} more").format(more)] if more > 0 else []
+    return "\n".join((said, *lines[:_MOST_LINES], *others))
 
 
 def _free(path: Path) -> Path:

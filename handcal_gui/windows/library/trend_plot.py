@@ -13,6 +13,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
+_MOST_TICKS = 20
 _SYMBOLS: dict[Eye, str] = {"left": "o", "right": "t1"}
 
 
@@ -61,7 +62,8 @@ class TrendPlot(Plot):
         self.item.setYRange(0.0, 1.1 * largest, padding=0.0)
         count = max(len(entries), 2)
         self.item.setXRange(0.8, count + 0.2)
-        self.item.getAxis("bottom").setTicks([[(number, f"{number:g}") for number in numbers]])
+        ticks = [[(number, f"{number:g}") for number in numbers]]
+        self.item.getAxis("bottom").setTicks(ticks if len(entries) <= _MOST_TICKS else None)
 
 
 def calibrations_of(wearer: str, entries: Sequence[LibraryEntry]) -> list[LibraryEntry]:

@@ -58,11 +58,14 @@ class LibraryWindow(QDialog):
         A session to open, or to resume.
     export_requested : Signal(object)
         The sessions to export, a list of Path.
+    changed : Signal()
+        Sessions may have been changed: names corrected, sessions deleted, restored or repaired.
     """
 
     open_requested = Signal(object)
     resume_requested = Signal(object)
     export_requested = Signal(object)
+    changed = Signal()
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -131,6 +134,12 @@ class LibraryWindow(QDialog):
         made = {entry.path for entry in entries} - shown if self._is_read else set()
         chosen = made or {entry.path for entry in self.chosen}  # a copy or what was restored
         self._deleted, self._is_read = deleted, True
+        wearers = {entry.path: entry.wearer for entry in entries}
+        self._former_names = {
+            path: name
+            for path, name in self._former_names.items()
+            if wearers.get(path, name) != name  # else it was not corrected, or is undone
+        }
         if entries != self._sessions.entries:
             self._sessions.show_entries(entries)
             self._table.choose(chosen)
@@ -142,7 +151,10 @@ class LibraryWindow(QDialog):
         self._search.selectAll()
 
     def _search_again(self) -> None:
+        chosen = {entry.path for entry in self.chosen}
+        self._table.clearSelection()  # else it changes, and all is refreshed, with every row
         self._filter.search(self._search.text(), self._kind.currentData())
+        self._table.choose(chosen)
         self._refresh()
 
     def _refresh(self) -> None:
@@ -153,7 +165,7 @@ class LibraryWindow(QDialog):
         can_resume = len(readable) == 1 and not readable[0].is_finished
         self._resume.setEnabled(can_resume)
         self._export.setEnabled(any(entry.alignments for entry in readable))
-        self._correct.setEnabled(is_free and bool(chosen) and chosen == readable)
+        self._correct.setEnabled(is_free and bool(readable))
         self._show_folder.setEnabled(len(chosen) == 1)
         self._copy.setEnabled(bool(chosen))
         self._check.setEnabled(is_free and bool(chosen))
@@ -207,8 +219,7 @@ class LibraryWindow(QDialog):
         self.accept()
 
     def _export_chosen(self) -> None:
-        paths = [entry.path for entry in self.chosen if entry.alignments and not entry.problem]
-        self.export_requested.emit(paths)
+        self.export_requested.emit([entry.path for entry in self.chosen])
 
     def _check_chosen(self) -> None:
         self._start(partial(check_sessions, [entry.path for entry in self.chosen]))
@@ -222,7 +233,7 @@ class LibraryWindow(QDialog):
 
     def _ask_name(self) -> None:
         """Let the user correct the name of the chosen sessions' wearer."""
-        chosen = self.chosen
+        chosen = [entry for entry in self.chosen if not entry.problem]
         known = {entry.wearer for entry in self._sessions.entries} - {""}
         former = [name for entry in chosen for name in entry.former_wearers]
         names = dict.fromkeys([chosen[0].wearer, *former, *sorted(known, key=str.casefold)])
@@ -257,7 +268,6 @@ class LibraryWindow(QDialog):
     def _undo_last(self) -> None:
         if self._former_names:
             self._start(partial(correct_names, self._former_names))
-            self._former_names = {}
         else:
             self._start(partial(restore_deleted, self._deleted[-1]))
 
@@ -278,6 +288,7 @@ class LibraryWindow(QDialog):
         self._job.wait()
         self._job = None
         self._say(str(said))
+        self.changed.emit()
         self.reload()
         self._refresh()
 

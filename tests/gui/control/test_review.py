@@ -15,10 +15,12 @@ from pytestqt.qtbot import QtBot
 from handcal.errors import CancelledError
 from handcal.progress import Progress
 from handcal.register.results import Results
+from handcal.session.library import delete_session
 from handcal.session.session import SessionRecord
 from handcal.station.solve_again import stored_solve_settings
 from handcal_gui.control.review import _Stored
 from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.pages.start.example import copy_example
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
@@ -64,6 +66,29 @@ def child(program: Program, kind: type[Any], name: str) -> Any:
 
 def is_open(program: Program) -> bool:
     return program.window.page == "review"
+
+
+def test_a_corrected_name_is_shown_and_exported(
+    program: Program, qtbot: QtBot, tmp_path: Path
+) -> None:
+    path = copy_example(tmp_path / "sessions")
+    program.open_session(path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    library = program.windows.show_library(path.parent)
+    qtbot.waitUntil(lambda: bool(library._sessions.entries), timeout=PATIENCE_MS)
+    library._correct_names(library._sessions.entries, "Ada")
+
+    def exported() -> str:
+        assert program.windows.record is not None
+        return program.windows.record.wearer
+
+    qtbot.waitUntil(lambda: exported() == "Ada", timeout=PATIENCE_MS)
+    titles = [one.text() for one in program.window.findChildren(QLabel)]
+    assert titles.count("Ada") == 2  # of the page, and in the session panel
+    delete_session(path)
+    library.changed.emit()
+    assert exported() == "Ada"
+    library.reject()
 
 
 def test_the_example_is_opened_from_the_start_page(

@@ -155,6 +155,20 @@ def test_open_and_export_ask_for_what_is_chosen(
     assert opened.args == [folder / "bea"]
 
 
+def test_an_unreadable_one_among_others_is_left_to_the_export_and_keeps_its_name(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    (folder / "cid" / "journal.jsonl").write_text("nonsense\n")
+    window.reload()
+    qtbot.waitUntil(lambda: "–" in wearers(window), timeout=PATIENCE_MS)
+    choose(window, "Bea", "–")
+    with qtbot.waitSignal(window.export_requested) as asked:
+        press(window, "exportSessions")
+    assert set(asked.args[0]) == {folder / "bea", folder / "cid"}  # which names it with the reason
+    answer_name(qtbot, window, "Eve")
+    wait_for(qtbot, window, "Name corrected in 1 session.")
+
+
 def wait_for(qtbot: QtBot, window: LibraryWindow, said: str) -> None:
     qtbot.waitUntil(lambda: said in text(window, "message"), timeout=PATIENCE_MS)
 
@@ -233,11 +247,19 @@ def test_one_that_is_gone_does_not_keep_the_others_from_being_deleted(
     qtbot.waitUntil(lambda: wearers(window) == ["Ada", "Ada"], timeout=PATIENCE_MS)
 
 
-def answer_name(window: LibraryWindow, name: str) -> list[str]:
+def activate(qtbot: QtBot, window: LibraryWindow) -> None:
+    """Do what a window manager does when a dialog ends."""
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow, timeout=PATIENCE_MS)
+
+
+def answer_name(qtbot: QtBot, window: LibraryWindow, name: str) -> list[str]:
     """Press F2 and type a name; return the names that were offered."""
+    activate(qtbot, window)
     table(window).setFocus()
     QTest.keyClick(table(window), Qt.Key.Key_F2)
     dialog = child(window, QInputDialog)
+    qtbot.waitUntil(dialog.isActiveWindow, timeout=PATIENCE_MS)  # else Return opens the session
     typed = child(dialog, QComboBox).lineEdit()
     assert typed is not None
     assert typed.text() == window.chosen[0].wearer
@@ -252,27 +274,33 @@ def test_a_name_is_corrected_and_brought_back(
     qtbot: QtBot, window: LibraryWindow, folder: Path
 ) -> None:
     choose(window, "Ada")
-    assert answer_name(window, "ada") == ["Ada", "Bea", "Cid"]
+    assert answer_name(qtbot, window, "ada") == ["Ada", "Bea", "Cid"]
     qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "ada", "ada"], timeout=PATIENCE_MS)
     wait_for(qtbot, window, "Name corrected in 2 sessions.")
     assert [entry.wearer for entry in window.chosen] == ["ada", "ada"]
-    window.activateWindow()  # which a window manager does when a dialog ends
-    qtbot.waitUntil(window.isActiveWindow, timeout=PATIENCE_MS)
+    activate(qtbot, window)
     QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "Ada", "Ada"], timeout=PATIENCE_MS)
     assert Session.open(folder / "ada-1").wearer == "Ada"
     qtbot.waitUntil(child(window, QPushButton, "correctName").isEnabled, timeout=PATIENCE_MS)
     assert child(window, QPushButton, "restoreSession").isHidden()
-    assert answer_name(window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
+    assert answer_name(qtbot, window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
 
 
 def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
-    choose(window, "Bea", "Cid")
+    choose(window, "Bea")
     with Session(folder / "bea"):
-        answer_name(window, "Eve")
+        answer_name(qtbot, window, "Eve")
+        wait_for(qtbot, window, "Name corrected in 0 sessions.\nbea: ")
+        qtbot.waitUntil(child(window, QPushButton, "restoreSession").isHidden, timeout=PATIENCE_MS)
+        choose(window, "Bea", "Cid")
+        answer_name(qtbot, window, "Eve")
         wait_for(qtbot, window, "Name corrected in 1 session.\nbea: ")
         assert "is in use by process" in text(window, "message")
     qtbot.waitUntil(lambda: wearers(window)[:2] == ["Eve", "Bea"], timeout=PATIENCE_MS)
+    press(window, "restoreSession")  # only Cid's name was corrected
+    wait_for(qtbot, window, "Name corrected in 1 session.")
+    qtbot.waitUntil(lambda: wearers(window)[0] == "Cid", timeout=PATIENCE_MS)
 
 
 def test_the_context_menu_has_every_action(window: LibraryWindow, folder: Path) -> None:

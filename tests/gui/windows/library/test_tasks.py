@@ -1,0 +1,22 @@
+"""Tasks of the library: their messages stay short."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from handcal.progress import Progress
+from handcal_gui.windows.library.tasks import check_sessions, delete_sessions
+
+
+def test_messages_name_a_few_of_many_sessions(tmp_path: Path) -> None:
+    paths = [tmp_path / f"s-{number}" for number in range(20)]
+    for path in paths:
+        path.mkdir()
+        (path / "journal.jsonl").write_text("nonsense\n")
+    first, *lines, last = check_sessions(paths, Progress()).splitlines()
+    assert first == "0 sessions sound, every file read."
+    assert len(lines) == 8
+    assert lines[0].startswith(f"s-0: {paths[0] / 'journal.jsonl'} does not begin as the journal")
+    assert last == "and 12 more"
+    gone = [tmp_path / f"gone-{number}" for number in range(20)]
+    assert len(delete_sessions(gone, Progress()).splitlines()) == 10
