@@ -140,12 +140,13 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
         min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (26, 30)
     )
     if page_px is not None:
-        left = (width - page_px) * 45 // 100
-        right = width - page_px - left
+        has_right = window.dockWidgetArea(docks["results"]) is _RIGHT
+        left = (width - page_px) * (45 if has_right else 100) // 100
+        right = max(width - page_px - left, 1)
     window.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
     column = [docks[name] for name in _LEFT_COLUMN]
     window.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
-    results = height // 2
+    results = height * 53 // 100  # with its tabs
     window.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
 
 

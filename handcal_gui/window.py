@@ -41,16 +41,17 @@ from handcal_gui.docks import (
 )
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.pages.wizard.wizard import WizardPanel
-from handcal_gui.theme import SPACING_PX, colors, follow_theme
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.layouts import scrollable, vbox
+from handcal_gui.widgets.placement import keep_on_screen
 
 Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
 _LAYOUT_VERSION = 2
-_SMALL_PX = 1200, 690
-"""Width and height below which all docks of a window are tabs."""
+_SMALL = 100.0, 57.5
+"""Width and height below which all docks of a window are tabs, in sizes of the font."""
 _MENUS = {
     "File": tr("&File"),
     "Edit": tr("Edi&t"),  # Alt+E adds the left eye, or exports
@@ -150,16 +151,13 @@ class MainWindow(QMainWindow):
         """Show a page with its docks, in the layout used last."""
         self._keep_layout()
         self._page = page
+        size_px = self.size()
         self.statusBar().setVisible(page == "live")
         self._stack.setCurrentIndex(list(self._pages).index(page))
-        is_small = self.width() < _SMALL_PX[0] or self.height() < _SMALL_PX[1]
+        is_small = self._is_small()
         is_alone = self._arrangement == "station"
         self._guide.fill_window(is_alone and not is_small)
-        layout = self._layouts.get(page, self._default_layouts[is_small])
-        hide_tabs(self)
-        self.restoreState(layout, _LAYOUT_VERSION)
-        if self.minimumSizeHint().height() > self.screen().availableGeometry().height():
-            self.restoreState(self._default_layouts[is_small], _LAYOUT_VERSION)
+        self._restore_layout(page, is_small=is_small)
         for name, dock in self._docks.items():
             belongs = name in self._docks_of_page
             if not belongs:
@@ -173,8 +171,9 @@ class MainWindow(QMainWindow):
             share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
         self._leave_titles_to_tabs()
-        if (box := self.layout()) is not None:
-            box.activate()  # or the least size stays that of the page before
+        self._find_least_size()
+        if self.size() != size_px:  # Qt enlarges a window for its docks
+            keep_on_screen(self)
 
     @property
     def _docks_of_page(self) -> frozenset[str]:
@@ -267,6 +266,29 @@ class MainWindow(QMainWindow):
     def _keep_layout(self) -> None:
         if self._docks_of_page:
             self._layouts[self._page] = self.saveState(_LAYOUT_VERSION)
+
+    def _restore_layout(self, page: Page, *, is_small: bool) -> None:
+        """Restore a page's layout, or the default where it needs a larger screen."""
+        size_px = self.size()
+        room_px = self.screen().availableSize() - (self.frameGeometry().size() - size_px)
+        default = self._default_layouts[is_small]
+        hide_tabs(self)
+        self.restoreState(self._layouts.get(page, default), _LAYOUT_VERSION)
+        if self.minimumSizeHint().boundedTo(room_px) != self.minimumSizeHint():
+            if self._docks_of_page:  # or it is kept, for the arrangement with panels
+                self._layouts.pop(page, None)
+            self.restoreState(default, _LAYOUT_VERSION)
+            self._find_least_size()
+            self.resize(size_px)  # Qt has enlarged it
+
+    def _find_least_size(self) -> None:
+        """Compute the least size for the docks shown, at once."""
+        if (box := self.layout()) is not None:
+            box.activate()  # or it stays that of the page before
+
+    def _is_small(self) -> bool:
+        width, height = _SMALL
+        return self.width() < width * font_px() or self.height() < height * font_px()
 
     def _leave_titles_to_tabs(self) -> None:
         leave_titles_to_tabs(self, self._docks)

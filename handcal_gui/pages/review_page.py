@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
-from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -19,6 +19,8 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.widgets.times import local_time
 
+_LOW = 34
+"""Height below which the page leaves out details, in sizes of the font."""
 _LEAST_MAP_PX = 240
 """Height below which the residual map is left to the panel of the results."""
 _EXPORT = tr("Look at the result, then export it, or resume the session to add to it.")
@@ -54,7 +56,7 @@ class ReviewPage(QWidget):
         self._card = ResultCard()
         self.residuals = ResidualsTab()
         self._export = main_button("reviewExport", tr("&Export…"))
-        self._resume = button("reviewResume", tr("&Resume this session"))
+        self._resume = button("reviewResume", tr("&Resume"))
         self._resume.setToolTip(
             tr("Open camera and headset to add alignments, fine-tuning or trials")
         )
@@ -130,7 +132,11 @@ class ReviewPage(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        viewport = self.parentWidget() or self
+        viewport, layout = self.parentWidget() or self, self.layout()
+        is_low = viewport.height() < _LOW * font_px()
+        self._card.show_details(not is_low)
+        if layout is not None:
+            layout.setSpacing(SPACING_PX if is_low else 2 * SPACING_PX)
         parts = self._title, self._task, self._facts, self._card, self._export
         others_px = sum(2 * SPACING_PX + part.sizeHint().height() for part in parts)
         room_px = viewport.height() - others_px - 4 * SPACING_PX

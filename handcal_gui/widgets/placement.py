@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRect, QTimer
+from PySide6.QtCore import QMargins, QRect, QTimer
 from PySide6.QtWidgets import QWidget
 
-_FRAME_PX = 40
-"""Height that a title bar may take, which is not known before the window is shown."""
+_FRAME_PX = QMargins(8, 32, 8, 8)
+"""Room for edges and title bar, which a window manager adds only after the window is shown."""
 
 
 def show_on_screen(window: QWidget) -> None:
     """Show a window, maximized if it is as large as the screen."""
     available = window.screen().availableGeometry()
-    fills = window.width() >= available.width() or window.height() > available.height() - _FRAME_PX
+    highest_px = available.marginsRemoved(_FRAME_PX).height()
+    fills = window.width() >= available.width() or window.height() > highest_px
     if fills and window.isWindow():
         window.showMaximized()
     else:
@@ -21,7 +22,11 @@ def show_on_screen(window: QWidget) -> None:
 
 
 def keep_on_screen(window: QWidget) -> None:
-    """Move a window onto the screen, and make it smaller if needed, once it has its frame."""
+    """Move a window onto the screen, and make it smaller if needed, with its frame."""
+    has_frame = window.frameGeometry() != window.geometry()
+    if not (has_frame or window.isMaximized() or window.isFullScreen()):
+        room = window.screen().availableGeometry().marginsRemoved(_FRAME_PX)
+        window.resize(window.size().boundedTo(room.size()))
     QTimer.singleShot(0, window, lambda: _place(window))
 
 

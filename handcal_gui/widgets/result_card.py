@@ -122,6 +122,11 @@ class ResultCard(QWidget):
             column.show_result(found.get(eye), target_arcmin, scale_arcmin)
         self.setAccessibleDescription(result_text(results, target_arcmin) if results else "")
 
+    def show_details(self, is_shown: bool) -> None:
+        """Show the error in depth and the effect of another alignment, or leave them out."""
+        for column in self._columns.values():
+            column.details.setVisible(is_shown)
+
     def _refresh(self) -> None:
         for column in self._columns.values():
             column.refresh()
@@ -140,13 +145,13 @@ class _Column(QWidget):
         bold.setBold(True)
         self._verdict.setFont(bold)  # its size is the card's
         self._bars = _Bars()
-        self._another = QLabel(wordWrap=True)
+        self.details = QLabel(wordWrap=True)
         self._reason = paragraph(f"card-reason-{eye}")
         self._reason.setAlignment(Qt.AlignmentFlag.AlignTop)
         vbox(
             self._verdict,
             self._bars,
-            self._another,
+            self.details,
             (self._reason, 1),
             on=self,
             margins=0,
@@ -160,14 +165,14 @@ class _Column(QWidget):
         word = tr("– Not solved") if result is None else VERDICT_WORDS[result.verdict]
         self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
         self._reason.setText(result.reason if result else "")
-        self._another.setText(f"{result.depth}\n{result.another}" if result else "")
+        self.details.setText(f"{result.depth}\n{result.another}" if result else "")
         self._bars.show_bars(result, target_arcmin, scale_arcmin)
         self.refresh()
 
     def refresh(self) -> None:
         shade = getattr(colors(), VERDICT_COLORS[self._result.verdict]) if self._result else ""
         self._verdict.setStyleSheet(f"color: {shade}" if shade else "")
-        self._another.setStyleSheet(f"color: {colors().muted}")
+        self.details.setStyleSheet(f"color: {colors().muted}")
         self._bars.update()
 
 

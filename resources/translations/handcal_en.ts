@@ -723,7 +723,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Resume this session</source>
+        <source>&amp;Resume</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

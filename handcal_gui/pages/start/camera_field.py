@@ -65,13 +65,18 @@ class CameraField(QWidget):
         details = QStackedWidget()
         pages = {"realsense": camera, "hololens2": self._host, "recording": self._recording}
         pages |= dict.fromkeys(("oak", "orbbec"), self._other)
-        empty = QWidget()
-        for page in (empty, *dict.fromkeys(pages.values())):
+        for page in dict.fromkeys(pages.values()):
             details.addWidget(page)
         fill_row(self, self._source, details, grows=details)
-        self._source.currentIndexChanged.connect(
-            lambda: details.setCurrentWidget(pages.get(self._source.currentData(), empty))
-        )
+
+        def show_details() -> None:
+            page = pages.get(self._source.currentData())
+            details.setVisible(page is not None)  # or the row is as wide as the widest page
+            if page is not None:
+                details.setCurrentWidget(page)
+
+        self._source.currentIndexChanged.connect(show_details)
+        show_details()
         self._source.currentIndexChanged.connect(self.changed)
         self._serial.textChanged.connect(self.changed)
         self._host.textChanged.connect(self.changed)

@@ -15,6 +15,7 @@ class Card(QFrame):
     Attributes
     ----------
     body : QVBoxLayout
+    hint : QLabel
     """
 
     def __init__(
@@ -33,7 +34,8 @@ class Card(QFrame):
         head.setColumnStretch(1, 1)
         head.addWidget(self._icon, 0, 0)
         head.addWidget(heading, 0, 1)
-        head.addWidget(paragraph(text=hint), 1, 0, 1, 3)
+        self.hint = paragraph(text=hint)
+        head.addWidget(self.hint, 1, 0, 1, 3)
         self.body = QVBoxLayout()
         self.body.setSpacing(SPACING_PX)
         across, down = 2 * SPACING_PX, 3 * SPACING_PX // 2

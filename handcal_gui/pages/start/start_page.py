@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.station.preflight import check_station
@@ -16,7 +16,7 @@ from handcal_gui.pages.start.new_calibration import Check, NewCalibration
 from handcal_gui.pages.start.session_entries import KnownSessions, find_sessions
 from handcal_gui.pages.start.session_list import SessionList
 from handcal_gui.preferences import CurrentPreferences, Preferences
-from handcal_gui.theme import SPACING_PX, scale_font
+from handcal_gui.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
 from handcal_gui.widgets.layouts import hbox, scrollable, vbox
@@ -25,6 +25,8 @@ FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
 _LARGEST_PX = 1600, 1000
 """Size beyond which a larger window leaves room around the page."""
+_LOW = 34
+"""Height below which the page has no head, in sizes of the font."""
 
 
 class StartPage(QWidget):
@@ -165,6 +167,13 @@ class StartPage(QWidget):
         super().showEvent(event)
         self.look_for_sessions()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave out texts that only greet, where the form needs their room."""
+        super().resizeEvent(event)
+        is_high = self.height() >= _LOW * font_px()
+        for text in (self._head, self.new.hint):
+            text.setVisible(is_high)
+
     def _look_in_another_folder(self) -> None:
         if Path(self.new.settings.sessions) != self._folder:
             self.look_for_sessions()
@@ -200,7 +209,9 @@ class StartPage(QWidget):
         grid.setColumnStretch(1, 3)
         grid.setColumnStretch(2, 2)
         hint = QLabel(tr("Calibrate a see-through headset with the wearer's bare hand."))
-        grid.addLayout(hbox(title, hint, 0, spacing=2 * SPACING_PX), 0, 1, 1, 2)
+        self._head = QWidget()
+        hbox(title, hint, 0, on=self._head, margins=0, spacing=2 * SPACING_PX)
+        grid.addWidget(self._head, 0, 1, 1, 2)
         grid.addWidget(self.new, 1, 1)
         grid.addWidget(right, 1, 2)
         grid.setRowStretch(1, 1)

@@ -58,13 +58,15 @@ class GuidePicture(QWidget):
         self.result = ResultBar()
         self.result.hide()
         self._aspect = 0.0  # height over width of the views, the largest beside one result
-        self._is_before = False
+        self._is_before = self._has_only_result = False
         self._blink = QTimer(self, interval=_BLINK_MS)
         self._blink.timeout.connect(lambda: self._show_before(not self._is_before))
         self.result.blink_toggled.connect(self._set_blinking)
         views = QWidget()
-        columns = hbox(*((one, 1) for one in self._columns.values()), spacing=SPACING_PX)
-        self._layout = vbox((columns, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
+        self._both = QWidget()
+        columns = ((one, 1) for one in self._columns.values())
+        hbox(*columns, on=self._both, margins=0, spacing=SPACING_PX)
+        self._layout = vbox((self._both, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
         self._views = views
         self._stack = QStackedLayout(self)
         for page in (self._camera, self._views):
@@ -87,6 +89,11 @@ class GuidePicture(QWidget):
             self._show_eyes(snapshot, open_eyes, is_result=is_result)
         else:
             self._show_camera(snapshot)
+
+    def fit(self, *, has_details: bool, has_eyes: bool) -> None:
+        """Leave out of the result what a low window has no room for: the eyes only above it."""
+        self.result.card.show_details(has_details)
+        self._has_only_result = not has_eyes
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the result beside the eyes if that makes them larger."""
@@ -144,6 +151,10 @@ class GuidePicture(QWidget):
             self.result.show_snapshot(snapshot)
         if is_new:
             self._arrange()
+        is_below = self._layout.direction() is QBoxLayout.Direction.TopToBottom
+        has_eyes = not (is_result and is_below and self._has_only_result)
+        self._both.setVisible(has_eyes)
+        self.result.offer_blinking(has_eyes)
         self._fit_eyes()
         self._stack.setCurrentWidget(self._views)
 
@@ -153,10 +164,9 @@ class GuidePicture(QWidget):
         is_fitted = is_below and not self.result.isHidden() and self._aspect > 0.0
         shown = sum(not column.isHidden() for column in self._columns.values())
         width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
-        for eye, column in self._columns.items():
-            title_px = self._titles[eye].sizeHint().height()
-            fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1])
-            column.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
+        title_px = self._titles["left"].sizeHint().height()
+        fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1])
+        self._both.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
 
     def _set_blinking(self, is_blinking: bool) -> None:
         if is_blinking:

@@ -28,6 +28,7 @@ class ResultBar(QWidget):
     Attributes
     ----------
     buttons : QWidget
+    card : ResultCard
     blink_toggled : Signal(bool)
         Before and after should be shown in turn, or no longer.
     """
@@ -40,7 +41,7 @@ class ResultBar(QWidget):
         self._results: Results | None = None
         self._target_arcmin = VerdictSettings().target_arcmin
         self._record: SessionRecord | None = None
-        self._card = ResultCard()
+        self.card = ResultCard()
         self._blink = add_action(
             self, tr("Blink before/after"), "", tooltip=tr("Show both in turn")
         )
@@ -52,8 +53,9 @@ class ResultBar(QWidget):
             add_action(self, tr("Print…"), "", self._ask_printer, tooltip=tr("Print the result")),
         )
         self.buttons = QWidget()
-        hbox(*map(_button, actions), on=self.buttons, margins=0, spacing=SPACING_PX)
-        vbox(self._card, on=self, margins=0)
+        hbox(*(made := list(map(_button, actions))), on=self.buttons, margins=0, spacing=SPACING_PX)
+        self._blink_button = made[0]
+        vbox(self.card, on=self, margins=0)
 
     def set_target(self, target_arcmin: float) -> None:
         """Set the lab's target for the error."""
@@ -64,7 +66,13 @@ class ResultBar(QWidget):
         self._record = snapshot.record
         if snapshot.procedure.results is not self._results:
             self._results = snapshot.procedure.results
-            self._card.show_results(self._results, self._target_arcmin)
+            self.card.show_results(self._results, self._target_arcmin)
+
+    def offer_blinking(self, is_offered: bool) -> None:
+        """Offer to show before and after in turn, where they are in sight."""
+        self._blink_button.setVisible(is_offered)
+        if not is_offered:
+            self._blink.setChecked(False)
 
     def text(self) -> str:
         """Return the result as text; empty if there is none."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from functools import partial
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -25,7 +25,7 @@ from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, Step, WizardView
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -38,6 +38,9 @@ _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
 _LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
 """Width and height from which the guide has larger texts, and their scale."""
+_LOW = 43, 40, 36
+"""Heights of a window below which the guide has smaller gaps, no details, and no small views of the
+eyes; in sizes of the font."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -121,6 +124,9 @@ class WizardPanel(QWidget):
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
+        # Later, because a part that is hidden while its page is laid out is laid out within that.
+        self._fit_soon = QTimer(self, interval=0, singleShot=True)
+        self._fit_soon.timeout.connect(self._fit)
         self.bar.asked.connect(self._on_asked)
         self._plan.currentIndexChanged.connect(self._choose_plan)
         follow_theme(self, self._refresh)
@@ -163,6 +169,18 @@ class WizardPanel(QWidget):
         if is_large != self._is_large:
             self._is_large = is_large
             self._scale_texts()
+        self._fit_soon.start()
+
+    def _fit(self) -> None:
+        """Leave out what a low window has no room for."""
+        height = self.window().height() / font_px()
+        has_gaps, has_details, has_eyes = (height >= least for least in _LOW)
+        self.picture.fit(has_details=has_details, has_eyes=has_eyes)
+        gap_px = SPACING_PX if has_gaps else SPACING_PX // 2
+        if (layout := self.layout()) is not None:
+            layout.setContentsMargins(*4 * (2 * gap_px,))
+            layout.setSpacing(gap_px)
+        self._rail.set_gap(gap_px // 2)
 
     def _scale_texts(self) -> None:
         larger = _LARGE_SCALE if self._is_large else 1.0
@@ -320,14 +338,17 @@ class _Rail(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        layout = QHBoxLayout(self)
+        self._row = layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX // 2)
         self._labels = {step: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for step in STEPS}
         for label in self._labels.values():
             scale_font(label, 0.85)
             label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             layout.addWidget(label)
+
+    def set_gap(self, gap_px: int) -> None:
+        """Set the gap between steps."""
+        self._row.setSpacing(gap_px)
 
     def show_step(self, present: Step, unearned: Collection[Step]) -> None:
         place = STEPS.index(present)

@@ -70,7 +70,7 @@ class EyeShiftEditor(QWidget):
             1,
             on=self,
             margins=0,
-            spacing=SPACING_PX // 2,
+            spacing=SPACING_PX // 4,
         )
 
     def show_shift(self, shift_m: Float64) -> None:

@@ -7,13 +7,14 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent
+from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
     QFrame,
     QHBoxLayout,
     QLabel,
+    QLayout,
     QScrollArea,
     QSizePolicy,
     QWidget,
@@ -327,42 +328,50 @@ class FineTunePanel(QWidget):
         self._sign, self._status = QLabel(), QLabel(wordWrap=True)
         self._status.setObjectName("status")
         self._status.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        hint = QLabel(text=_KEYS, wordWrap=True)
-        body = QWidget()
-        steps = self._steps.actions()
+        steps, changes = self._steps.actions(), (self._undo, self._redo)
         show, reset = QLabel(tr("Show")), QLabel(tr("Reset to"))
-        vbox(
-            _row(
-                QLabel(tr("Step")), *steps, QLabel("mm"), None, self._both, self._undo, self._redo
-            ),
+        controls = vbox(
+            _row(QLabel(tr("Step")), *steps, QLabel("mm"), None, self._both, *changes),
             _row(self._editors["left"], self._editors["right"]),
             _row(QLabel(tr("Effect at")), self._depth, self._against, None),
             _row(
                 *(show, self._show_solved, self._show_offline, None),
                 *(reset, self.reset_action, self._reset_offline),
-                spacing=SPACING_PX // 2,
+                spacing=SPACING_PX // 4,
             ),
-            hint,
-            1,
-            on=body,
-            margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, 0),
             spacing=SPACING_PX // 2,
         )
-        area = _QuietScrollArea(widgetResizable=True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        area.setWidget(body)
-        outer = vbox((area, 1), on=self, margins=0)
         status = _row(self._sign, self._status)
-        status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
-        outer.addLayout(status)
+        status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 4)
+        vbox((_ControlsArea(controls), 1), status, on=self, margins=0)
 
 
-class _QuietScrollArea(QScrollArea):
-    """Leaves the arrow keys to the enclosing panel."""
+class _ControlsArea(QScrollArea):
+    """Scrolls controls, with the keys below them where there is room.
+
+    The arrow keys are left to the enclosing panel.
+    """
+
+    def __init__(self, controls: QLayout) -> None:
+        super().__init__(widgetResizable=True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._controls, self._keys = controls, QLabel(text=_KEYS, wordWrap=True)
+        body = QWidget()
+        body.setToolTip(_KEYS)
+        margins = SPACING_PX, SPACING_PX // 2, SPACING_PX, 0
+        vbox(controls, self._keys, 1, on=body, margins=margins, spacing=SPACING_PX // 2)
+        self.setWidget(body)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         event.ignore()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave the keys to the tooltip where they would have to be scrolled to."""
+        keys_px = self._keys.heightForWidth(self.width() - 2 * SPACING_PX)
+        least_px = self._controls.totalMinimumSize().height() + keys_px + SPACING_PX
+        self._keys.setVisible(least_px <= self.height())
+        super().resizeEvent(event)
 
 
 def _row(*items: QWidget | QAction | None, spacing: int = SPACING_PX) -> QHBoxLayout:

@@ -17,7 +17,7 @@ from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.plots import Plot
 
 _LASTS_S = 30.0
-_HEIGHTS_PX = 56, 200
+_HEIGHTS_PX = 48, 200
 """Least and largest height."""
 _TOPS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
 """Allowed upper limits of the scales."""

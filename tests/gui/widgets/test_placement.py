@@ -40,3 +40,14 @@ def test_a_window_as_large_as_the_screen_is_maximized(qtbot: QtBot) -> None:
     for window in (large, small):
         show_on_screen(window)
     assert (large.isMaximized(), small.isMaximized()) == (True, False)
+
+
+def test_room_is_left_for_a_frame_that_is_not_known_yet(qtbot: QtBot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    available = window.screen().availableSize()
+    window.resize(available)
+    assert window.frameGeometry() == window.geometry()
+    keep_on_screen(window)
+    qtbot.waitUntil(lambda: window.height() == available.height() - 40)
+    assert window.width() < available.width()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.station.snapshot import Snapshot
@@ -21,7 +21,18 @@ from handcal_gui.window import MainWindow
 
 
 @pytest.fixture
-def program(qtbot: QtBot, tmp_path: Path) -> Iterator[Program]:
+def text_scale(qapp: QApplication, request: pytest.FixtureRequest) -> Iterator[float]:
+    """Scale the font of the test's windows by an indirect parameter."""
+    was, scaled = qapp.font(), qapp.font()
+    scale: float = getattr(request, "param", 1.0)
+    scaled.setPointSizeF(scale * was.pointSizeF())
+    qapp.setFont(scaled)
+    yield scale
+    qapp.setFont(was)
+
+
+@pytest.fixture
+def program(qtbot: QtBot, tmp_path: Path, text_scale: float) -> Iterator[Program]:
     program = Program(PreferencesFile(tmp_path / "preferences.json"))
     qtbot.addWidget(program.window)
     program.window.resize(1280, 800)

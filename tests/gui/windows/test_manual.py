@@ -94,3 +94,10 @@ def test_every_link_of_a_page_leads_to_something_that_the_wheel_carries(page: Pa
         target = (page.parent / link.partition("#")[0]).resolve()
         assert target.exists(), link
         assert target.relative_to(ROOT).as_posix().startswith(carried), link
+
+
+def test_it_opens_on_a_small_screen(qtbot: QtBot, manual: Manual) -> None:
+    available = manual.screen().availableGeometry()
+    manual.resize(2 * available.width(), 2 * available.height())
+    manual.open("docs/guide.md")
+    qtbot.waitUntil(lambda: available.contains(manual.frameGeometry()))

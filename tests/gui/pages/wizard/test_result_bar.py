@@ -105,3 +105,24 @@ def test_before_and_after_are_shown_in_turn(qtbot: QtBot, snapshot: Maker) -> No
     qtbot.waitUntil(lambda: left.grab().toImage() == before)
     blink.click()
     assert left.grab().toImage() == after
+
+
+def test_a_low_window_leaves_out_eyes_too_small_to_see_anything(
+    qtbot: QtBot, snapshot: Maker
+) -> None:
+    picture = show(qtbot, GuidePicture(), 500, 230)
+    qtbot.addWidget(picture.result.buttons)
+    picture.result.buttons.show()
+    blink = button(picture.result.buttons, QToolButton, "Blink before/after")
+    picture.step = Step.VERIFY
+    eyes = picture.findChildren(EyeCanvas)
+    for has_eyes in (False, True):
+        picture.fit(has_details=has_eyes, has_eyes=has_eyes)
+        picture.show_snapshot(snapshot(State.APPLIED))
+        assert {eye.isVisible() for eye in eyes} == {has_eyes}
+        assert blink.isVisible() == has_eyes, "there would be nothing to see"
+        assert picture.result.isVisible()
+    picture.fit(has_details=False, has_eyes=False)
+    picture.step = Step.ALIGN
+    picture.show_snapshot(snapshot(State.ALIGN))
+    assert any(eye.isVisible() for eye in eyes)

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QDoubleSpinBox,
+    QLabel,
     QRadioButton,
     QScrollArea,
     QSlider,
@@ -250,3 +251,16 @@ def test_a_small_panel_needs_no_scrolling(panel: FineTunePanel, show: Show) -> N
             assert control.visibleRegion().boundingRect() == control.rect(), (
                 control.accessibleName()
             )
+
+
+def test_the_keys_are_told_where_there_is_room_for_them(panel: FineTunePanel, show: Show) -> None:
+    [keys] = [one for one in panel.findChildren(QLabel) if one.text().startswith("Arrow keys")]
+    show()
+    assert keys.isVisible()
+    panel.resize(384, 284)
+    show()
+    QApplication.processEvents()
+    assert not keys.isVisible()
+    [area] = panel.findChildren(QScrollArea)
+    assert area.widget().toolTip() == keys.text()
+    assert area.verticalScrollBar().maximum() == 0
