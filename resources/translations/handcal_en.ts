@@ -3973,6 +3973,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The display in front of the camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Grid squares</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4010,6 +4014,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Nearest object, by depth alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where the hand is looked for in a frame.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4697,6 +4705,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>A ChArUco board may be partly hidden; a checkerboard must be seen whole.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Side length of a square, measured on the print.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4722,6 +4734,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Paper</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Size of the sheet of the PDF.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4825,14 +4841,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>as measured</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>solved from the squares&apos; angle</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye position, focused on the display. Darken the room and take 3 or more images.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4910,6 +4918,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Distance of the virtual screen from the eye, z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>from the squares&apos; angle</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5006,6 +5022,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Uncertainty</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Images of the board: how many cover each part of the view. Uncertainty: how well the solved projection is known there, in pixels.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

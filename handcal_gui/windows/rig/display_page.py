@@ -26,8 +26,8 @@ from handcal_gui.windows.rig.solve import SolvedPart, solve_display
 from handcal_gui.windows.rig.step_page import StepPage
 
 _DISTANCES: dict[Distance, str] = {
-    "measured": tr("as measured"),
-    "solved": tr("solved from the squares' angle"),
+    "measured": tr("measured"),
+    "solved": tr("from the squares' angle"),
 }
 _GRID_HINT = tr(
     "Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye "
