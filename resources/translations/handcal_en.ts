@@ -296,6 +296,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Tick it when the wearer sees the square with this eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Export {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4853,6 +4857,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Distance of the virtual screen from the viewpoint camera, z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Side length of the grid&apos;s squares, in pixels.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4897,6 +4905,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Transform from the headset rig to this eye&apos;s rendering camera, T_V_H, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Images of the grid</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4914,10 +4926,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Angle of a square</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Distance of the virtual screen from the eye, z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4942,10 +4950,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Instead of the images of the board</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Pose of this eye&apos;s rendering camera relative to the headset, T_V_H, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
