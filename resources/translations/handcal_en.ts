@@ -4557,6 +4557,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Mean error, px</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean error, ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>trials will be stored in {}</source>
         <translation type="unfinished"></translation>
     </message>
