@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRect, QTimer
+from PySide6.QtCore import QEvent, QObject, QRect, QTimer
 from PySide6.QtWidgets import QWidget
 
 _FRAME_PX = 40
@@ -22,7 +22,7 @@ def show_on_screen(window: QWidget) -> None:
 
 def keep_on_screen(window: QWidget) -> None:
     """Move a window onto the screen, and make it smaller if needed, once it has its frame."""
-    QTimer.singleShot(0, window, lambda: _place(window))
+    QTimer.singleShot(0, window, lambda: _place_once_framed(window))
 
 
 def placed(frame: QRect, available: QRect) -> QRect:
@@ -34,6 +34,28 @@ def placed(frame: QRect, available: QRect) -> QRect:
     )
     inside.moveTop(min(max(frame.top(), available.top()), available.bottom() - inside.height() + 1))
     return inside
+
+
+def _place_once_framed(window: QWidget) -> None:
+    handle = window.windowHandle()
+    if handle is None or handle.isExposed():
+        _place(window)
+    else:
+        handle.installEventFilter(_Exposure(window))
+
+
+class _Exposure(QObject):
+    """Places its parent when it is exposed: then its window manager has framed it."""
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window)
+        self._window = window
+
+    def eventFilter(self, handle: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Expose:
+            handle.removeEventFilter(self)
+            QTimer.singleShot(0, self._window, lambda: _place(self._window))
+        return False
 
 
 def _place(window: QWidget) -> None:

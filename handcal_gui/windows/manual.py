@@ -25,6 +25,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.placement import keep_on_screen
 
 _FIRST_SIZE = QSize(900, 750)
 _BESIDE_PX = 80
@@ -116,6 +117,7 @@ class Manual(QWidget):
         self._lines = self._lines or read_lines(resource_path("docs"))
         self.page.setSource(QUrl.fromLocalFile(str(resource_path(page))))
         self.show()
+        keep_on_screen(self)
         self.raise_()
         self.activateWindow()
         self.page.setFocus()

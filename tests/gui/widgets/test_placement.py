@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRect
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.placement import keep_on_screen, placed, show_on_screen
@@ -28,6 +28,18 @@ def test_a_window_above_the_screen_comes_down(qtbot: QtBot) -> None:
     available = window.screen().availableGeometry()
     assert not available.contains(window.frameGeometry())
     keep_on_screen(window)
+    qtbot.waitUntil(lambda: available.contains(window.frameGeometry()))
+
+
+def test_a_window_is_placed_once_it_is_exposed_and_has_its_frame(qtbot: QtBot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.create()
+    keep_on_screen(window)
+    QApplication.processEvents()
+    window.setGeometry(20, -200, 300, 200)  # as when a window manager adds the frame
+    window.show()
+    available = window.screen().availableGeometry()
     qtbot.waitUntil(lambda: available.contains(window.frameGeometry()))
 
 
