@@ -233,6 +233,7 @@ class _Square(QWidget):
             QCheckBox(tr("The wearer sees it")),
             f"squareSeen-{eye}",
             tr("{}: the wearer sees it").format(name),
+            tr("Tick it when the wearer sees the square with this eye."),
         )
         hbox(self.send, (self._state, 1), self._seen, on=self, margins=0, spacing=SPACING_PX)
         self.forget()

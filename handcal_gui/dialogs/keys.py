@@ -22,7 +22,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 
-_FIRST_SIZE = QSize(80 * SPACING_PX, 80 * SPACING_PX)
+_FIRST_SIZE = QSize(80 * SPACING_PX, 60 * SPACING_PX)
 _KEYS, _MEANING = range(2)
 
 

@@ -47,9 +47,6 @@ class EntriesForm(QWidget):
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(SPACING_PX)
         grid.setVerticalSpacing(SPACING_PX // 2)
-        for column in (1, 4):
-            grid.setColumnStretch(column, 1)
-        grid.setColumnMinimumWidth(2, SPACING_PX)
         half = (len(fields) + 1) // 2
         for number, (text, field) in enumerate(fields.values()):
             row, column = number % half, 3 * (number // half)
@@ -57,7 +54,10 @@ class EntriesForm(QWidget):
             label.setBuddy(field)
             grid.addWidget(label, row, column)
             grid.addWidget(field, row, column + 1)
+            grid.setColumnStretch(column + 1, 1)
             _change_of(field).connect(self.changed)
+        if grid.columnCount() > 2:
+            grid.setColumnMinimumWidth(2, SPACING_PX)
 
     def show_entries(self, entries: object) -> None:
         """Show the fields' values."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QImage, QKeyEvent, QTextBlock, QTextCursor, QTextDocument
 from PySide6.QtWidgets import (
     QLabel,
@@ -27,9 +27,9 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
 
-_SIZE_PX = 900, 750
-_WIDEST_PX = 820
-"""Width to which wider pictures are reduced."""
+_FIRST_SIZE = QSize(900, 750)
+_BESIDE_PX = 80
+"""Room beside the widest picture."""
 _FOUND_PX = 230
 _COLUMNS_PX = 150, 200, 450
 _MOST_FOUND = 200
@@ -77,7 +77,7 @@ class Manual(QWidget):
         super().__init__(parent, Qt.WindowType.Window)
         self.setWindowTitle(tr("Manual"))
         self.setObjectName("manual")
-        self.resize(*_SIZE_PX)
+        self.resize(self.screen().availableSize().boundedTo(_FIRST_SIZE))
         self.page = ManualPage(self)
         self.search = with_name(
             QLineEdit(placeholderText=tr("Search all pages (Ctrl+F)"), clearButtonEnabled=True),
@@ -202,9 +202,10 @@ class ManualPage(QTextBrowser):
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
         image = QImage(self.source().resolved(QUrl(name)).toLocalFile())
-        if image.width() <= _WIDEST_PX:
+        widest_px = self.window().width() - _BESIDE_PX
+        if image.width() <= widest_px:
             return image
-        return image.scaledToWidth(_WIDEST_PX, Qt.TransformationMode.SmoothTransformation)
+        return image.scaledToWidth(widest_px, Qt.TransformationMode.SmoothTransformation)
 
 
 def _lines(page: Path) -> Iterator[Line]:

@@ -296,6 +296,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Tick it when the wearer sees the square with this eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Export {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3968,6 +3972,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The display in front of the camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Grid squares</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4005,6 +4013,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Nearest object, by depth alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Where the hand is looked for in a frame.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4568,6 +4580,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Mean error, px</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean error, ′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>trials will be stored in {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4720,6 +4740,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>A ChArUco board may be partly hidden; a checkerboard must be seen whole.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Side length of a square, measured on the print.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4745,6 +4769,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Paper</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Size of the sheet of the PDF.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4848,14 +4876,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>as measured</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>solved from the squares&apos; angle</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye position, focused on the display. Darken the room and take 3 or more images.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4865,6 +4885,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Distance of the virtual screen</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance of the virtual screen from the viewpoint camera, z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4912,6 +4936,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Transform from the headset rig to this eye&apos;s rendering camera, T_V_H, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Images of the grid</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4932,7 +4960,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Distance of the virtual screen from the eye, z(C0→S): measured, for example by the camera&apos;s focus, or solved from the angle that a square subtends at the nominal distance.</source>
+        <source>measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>from the squares&apos; angle</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4949,10 +4981,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Instead of the images of the board</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Pose of this eye&apos;s rendering camera relative to the headset, T_V_H, as the headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. If empty, that of the initial rig is used.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5029,6 +5057,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Uncertainty</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Images of the board: how many cover each part of the view. Uncertainty: how well the solved projection is known there, in pixels.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -188,7 +188,12 @@ def _cube_form() -> EntriesForm:
             "rig": (tr("Rig file"), rig),
             "eye": (
                 tr("Display"),
-                choice("eye", tr("Display"), {"left": tr("Left"), "right": tr("Right")}),
+                choice(
+                    "eye",
+                    tr("Display"),
+                    {"left": tr("Left"), "right": tr("Right")},
+                    tr("The display in front of the camera."),
+                ),
             ),
             "square_px": (tr("Grid squares"), square),
             "seed": (tr("Seed of the rendering"), _seed()),
@@ -214,7 +219,10 @@ def _segmentation_form() -> EntriesForm:
     return EntriesForm(
         {
             "folder": (tr("Frames"), folder),
-            "roi": (tr("Hand"), choice("roi", tr("Hand"), ways)),
+            "roi": (
+                tr("Hand"),
+                choice("roi", tr("Hand"), ways, tr("Where the hand is looked for in a frame.")),
+            ),
             **_output(),
         }
     )
@@ -244,9 +252,11 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
 
 
 def _seed() -> QSpinBox:
-    return whole_number(
+    seed = whole_number(
         "seed", 0, _MOST_SEED, tr("Random seed; the same seed gives the same numbers.")
     )
+    seed.setMinimumWidth(seed.sizeHint().width())
+    return seed
 
 
 def _output() -> dict[str, tuple[str, QWidget]]:

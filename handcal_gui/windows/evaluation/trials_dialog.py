@@ -220,7 +220,7 @@ class TrialsDialog(PreparationDialog):
     def _show_trials(self, trials: tuple[Trial, ...]) -> None:
         self._step = None
         self._table.show_rows(
-            ("px", "′"),
+            (tr("Mean error, px"), tr("Mean error, ′")),
             [
                 Row(
                     f"{EYE_NAMES[trial.eye]}, {trial.target_depth_m:g} m",

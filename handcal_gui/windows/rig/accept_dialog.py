@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QUrl
+from PySide6.QtCore import QSize, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QDialog, QGridLayout, QLabel, QWidget
 
@@ -184,7 +184,7 @@ class AcceptDialog(QDialog):
             images.addWidget(self._counts[eye], row, 3)
         images.setColumnStretch(3, 1)
         drawing = Drawing("docs/pictures/setup-accept.svg")
-        drawing.setMinimumHeight(20 * SPACING_PX)
+        drawing.setMinimumHeight(10 * SPACING_PX)
         foot = hbox(self._run, (self._bar, 1), self._open, self._close, spacing=SPACING_PX)
         vbox(
             paragraph("how", _HOW),
@@ -197,3 +197,4 @@ class AcceptDialog(QDialog):
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,
         )
+        self.resize(self.sizeHint() + QSize(0, 10 * SPACING_PX))

@@ -52,7 +52,12 @@ class BoardPage(QWidget):
         self.setObjectName("boardPage")
         self._project = project
         squares_help = tr("Squares, not inner corners.")
-        self._kind = choice("kind", tr("Kind of board"), _KINDS)
+        self._kind = choice(
+            "kind",
+            tr("Kind of board"),
+            _KINDS,
+            tr("A ChArUco board may be partly hidden; a checkerboard must be seen whole."),
+        )
         self._columns = whole_number("columns", 3, 40, squares_help)
         self._rows = whole_number("rows", 3, 40, squares_help)
         self._square = number(
@@ -78,7 +83,10 @@ class BoardPage(QWidget):
             help_text=tr("Boards with an even number of rows started with a white square."),
         )
         self._paper = choice(
-            "paper", tr("Paper"), {paper: paper.capitalize() for paper in get_args(Paper)}
+            "paper",
+            tr("Paper"),
+            {paper: paper.capitalize() for paper in get_args(Paper)},
+            tr("Size of the sheet of the PDF."),
         )
         self._pdf = button(
             "savePdf", tr("Save as PDF…"), help_text=tr("To scale, with a ruler to check the print")

@@ -26,8 +26,8 @@ from handcal_gui.windows.rig.solve import SolvedPart, solve_display
 from handcal_gui.windows.rig.step_page import StepPage
 
 _DISTANCES: dict[Distance, str] = {
-    "measured": tr("as measured"),
-    "solved": tr("solved from the squares' angle"),
+    "measured": tr("measured"),
+    "solved": tr("from the squares' angle"),
 }
 _GRID_HINT = tr(
     "Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye "
@@ -54,9 +54,9 @@ class DisplayPage(StepPage):
             tr("Distance of the virtual screen"),
             _DISTANCES,
             tr(
-                "Distance of the virtual screen from the eye, z(C0→S): measured, for example by "
-                "the camera's focus, or solved from the angle that a square subtends at the "
-                "nominal distance."
+                "Distance of the virtual screen from the viewpoint camera, z(C0→S): measured, for "
+                "example by the camera's focus, or solved from the angle that a square subtends "
+                "at the nominal distance."
             ),
         )
         distance_m = number(
@@ -109,7 +109,7 @@ class DisplayPage(StepPage):
         view = PathField(tr("Rendering camera"), "file", files, tr("As in the rig"))
         view.setToolTip(
             tr(
-                "Pose of this eye's rendering camera relative to the headset, T_V_H, as the "
+                "Transform from the headset rig to this eye's rendering camera, T_V_H, as the "
                 "headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. "
                 "If empty, that of the initial rig is used."
             )

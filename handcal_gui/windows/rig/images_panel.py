@@ -103,6 +103,10 @@ class ImagesPanel(QWidget):
             "map",
             tr("Map"),
             {"coverage": tr("Images of the board"), "uncertainty": tr("Uncertainty")},
+            tr(
+                "Images of the board: how many cover each part of the view. Uncertainty: how well "
+                "the solved projection is known there, in pixels."
+            ),
         )
         self._shown_map.currentIndexChanged.connect(self._show_map)
         self._drawing = Drawing(f"docs/pictures/{drawing}.svg")
@@ -138,6 +142,7 @@ class ImagesPanel(QWidget):
     def add_button(self, added: QPushButton) -> None:
         """Add a button in front of the panel's own."""
         self._buttons.insertWidget(0, added)
+        self.setTabOrder(self._shown_map, added)
 
     def look(self, folders: Sequence[str], board: Board, dropped: Sequence[str]) -> None:
         """Search folders for the board, unless just done; do nothing if a folder is missing."""

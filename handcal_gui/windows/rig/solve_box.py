@@ -12,7 +12,8 @@ from handcal.rig_types import Origin
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import main_button, paragraph
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox
@@ -43,7 +44,7 @@ class SolveBox(QWidget):
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
-        self._lenses = paragraph("lenses")
+        self._lenses = with_name(ElidedLabel(), "lenses")  # whole, it would hide the images
         self._table = NumberTable("numbers", tr("Numbers"))
         self._table.setMinimumWidth(40 * SPACING_PX)
         self._lay_out()

@@ -31,7 +31,7 @@ from handcal_gui.windows.rig.stereo_page import StereoPage
 from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
 
 _FIRST_SIZE = QSize(1240, 760)
-_RAIL_PX = 29 * SPACING_PX
+_RAIL_PX = 20 * SPACING_PX
 _SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
 _BOARD, _VIEWPOINT = tr("Board"), tr("Viewpoint camera")
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
@@ -202,6 +202,7 @@ class RigWizard(QDialog):
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
         self._rail.setFixedWidth(_RAIL_PX)
+        self._rail.setWordWrap(True)
         self._rail.setSpacing(SPACING_PX // 2)
         self._rail.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self._rail.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

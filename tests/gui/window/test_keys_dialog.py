@@ -20,7 +20,9 @@ from tests.gui.helpers import child, show
 
 @pytest.fixture
 def dialog(qtbot: QtBot, window: MainWindow) -> KeysDialog:
-    return show(qtbot, KeysDialog(window), 640, 440)
+    dialog = KeysDialog(window)
+    assert dialog.height() <= 490, "fits 960x510 with its frame"
+    return show(qtbot, dialog, dialog.width(), dialog.height())
 
 
 def listed(dialog: KeysDialog) -> dict[str, list[str]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CameraError
@@ -18,6 +18,7 @@ from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset
 from handcal_gui.windows.evaluation.track_dialog import TrackDialog
+from tests.gui.helpers import child
 
 Make = Callable[[str, Any], TrackDialog]
 
@@ -90,6 +91,13 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     assert (low_px < middle_px).all()
     assert (middle_px < high_px).all()
     assert np.ptp(sight.corners_px, axis=0).max() < camera.width / 2
+
+
+def test_before_a_cube_is_seen_there_is_no_empty_table_and_nothing_is_cut(make: Make) -> None:
+    dialog = make("network", track_cube)
+    chosen = child(dialog, QComboBox, "trackedBy")
+    assert chosen.width() >= chosen.sizeHint().width()
+    assert not child(dialog, QTableWidget, "pose-of-the-cube").isVisible()
 
 
 def test_the_failure_of_a_camera_is_shown_and_it_can_be_started_again(

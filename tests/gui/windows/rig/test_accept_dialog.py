@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QTableWidget, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
@@ -17,6 +17,7 @@ from handcal.rig.formats import write_intrinsics
 from handcal.sim.acceptance import write_acceptance
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
+from handcal_gui.windows.rig.images_panel import Drawing
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder, ViewpointEntries
 from handcal_gui.windows.rig.take_dialog import TakeDialog
@@ -46,6 +47,14 @@ def part(dialog: QWidget, kind: type[Kind], name: str) -> Kind:
     found = dialog.findChild(kind, name)
     assert isinstance(found, kind)
     return found
+
+
+def test_on_a_small_screen_the_drawing_hides_no_button(dialog: AcceptDialog) -> None:
+    dialog.resize(dialog.width(), 360)
+    QApplication.processEvents()
+    drawing = part(dialog, Drawing, "drawing").geometry()
+    assert not drawing.intersects(part(dialog, QPushButton, "left-grid").geometry())
+    assert part(dialog, QTableWidget, "drawn-against-seen").isHidden(), "there are no numbers yet"
 
 
 def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> None:

@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QRect, Qt
-from PySide6.QtWidgets import QLabel, QLineEdit, QListWidget, QPushButton, QSpinBox, QTreeWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QPushButton,
+    QScrollArea,
+    QSpinBox,
+    QTreeWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.board import Board
@@ -228,3 +237,12 @@ def test_labels_are_words_and_the_name_of_the_rig_is_whole(wizard: RigWizard) ->
     name = child(wizard, QLabel, "initialRig")
     assert name.text() == example_rig().name
     assert name.height() >= name.heightForWidth(name.width()) > 0
+
+
+def test_on_a_small_screen_no_form_is_cut_at_its_side(wizard: RigWizard) -> None:
+    wizard.resize(960, 510)
+    for step in (STEREO, VIEWPOINT, LEFT, RIGHT):
+        wizard.show_step(step)
+        QApplication.processEvents()
+        [area] = [one for one in wizard.findChildren(QScrollArea) if one.isVisible()]
+        assert area.horizontalScrollBar().maximum() == 0
