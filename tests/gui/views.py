@@ -18,7 +18,7 @@ from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import Action, Step, WizardView
 
 _ZERO = (0.0, 0.0, 0.0)
-_NUDGED = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, True, False)
+NUDGED = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, True, False)
 PLANNED: dict[StepName, tuple[State, tuple[Eye, ...]]] = {
     StepName.RAISE: (State.SHOW_HAND, ("left",)),
     StepName.CURSOR: (State.APPLIED, ("right",)),
@@ -69,7 +69,7 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
         wizard.view(snapshot(State.SOLVED))
         views.append(wizard.view(snapshot(State.APPLIED, procedure={"results": None})))
         views.append(wizard.view(snapshot(State.APPLIED, record=one)))
-        views.append(wizard.view(snapshot(State.VERIFY, procedure={"verifying": _NUDGED})))
+        views.append(wizard.view(snapshot(State.VERIFY, procedure={"verifying": NUDGED})))
         applied = snapshot(State.APPLIED)
         for _ in range(3):  # each eye in turn, then the result
             views.append(wizard.view(applied))
@@ -93,7 +93,7 @@ def planned_snapshot(
     state, eyes = PLANNED[name]
     planned = {"plan": "recommended", "next_step": NextStep(name, eyes, "as told"), "eyes": eyes}
     if name is StepName.NUDGE:
-        planned["verifying"] = _NUDGED
+        planned["verifying"] = NUDGED
     return snapshot(state, procedure={**planned, **procedure})
 
 
