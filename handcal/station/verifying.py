@@ -52,7 +52,7 @@ class VerifyingView:
     can_undo: bool
     can_redo: bool
     began_host_ns: int = 0
-    """When it began; 0 if it was resumed."""
+    """Time of its first frame; 0 if it was resumed."""
 
 
 class Verifying:
