@@ -5,14 +5,14 @@ from __future__ import annotations
 from PySide6.QtCore import QRect, QTimer
 from PySide6.QtWidgets import QWidget
 
-_FRAME_PX = 40
+FRAME_PX = 40
 """Height that a title bar may take, which is not known before the window is shown."""
 
 
 def show_on_screen(window: QWidget) -> None:
     """Show a window, maximized if it is as large as the screen."""
     available = window.screen().availableGeometry()
-    fills = window.width() >= available.width() or window.height() > available.height() - _FRAME_PX
+    fills = window.width() >= available.width() or window.height() > available.height() - FRAME_PX
     if fills and window.isWindow():
         window.showMaximized()
     else:

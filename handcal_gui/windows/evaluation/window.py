@@ -22,6 +22,7 @@ from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.placement import FRAME_PX
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
 
 _FIRST_SIZE = QSize(1240, 860)
@@ -75,7 +76,8 @@ class EvaluationWindow(QDialog):
         self._lay_out()
         self._rail.currentRowChanged.connect(self._go_to)
         self._rail.setCurrentRow(0)
-        self.resize(QGuiApplication.primaryScreen().availableSize().boundedTo(_FIRST_SIZE))
+        room = QGuiApplication.primaryScreen().availableSize() - QSize(0, FRAME_PX)
+        self.resize(room.boundedTo(_FIRST_SIZE))
 
     @property
     def entries(self) -> EvaluationEntries:

@@ -16,6 +16,7 @@ from pytestqt.qtbot import QtBot
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.lab.study.run import run_study
 from handcal_gui.evaluation_entries import EvaluationEntries
+from handcal_gui.widgets.placement import FRAME_PX
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 
@@ -77,6 +78,11 @@ def student(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator
     yield Student(qtbot, window)
     numbers.may_go_on.set()
     window.stop()
+
+
+def test_the_window_leaves_room_for_its_title_bar(student: Student) -> None:
+    window = student.page.window()
+    assert window.height() <= window.screen().availableGeometry().height() - FRAME_PX
 
 
 def test_a_study_runs_to_its_end(
