@@ -24,12 +24,15 @@ from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.translation import tr
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
-PREFERENCES_VERSION = 3
-"""Version 1 had no number; version 2 had the verifications of a plan as checks."""
+PREFERENCES_VERSION = 4
+"""Version 1 had no number; version 2 had the verifications of a plan as checks, and up to version 3
+there were at most three."""
 MOST_RECENT = 8
 """Number of sessions that are remembered, and listed on the start page."""
 _OLD_ERROR_MAX_ARCMIN = 15.0
 """Default of version 1, which nobody chose."""
+_OLD_VERIFICATIONS = 3
+"""Default of versions 1 to 3, which nobody could change."""
 
 
 def _default_station() -> StationSettings:
@@ -243,6 +246,8 @@ def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
     placement = _part(upgraded, "station", "plan", "placement")
     if "checks" in placement:
         placement["verifications"] = placement.pop("checks")
+    if placement.get("verifications") == _OLD_VERIFICATIONS:
+        del placement["verifications"]
     solve = _part(upgraded, "station", "calibration", "solve")
     fuse, verdict = solve.get("fuse"), solve.get("verdict")
     if isinstance(fuse, dict) and "eye_box_sigma_m" in fuse:

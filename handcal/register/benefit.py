@@ -13,7 +13,6 @@ distance must move to cover its drawing: (1 - z φ4) |φ3 - φ3'| by the model o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
@@ -144,27 +143,26 @@ def depth_error_m(display: EyeDisplay, difference_m: Float64) -> Float64:
     return along_m * (1.0 - WORKING_DISTANCE_M / display.z_C0_S_m)
 
 
-def foreseen_benefits(
-    display: EyeDisplay, shift_m: Float64, covariance_m2: Float64, later_m2: Sequence[Float64]
-) -> list[tuple[float, float]]:
-    """Return the errors to expect after further alignments, with the probabilities of a benefit.
+def foreseen_benefit(
+    display: EyeDisplay, shift_m: Float64, later_m2: Float64
+) -> tuple[float, float]:
+    """Return the error to expect once φ is known better, and the probability of a benefit then.
+
+    The estimate is as likely to move one way as another, so it is taken to stay where it is. Then
+    whatever adds nothing leaves the probability as it is.
 
     Parameters
     ----------
     display : EyeDisplay
-    shift_m, covariance_m2 : (3,), (3, 3) float64
-        φ of the eye as it is known now.
-    later_m2 : sequence of (3, 3) float64
-        Covariances of φ then; the later φ is taken to err by it around the true one.
+    shift_m : (3,) float64
+        φ of the eye as estimated now.
+    later_m2 : (3, 3) float64
+        Its covariance then.
     """
-    without = _errors_arcmin(display, _samples(shift_m, covariance_m2))
-    # Which of the later errors goes with which eye does not matter, as long as it is no pattern.
-    order = np.random.default_rng(0).permutation(len(without))
-    found = []
-    for one_m2 in later_m2:
-        after = _errors_arcmin(display, _samples(np.zeros(3), one_m2))[order]
-        found.append((float(after.mean()), float((after < without).mean())))
-    return found
+    errors_m = _samples(np.zeros(3), later_m2)
+    after = _errors_arcmin(display, errors_m)
+    without = _errors_arcmin(display, shift_m + errors_m)
+    return float(after.mean()), float((after < without).mean())
 
 
 def _samples(mean_m: Float64, covariance_m2: Float64) -> Float64:

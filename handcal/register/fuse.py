@@ -95,8 +95,8 @@ class Fused:
     """Expected error of the wearer's overlays, relative to a usual wearer's."""
     verified: Mapping[Eye, tuple[Observation, ...]] = field(default_factory=dict)
     """The φ found by each eye's verifications."""
-    unverified: Mapping[Eye, Observation] = field(default_factory=dict)
-    """The expected verification of each solved eye that was not verified; its φ is zero."""
+    verifiable: Mapping[Eye, Observation] = field(default_factory=dict)
+    """The verification to expect of each solved eye; its φ is zero."""
     by_depth_m2: Float64 = field(default_factory=lambda: np.zeros((6, 6)))
     """(6, 6); part of the covariance by errors of the depth camera."""
 
@@ -222,10 +222,9 @@ def fuse_alignments(
         observed=observed,
         wearer_scale=wearer_scale,
         verified=verifications,
-        unverified={
+        verifiable={
             eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M, settings)
             for eye in of_eye
-            if eye not in verifications
         },
         by_depth_m2=by_depth_m2,
     )

@@ -52,7 +52,7 @@ class PlacementSettings:
     """Alignments of the recommended plan before the eyes are verified."""
     most: int = 6
     """Alignments after which no other is planned."""
-    verifications: int = 3
+    verifications: int = 4
     """Largest number of verifications of one eye: the others are for an eye that the first does not
     lead to *accept*. People see two outlines coincide better than they hold a hand."""
 
@@ -117,7 +117,7 @@ def next_alignment(
         If nearly all points of the hand lie at cut edges.
     """
     fewest = settings.fewest if plan == "recommended" else 1
-    is_enough = results is not None and _is_enough(plan, results, usable_eyes, settings)
+    is_enough = results is not None and _is_enough(plan, results, len(done), usable_eyes, settings)
     if len(done) >= settings.most or (len(done) >= fewest and is_enough):
         return None
     eyes = planned_eyes(plan, done, usable_eyes)
@@ -178,14 +178,24 @@ def _to_verify(
 
 
 def _is_enough(
-    plan: PlanName, results: Results, usable_eyes: Sequence[Eye], settings: PlacementSettings
+    plan: PlanName,
+    results: Results,
+    done: int,
+    usable_eyes: Sequence[Eye],
+    settings: PlacementSettings,
 ) -> bool:
-    """Return whether no alignment is needed now: an eye must be verified, or all are judged."""
+    """Return whether no alignment is needed now: an eye must be verified, or none would help."""
     if not set(results.verdicts) >= set(usable_eyes):
         return False
     counts = {eye: len(found) for eye, found in results.fused.verified.items()}
-    may_verify = plan == "recommended" and _to_verify(results, counts, usable_eyes, settings)
-    return bool(may_verify) or all(one.name != "repeat" for one in results.verdicts.values())
+    if plan == "paper":
+        return all(one.name != "repeat" for one in results.verdicts.values())
+    # Alignments that cannot lead to accept are not made.
+    is_worthwhile = any(
+        one.is_accepted and not one.verify and one.alignments <= settings.most - done
+        for one in results.advice.values()
+    )
+    return bool(_to_verify(results, counts, usable_eyes, settings)) or not is_worthwhile
 
 
 def _places(

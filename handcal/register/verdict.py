@@ -7,8 +7,9 @@ contradict it, whatever the solver says.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from types import MappingProxyType
 
 import numpy as np
@@ -17,10 +18,10 @@ from handcal.register.benefit import (
     Benefit,
     benefit,
     expected_arcmin,
-    foreseen_benefits,
+    foreseen_benefit,
     percent,
 )
-from handcal.register.fuse import Fused
+from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_position_m, eye_slice
 from handcal.rig_types import Rig
 from handcal.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
@@ -66,7 +67,8 @@ class Advice:
     is_accepted: bool
     """True if both are enough for *accept*."""
     verify: bool = False
-    """True if each solved eye is to be verified after the alignments."""
+    """True if each eye that was not verified is to be verified after the alignments; if all were,
+    this eye again, as no alignments are enough."""
 
 
 def planned_eyes(
@@ -126,34 +128,35 @@ def advise(
     With a plan, those are its next alignments, `upcoming`, and a verification may follow. Without
     one, alignments with this eye alone open are compared with alignments with all solved eyes open.
     """
-    shift, part = fused.shifts[eye], eye_slice(eye)
-    plans: list[tuple[Eye, ...]] = [tuple(fused.shifts)]
-    if len(plans[0]) > 1:
-        plans.append((eye,))
-    ahead: list[tuple[tuple[Eye, ...], int, bool]]
-    if upcoming:
-        ahead = [((), count, False) for count in range(1, len(upcoming) + 1)]
-        if fused.unverified:
-            ahead += [((), count, True) for count in range(len(upcoming) + 1)]
-    else:
-        ahead = [(eyes, count, False) for count in range(1, MOST_ALIGNMENTS + 1) for eyes in plans]
-    later_m2 = [
-        fused.foreseen_m2(
-            [eyes] * count if eyes else upcoming[:count],
-            list(fused.unverified.values()) if verify else [],
-        )[part, part]
-        for eyes, count, verify in ahead
-    ]
-    foreseen = foreseen_benefits(rig.eyes[eye], shift.shift_m, shift.covariance_m2, later_m2)
-    best: Advice | None = None
-    for (eyes, count, verify), (after_arcmin, probability) in zip(ahead, foreseen, strict=True):
+    part = eye_slice(eye)
+
+    def foresee(eyes: tuple[Eye, ...], count: int, then: Collection[Observation] = ()) -> Advice:
+        aligned = [eyes] * count if eyes else upcoming[:count]
+        after_arcmin, probability = foreseen_benefit(
+            rig.eyes[eye],
+            fused.shifts[eye].shift_m,
+            fused.foreseen_m2(aligned, tuple(then))[part, part],
+        )
         is_accepted = _is_enough(after_arcmin, probability, settings)
         meets_target = after_arcmin <= settings.target_arcmin
-        found = Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted, verify)
-        if best is None or _is_better_advice(found, best):
-            best = found
-    assert best is not None
-    return best
+        return Advice(eyes, count, after_arcmin, probability, meets_target, is_accepted, bool(then))
+
+    solved = tuple(fused.shifts)
+    if not upcoming:
+        plans = [solved, (eye,)] if len(solved) > 1 else [solved]
+        counts = range(1, MOST_ALIGNMENTS + 1)
+        return _best_advice(foresee(eyes, count) for count in counts for eyes in plans)
+    unverified = [one for other, one in fused.verifiable.items() if other not in fused.verified]
+    found = [foresee((), count) for count in range(1, len(upcoming) + 1)]
+    if unverified:
+        found += [foresee((), count, unverified) for count in range(len(upcoming) + 1)]
+    elif eye in fused.verified and not _best_advice(found).is_accepted:
+        found.append(foresee((), 0, [fused.verifiable[eye]]))
+    return _best_advice(found)
+
+
+def _best_advice(found: Iterable[Advice]) -> Advice:
+    return reduce(lambda best, one: one if _is_better_advice(one, best) else best, found)
 
 
 def _is_better_advice(one: Advice, other: Advice) -> bool:
@@ -196,7 +199,12 @@ def judge(
         }
     verdicts = {
         eye: _fault(shift, apart_m, settings)
-        or _judge_benefit(eye_benefit(rig, fused, eye), advice[eye], eye, settings)
+        or _judge_benefit(
+            eye_benefit(rig, fused, eye),
+            advice[eye],
+            _further_text(fused, advice[eye], eye),
+            settings,
+        )
         for eye, shift in fused.shifts.items()
     }
     for eye, (before, _) in measured.items():
@@ -241,7 +249,7 @@ def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
     return None
 
 
-def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSettings) -> Verdict:
+def _judge_benefit(gain: Benefit, advice: Advice, more: str, settings: VerdictSettings) -> Verdict:
     sure = percent(gain.probability_better)
     if _is_enough(gain.after_arcmin, gain.probability_better, settings):
         return Verdict(
@@ -259,21 +267,25 @@ def _judge_benefit(gain: Benefit, advice: Advice, eye: Eye, settings: VerdictSet
             f"this result, expected at {gain.after_arcmin:.1f}′, is only {sure} sure to be "
             "better",
         )
-    more = _further_text(advice, eye)
     now = f"expected error {gain.after_arcmin:.1f}′, {sure} sure to be better than none"
     then = f"{advice.after_arcmin:.1f}′ expected after {more}"
-    if advice.meets_target:
-        return Verdict("repeat", f"{now}; {then}")
-    return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
+    if not advice.meets_target:
+        return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
+    if not advice.is_accepted:
+        then += f", {percent(advice.probability_better)} sure"
+    return Verdict("repeat", f"{now}; {then}")
 
 
-def _further_text(advice: Advice, eye: Eye) -> str:
+def _further_text(fused: Fused, advice: Advice, eye: Eye) -> str:
     """Return what advice asks for: ``2 more alignments, then verifying each eye``."""
     count = advice.alignments
     steps = [f"{count} more alignment{'s' * (count != 1)}"] if count else []
     if advice.eyes:
         steps[0] += " with both eyes open" if len(advice.eyes) > 1 else f" with the {eye} eye alone"
-    return ", then ".join([*steps, "verifying each eye"] if advice.verify else steps)
+    if advice.verify:
+        is_again = set(fused.shifts) <= set(fused.verified)
+        steps.append("verifying this eye again" if is_again else "verifying each eye")
+    return ", then ".join(steps)
 
 
 def _is_enough(after_arcmin: float, probability_better: float, settings: VerdictSettings) -> bool:

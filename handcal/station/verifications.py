@@ -90,6 +90,7 @@ class VerificationSteps(AlignmentSteps, ABC):
             self.rig.eyes[eye],
             self._drawing.shift_m[eye],
             hand_centre_E_m(self.rig, eye, hand),
+            hand.t_host_ns,
         )
         self._ask_to_verify(self.verifying)
         self._store.event(VERIFYING, **self.verifying.event())

@@ -51,6 +51,8 @@ class VerifyingView:
     """φ before the verification, and with the movement so far."""
     can_undo: bool
     can_redo: bool
+    began_host_ns: int = 0
+    """Time of its first frame; 0 if it was resumed."""
 
 
 class Verifying:
@@ -66,6 +68,7 @@ class Verifying:
         φ that the eye is drawn with at the start.
     hand_E_m : (3,) float64
         Centre of the hand in the eye's E.
+    began_host_ns : int
 
     Attributes
     ----------
@@ -80,7 +83,12 @@ class Verifying:
     """
 
     def __init__(
-        self, request: VerifyRequest, display: EyeDisplay, before_m: Float64, hand_E_m: Float64
+        self,
+        request: VerifyRequest,
+        display: EyeDisplay,
+        before_m: Float64,
+        hand_E_m: Float64,
+        began_host_ns: int = 0,
     ) -> None:
         self.request = request
         self.before_m = before_m
@@ -90,6 +98,7 @@ class Verifying:
         self.fits: Nudge | None = None
         self.refusal = ""
         self._display = display
+        self._began_host_ns = began_host_ns
         self._heard = NudgeSum()
         self._session = 0
         self._done: list[NudgeSum] = []
@@ -109,6 +118,7 @@ class Verifying:
             _triple(self.shift_m),
             can_undo=bool(self._done),
             can_redo=bool(self._undone),
+            began_host_ns=self._began_host_ns,
         )
 
     def nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:

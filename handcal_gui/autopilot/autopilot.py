@@ -9,14 +9,12 @@ from PySide6.QtCore import QObject, Signal
 
 from handcal.station.snapshot import Snapshot
 from handcal_gui.control.live import CalibrationController
-from handcal_gui.pages.wizard.view import Action, WizardView
+from handcal_gui.pages.wizard.view import WEARERS, Action, WizardView
 from handcal_gui.pages.wizard.wizard import WizardPanel
 
 _LOOK_S = 0.7
 _MOST_ADDED = 4
 """Most times that another alignment is begun, however many are advised."""
-_WEARERS = Action.CONFIRM, Action.VERIFIED
-"""Actions that are left to the wearer, in the headset."""
 _PATIENCE_S = 120.0
 _PATIENCE_STEPS = 600
 """Engine steps to wait for as well, for a busy machine; an idle one makes five a second or more."""
@@ -83,7 +81,7 @@ class Autopilot(QObject):
         if now_s - self._moved_s > _PATIENCE_S and steps > _PATIENCE_STEPS:
             self._end(lambda: self.stuck.emit(self._complaint(view)))
         elif now_s - self._since_s > _LOOK_S and (
-            view.main.is_enabled or view.main.action in _WEARERS
+            view.main.is_enabled or view.main.action in WEARERS
         ):
             self._act(view)
 
@@ -96,7 +94,7 @@ class Autopilot(QObject):
             self._end(self.finished.emit)
         elif view.main.action is Action.ANOTHER and self._added == _MOST_ADDED:
             self._wizard_panel.asked.emit(Action.NEXT)
-        elif view.main.action not in _WEARERS:
+        elif view.main.action not in WEARERS:
             self._added += view.main.action is Action.ANOTHER
             self._wizard_panel.press_main()
 

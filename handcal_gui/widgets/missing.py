@@ -1,4 +1,4 @@
-"""The reason why a panel shows no image or hand."""
+"""The reason why a panel shows no image, hand or view."""
 
 from __future__ import annotations
 
@@ -19,3 +19,10 @@ def missing_text(snapshot: Snapshot) -> str:
     if seen is None or not seen.problem:
         return ""
     return tr("No hand") if seen.cloud is None else sentence(seen.problem)
+
+
+def missing_view_text(snapshot: Snapshot) -> str:
+    """Return in short why the eyes' views are missing; empty if they are there or to come."""
+    if snapshot.comparing is not None:
+        return tr("Hidden while the wearer compares")
+    return missing_text(snapshot)

@@ -1265,6 +1265,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Not accepted yet: verify {} again. Another alignment would change little.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The headset draws with a different φ from this result&apos;s: an earlier or a fine-tuned one.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5611,6 +5615,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>{}: {} before, {} after</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hidden while the wearer compares</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

@@ -88,6 +88,15 @@ def test_checks_of_version_2_are_verifications(file: PreferencesFile) -> None:
     assert file.load() == (changed, "")
 
 
+def test_the_old_number_of_verifications_is_no_choice(file: PreferencesFile) -> None:
+    file.path.parent.mkdir()
+    plan = {"placement": {"verifications": 3, "most": 5}}
+    file.path.write_text(json.dumps({"version": 3, "station": {"plan": plan}}))
+    preferences, said = file.load()
+    assert said == ""
+    assert preferences.station.plan.placement == PlacementSettings(most=5)
+
+
 def test_the_old_default_of_a_limit_is_no_choice(file: PreferencesFile) -> None:
     file.path.parent.mkdir()
     verdict = {"error_max_arcmin": 15.0}

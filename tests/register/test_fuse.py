@@ -122,7 +122,7 @@ def test_checks_alone_give_estimates_with_honest_covariances(checks: int) -> Non
             squares.append(error_m @ np.linalg.solve(fused.shifts[eye].covariance_m2, error_m))
     assert (np.abs(np.mean(errors_m, axis=0)) < 4 * np.std(errors_m, axis=0) / np.sqrt(150)).all()
     assert 2.5 < np.mean(squares) < 3.5
-    assert not fused.unverified
+    assert set(fused.verifiable) == set(EYES)
 
 
 def test_a_check_adds_to_an_alignment_and_says_nothing_without_a_place() -> None:
@@ -139,7 +139,7 @@ def test_a_check_adds_to_an_alignment_and_says_nothing_without_a_place() -> None
     sigma_m = [np.linalg.norm(one.shifts["left"].sigma_m) for one in (alone, checked, nowhere)]
     assert sigma_m[1] < 0.8 * sigma_m[0]
     assert sigma_m[2] == sigma_m[0]
-    foreseen_m2 = alone.foreseen_m2([], list(alone.unverified.values()))[:3, :3]
+    foreseen_m2 = alone.foreseen_m2([], list(alone.verifiable.values()))[:3, :3]
     np.testing.assert_allclose(foreseen_m2, checked.shifts["left"].covariance_m2, rtol=0.02)
 
 

@@ -9,7 +9,7 @@ from handcal.geometry import invert, project, rigid, transform
 from handcal.lab.study.trials import study_hand
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.register.verdict import planned_eyes
+from handcal.register.verdict import Advice, planned_eyes
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.raster import visible_points
@@ -116,8 +116,16 @@ def test_the_plan_ends_when_nothing_more_is_needed_or_the_most_were_made() -> No
         for count in (1, PlacementSettings().verifications)
     )
     assert _next(eyes, once, PlacementSettings(most=10)) is None
-    assert _next(eyes, often, PlacementSettings(most=10)) is not None
-    assert _next(eyes, often, PlacementSettings(most=6)) is None
+    # … if they can lead to *accept*.
+    useful = Advice((), 3, 3.0, 0.99, meets_target=True, is_accepted=True)
+    for advice, most, is_planned in (
+        (useful, 9, True),
+        (useful, 8, False),
+        (replace(useful, is_accepted=False), 9, False),
+        (replace(useful, verify=True), 9, False),
+    ):
+        advised = replace(often, advice={"left": advice})
+        assert (_next(eyes, advised, PlacementSettings(most=most)) is not None) == is_planned
 
 
 def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:
@@ -134,8 +142,11 @@ def test_each_eye_is_verified_once_and_again_if_it_is_not_accepted() -> None:
     assert next_verification(unsure, both) == "left"
     again: dict[Eye, Verification] = both | {"left": check.after(check)}
     assert next_verification(unsure, again) == "right"
-    thrice = check.after(check.after(check))
-    assert next_verification(unsure, dict.fromkeys(EYES, thrice)) is None
+    often = check
+    for _ in range(PlacementSettings().verifications - 1):
+        assert next_verification(unsure, dict.fromkeys(EYES, often)) == "left"
+        often = check.after(often)
+    assert next_verification(unsure, dict.fromkeys(EYES, often)) is None
 
 
 def _all_named(results: Results, name: VerdictName) -> Results:

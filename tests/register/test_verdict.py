@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handcal.register.benefit import percent
 from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_prior, eye_slice
 from handcal.register.verdict import (
@@ -155,13 +156,34 @@ def test_advice_counts_the_plans_own_next_steps() -> None:
     )
     assert of_left.after_arcmin < of_right.after_arcmin
     told = judge(RIG, fused, {"left": advice, "right": advice}, SETTINGS)["left"].reason
-    assert told.endswith(f"expected after {advice.alignments} more alignments")
+    assert told.endswith(f"expected after {advice.alignments} more alignments, 82\u00a0% sure")
     check = Observation(np.eye(3, 6), np.zeros(3), np.zeros((3, 3)), 1e-8 * np.eye(3))
-    verifiable = replace(fused, unverified={"left": check})
+    verifiable = replace(fused, verifiable={"left": check})
     advice = advise(RIG, verifiable, "left", SETTINGS, ahead)
     assert (advice.alignments, advice.verify, advice.is_accepted) == (0, True, True)
     told = judge(RIG, verifiable, {"left": advice, "right": advice}, SETTINGS)["left"].reason
     assert told.endswith("expected after verifying each eye")
+
+
+def test_an_eye_that_alignments_cannot_decide_is_to_be_verified_again() -> None:
+    """The reason has the probability then, as that may not be enough either."""
+    uncertain = replace(
+        GOOD,
+        shift_m=np.array([0.0025, 0.0, 0.003]),
+        covariance_m2=np.diag([0.0009, 0.0009, 0.0014]) ** 2,
+    )
+    check = Observation(np.eye(3, 6), np.zeros(3), np.zeros((3, 3)), 4e-6 * np.eye(3))
+    fused = replace(
+        _fused({"left": uncertain}),
+        verified={"left": ()},
+        verifiable={"left": check},
+    )
+    advice = advise(RIG, fused, "left", SETTINGS, [("right",)] * 10)
+    assert (advice.alignments, advice.verify, advice.is_accepted) == (0, True, False)
+    told = judge(RIG, fused, {"left": advice}, SETTINGS)["left"].reason
+    assert told.endswith(
+        f"after verifying this eye again, {percent(advice.probability_better)} sure"
+    )
 
 
 def test_a_verdict_tells_the_error_that_the_verification_found() -> None:

@@ -18,7 +18,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.missing import missing_text
+from handcal_gui.widgets.missing import missing_view_text
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _BLINK_MS = 800
@@ -132,7 +132,7 @@ class GuidePicture(QWidget):
         self._camera.show_text(message=tr("No image") if snapshot.camera.problem else message)
 
     def _show_eyes(self, snapshot: Snapshot, eyes: tuple[Eye, ...], *, is_result: bool) -> None:
-        message = missing_text(snapshot)
+        message = missing_view_text(snapshot)
         for eye, canvas in self._eyes.items():
             self._columns[eye].setVisible(eye in eyes)
             view, results = snapshot.views.get(eye), snapshot.procedure.results

@@ -209,6 +209,12 @@ class PlannedWizard(Wizard):
             text = tr("Do not use this result. Follow the advice below, then add alignments.")
         elif any(one.verdict == "repeat" for one in preconditions) or not preconditions:
             text = tr("Not accepted yet: add an alignment, or verify an eye again.")
+            advice = procedure.results.advice if procedure.results is not None else {}
+            again = tuple(eye for eye, one in advice.items() if one.verify)
+            if again and all(eye in procedure.verifications for eye in self.usable_eyes):
+                text = tr(
+                    "Not accepted yet: verify {} again. Another alignment would change little."
+                ).format(eye_names(again))
         elif set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("The wearer has verified the result. Finish, or verify an eye again.")
             main = ButtonSpec(Action.NEXT, tr("Finish"))

@@ -32,7 +32,8 @@ from handcal_gui.widgets.sentence import sentence
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
 """Waiting times of automatic steps: for the hand, and to read a text or advice."""
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
-_LEAST_ALIGN_NS = 1_500_000_000
+_LEAST_LOOK_NS = 1_500_000_000
+"""Time from a drawing to its confirmation: a second press of a key confirms nothing unseen."""
 _SENDS_UNUSABLE = tr("Draws with a result that should not be used")
 
 
@@ -72,8 +73,7 @@ def align_view(snapshot: Snapshot) -> WizardView:
     is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
     limit_deg = round(float(np.degrees(procedure.guard_limit_rad)), 1)
     cursor = procedure.cursor
-    # A second press of the key that made the cursor must not confirm a hand that has not moved.
-    is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_ALIGN_NS
+    is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_LOOK_NS
     close = ""
     if len(procedure.eyes) == 1:
         close = tr("Close the {} eye. ").format(
@@ -164,11 +164,12 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     if eye in snapshot.procedure.verifications:
         text = tr("Once more, to be sure. {}").format(text)
     total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
+    is_due = snapshot.t_host_ns - verifying.began_host_ns > _LEAST_LOOK_NS
     return WizardView(
         Step.VERIFY,
         text,
         (hand_found(snapshot), hand_still(snapshot)),
-        ButtonSpec(Action.VERIFIED, tr("It covers the hand"), is_steady(snapshot)),
+        ButtonSpec(Action.VERIFIED, tr("It covers the hand"), is_steady(snapshot) and is_due),
         (
             ButtonSpec(Action.UNDO_NUDGE, tr("&Undo"), verifying.can_undo),
             ButtonSpec(Action.SKIP, tr("&Skip")),

@@ -85,6 +85,9 @@ ACTION_NAMES: dict[str, str] = {
 }
 """The engine's commands in the user's language, within "Could not …"."""
 
+WEARERS = Action.CONFIRM, Action.VERIFIED
+"""Actions that are left to the wearer, in the headset."""
+
 
 @dataclass(frozen=True, slots=True)
 class Precondition:

@@ -24,7 +24,7 @@ from handcal_gui.pages.wizard.automatic import Automatic
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
-from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, Step, WizardView
+from handcal_gui.pages.wizard.view import STEPS, WEARERS, Action, Precondition, Step, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
@@ -320,8 +320,8 @@ class WizardPanel(QWidget):
         for action in self._go_back:
             action.setEnabled(view.step is not Step.CONNECT)
         runs_itself = view.runs_after_s is not None and not self._automatic.is_held
-        # The wearer confirms; the technician only where the wearer cannot.
-        self.bar.show_view(view, is_quiet=runs_itself or view.main.action is Action.CONFIRM)
+        # The technician confirms only where the wearer cannot.
+        self.bar.show_view(view, is_quiet=runs_itself or view.main.action in WEARERS)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:
             self._plan.clearFocus()  # otherwise Qt would pass the focus on

@@ -12,7 +12,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.legend import LegendEntry
-from handcal_gui.widgets.missing import missing_text
+from handcal_gui.widgets.missing import missing_view_text
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 
 _TITLES: dict[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
@@ -65,7 +65,7 @@ class WearerViewPanel(QWidget):
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the eyes' views, the closed eye, or a message."""
-        procedure, missing = snapshot.procedure, missing_text(snapshot)
+        procedure, missing = snapshot.procedure, missing_view_text(snapshot)
         for eye, column in self._eyes.items():
             is_closed = procedure.cursor is not None and eye not in procedure.eyes
             message = _CLOSED if is_closed else missing

@@ -57,11 +57,8 @@ class ResultsView(QWidget):
         self._path.setText(str(outcome.folder))
         self._lead.setText(outcome.report.lead)
         tables = _key_tables(outcome.report)
-        for number, table in enumerate(tables, 1):
-            self._add(
-                tr("Numbers {}").format(number) if len(tables) > 1 else tr("Numbers"),
-                _table_page(table),
-            )
+        for title, table in zip(_titles(tables), tables, strict=True):
+            self._add(title, _table_page(table))
         for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
             title = sentence(figure.name.replace("-", " "))
             self._add(title, _figure_page(title, figure, picture))
@@ -112,6 +109,16 @@ def _key_tables(report: Report) -> list[Table]:
         if shown := [table for table in tables if any(one.title for one in table.columns)]:
             return shown
     return []
+
+
+def _titles(tables: list[Table]) -> list[str]:
+    """Return the beginnings of the tables' captions; numbers if these do not tell them apart."""
+    if len(tables) == 1:
+        return [tr("Numbers")]
+    titles = [sentence(one.caption.partition(",")[0].rstrip(".")) for one in tables]
+    if all(titles) and len(set(titles)) == len(titles):
+        return titles
+    return [tr("Numbers {}").format(number) for number in range(1, len(tables) + 1)]
 
 
 def _table_page(table: Table) -> QWidget:

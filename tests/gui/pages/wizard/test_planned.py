@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.register.verdict import Advice
 from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
@@ -117,6 +118,21 @@ def test_the_end_says_what_was_reached(
         Action.VERIFY_LEFT,
         Action.VERIFY_RIGHT,
     ]
+
+
+def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
+    done = planned_snapshot(snapshot, StepName.DONE, verifications=VERIFIED)
+    assert done.procedure.results is not None
+    again = Advice((), 0, 3.0, 0.98, meets_target=True, is_accepted=False, verify=True)
+    results = replace(
+        done.procedure.results,
+        verdicts={"left": Verdict("accept", "as told"), "right": Verdict("repeat", "as told")},
+        advice={"right": again},
+    )
+    done = replace(done, procedure=replace(done.procedure, results=results))
+    assert begun(snapshot).view(done).sentence == (
+        "Not accepted yet: verify the right eye again. Another alignment would change little."
+    )
 
 
 def test_one_usable_eye_is_the_only_one_offered(snapshot: Maker) -> None:

@@ -14,7 +14,7 @@ from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName, Verification
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
-from tests.gui.views import Maker, actions, judged
+from tests.gui.views import NUDGED, Maker, actions, judged
 
 
 @pytest.mark.parametrize(
@@ -123,6 +123,16 @@ def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> 
     before: dict[Eye, Verification] = {"left": Verification(triple, (0.0, 0.0), triple)}
     again = replace(seen, procedure=replace(seen.procedure, verifications=before))
     assert Wizard().view(again).sentence == f"Once more, to be sure. {view.sentence}"
+
+
+def test_a_drawing_is_not_confirmed_before_anyone_can_have_looked(snapshot: Maker) -> None:
+    def can_confirm(ago_s: float) -> bool:
+        seen = snapshot(State.VERIFY, procedure={"verifying": NUDGED})
+        began = replace(NUDGED, began_host_ns=seen.t_host_ns - round(1e9 * ago_s))
+        seen = replace(seen, procedure=replace(seen.procedure, verifying=began))
+        return Wizard().view(seen).main.is_enabled
+
+    assert [can_confirm(ago_s) for ago_s in (0.1, 1.4, 1.6)] == [False, False, True]
 
 
 def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:

@@ -15,7 +15,7 @@ from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.theme import use_theme
-from tests.gui.views import all_views
+from tests.gui.views import NUDGED, all_views
 
 Maker = Callable[..., Snapshot]
 
@@ -89,6 +89,8 @@ def test_the_main_button_has_its_colour_only_where_a_press_is_needed(
             panel.hold(True)
             panel.show_snapshot(snapshot(State.ALIGN))
             assert not is_colored()  # the wearer confirms
+            panel.show_snapshot(snapshot(State.VERIFY, procedure={"verifying": NUDGED}))
+            assert not is_colored()
     finally:
         use_theme("system")
 

@@ -10,6 +10,8 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.wearer_view import EyeView
 from handcal.types import EYES, Eye
+from handcal_gui.pages.wizard.picture import GuidePicture
+from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
 from handcal_gui.widgets.legend import LegendEntry
@@ -61,6 +63,19 @@ def test_simulated_eyes_show_their_errors(panel: WearerViewPanel, snapshot: Make
         assert arcmin == f"{drawn.error_arcmin:.1f}′"
         assert before == [px, arcmin]  # nothing is applied yet
         assert _canvas(panel, eye).accessibleDescription() == ""
+
+
+def test_a_comparison_is_no_missing_hand(
+    qtbot: QtBot, panel: WearerViewPanel, snapshot: MakeSnapshot
+) -> None:
+    picture = show(qtbot, GuidePicture(), 600, 500)
+    picture.step = Step.VERIFY
+    compared = replace(snapshot(State.APPLIED, views={}), comparing="first")
+    panel.show_snapshot(compared)
+    picture.show_snapshot(compared)
+    for shown in (panel, picture):
+        for canvas in shown.findChildren(EyeCanvas):
+            assert canvas.accessibleDescription() == "Hidden while the wearer compares"
 
 
 def test_eye_that_is_not_known_has_no_error(
