@@ -262,5 +262,7 @@ def test_the_keys_are_told_where_there_is_room_for_them(panel: FineTunePanel, sh
     QApplication.processEvents()
     assert not keys.isVisible()
     [area] = panel.findChildren(QScrollArea)
-    assert area.widget().toolTip() == keys.text()
+    body = area.widget()
+    assert body is not None
+    assert body.toolTip() == keys.text()
     assert area.verticalScrollBar().maximum() == 0
