@@ -38,9 +38,9 @@ _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
 _LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
 """Width and height from which the guide has larger texts, and their scale."""
-_LOW, _LOWEST = 40, 36
-"""Heights of a window below which the guide leaves out details, and small views of the eyes, in
-sizes of the font."""
+_LOW = 43, 40, 36
+"""Heights of a window below which the guide has smaller gaps, no details, and no small views of the
+eyes; in sizes of the font."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -174,8 +174,9 @@ class WizardPanel(QWidget):
     def _fit(self) -> None:
         """Leave out what a low window has no room for."""
         height = self.window().height() / font_px()
-        self.picture.fit(has_details=height >= _LOW, has_eyes=height >= _LOWEST)
-        gap_px = SPACING_PX if height >= _LOW else SPACING_PX // 2
+        has_gaps, has_details, has_eyes = (height >= least for least in _LOW)
+        self.picture.fit(has_details=has_details, has_eyes=has_eyes)
+        gap_px = SPACING_PX if has_gaps else SPACING_PX // 2
         if (layout := self.layout()) is not None:
             layout.setContentsMargins(*4 * (2 * gap_px,))
             layout.setSpacing(gap_px)

@@ -261,6 +261,8 @@ def test_the_keys_are_told_where_there_is_room_for_them(panel: FineTunePanel, sh
     show()
     QApplication.processEvents()
     assert not keys.isVisible()
-    assert keys.parentWidget().toolTip() == keys.text()
     [area] = panel.findChildren(QScrollArea)
+    body = area.widget()
+    assert body is not None
+    assert body.toolTip() == keys.text()
     assert area.verticalScrollBar().maximum() == 0
