@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
     QLabel,
@@ -89,6 +91,15 @@ def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog)
     assert not child(dialog, QCheckBox, "squareSeen-left").isEnabled()
     assert len(text(dialog, "digits").replace(" ", "")) == 8
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
+
+
+def test_enter_keeps_the_code_that_is_being_typed(dialog: ConnectDialog) -> None:
+    code = text(dialog, "digits")
+    focused = dialog.focusWidget()
+    assert focused is button(dialog, "close")
+    QTest.keyClick(focused, Qt.Key.Key_Return)
+    assert not dialog.isVisible()
+    assert text(dialog, "digits") == code
 
 
 def test_a_headset_pairs_by_the_code_once(
