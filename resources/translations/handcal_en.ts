@@ -4124,7 +4124,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Review it (Return)</source>
+        <source>Review the selected session (Return)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

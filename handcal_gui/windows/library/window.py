@@ -298,7 +298,9 @@ class LibraryWindow(QDialog):
 
     def _make_actions(self) -> None:
         """Make the actions of the context menu, most of which have a button and some a key."""
-        self._open = self._act(tr("Open"), "Return", self._open_chosen, tr("Review it (Return)"))
+        self._open = self._act(
+            tr("Open"), "Return", self._open_chosen, tr("Review the selected session (Return)")
+        )
         self._resume = self._act(
             tr("Resume"), "", self._resume_chosen, tr("Continue the selected session")
         )
