@@ -46,7 +46,7 @@ class ReviewPage(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("reviewPage")
-        self._title = QLabel()
+        self._title = QLabel(textFormat=Qt.TextFormat.PlainText)
         scale_font(self._title, 1.6, is_bold=True)
         self._task = paragraph("reviewTask")
         self._is_solved = False
