@@ -16,6 +16,7 @@ from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.rig_types import Rig
 from handcal.session.library import correct_wearer
+from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.station import lab_prior
 from handcal.station.lab_prior import run_learn_prior
@@ -117,6 +118,9 @@ def test_a_session_counts_by_its_start_and_under_its_corrected_name(
     found = run_learn_prior(tmp_path, RIG, SETTINGS)
     assert (found.used, dict(found.left_out)) == (1, {"earlier sessions of the same wearer": 1})
     assert counts == [[2, 1], [1]]
+    _session(tmp_path, "nameless", alignment)
+    repair_session(tmp_path / "nameless", tmp_path / "copy")
+    assert run_learn_prior(tmp_path, RIG, SETTINGS).used == 2, "a copy is no other wearer"
 
 
 def test_measured_eye_distances_are_learned_from(tmp_path: Path, alignment: Alignment) -> None:
