@@ -26,7 +26,7 @@ class ConvergencePlot(Plot):
         self.setToolTip(
             tr(
                 "RMS distance between matched points of hand and cursor at each iteration\n"
-                "of each alignment (1, 2, …). “consistent” measures it along the surface’s "
+                "of each alignment (1, 2, …). “consistent” measures it along the surface's "
                 "normals,\nwhich is less than the RMS in the table."
             )
         )
