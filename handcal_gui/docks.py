@@ -141,7 +141,7 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
     )
     if page_px is not None:
         has_right = window.dockWidgetArea(docks["results"]) is _RIGHT
-        left = (width - page_px) * (45 if has_right else 100) // 100
+        left = max((width - page_px) * (45 if has_right else 100) // 100, 1)
         right = max(width - page_px - left, 1)
     window.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
     column = [docks[name] for name in _LEFT_COLUMN]

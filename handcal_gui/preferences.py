@@ -191,7 +191,7 @@ class CurrentPreferences(QObject):
         self._file, self._remembers = file, remembers
         self.folder = file.path.parent
         self.now, self.complaint = file.load()
-        self._for_one_run = self._instead = self.now.station
+        self._instead: dict[str, Any] = {}  # by name: stored in place of settings of one run
         try:
             self.pairings = file.pairings()
         except FileError as error:
@@ -204,21 +204,22 @@ class CurrentPreferences(QObject):
 
     def use_for_one_run(self, station: StationSettings) -> None:
         """Use other settings of the station; each is remembered only if it is changed again."""
-        self._for_one_run, self._instead = station, self.now.station
+        now = self.now.station
+        self._instead = {one.name: getattr(now, one.name) for one in fields(StationSettings)}
         self.now = replace(self.now, station=station)
 
     def use(self, preferences: Preferences) -> None:
         """Replace all preferences."""
-        self.now = preferences
+        before, self.now = self.now.station, preferences
         station = preferences.station
-        former = {
-            one.name: getattr(self._instead, one.name)
-            for one in fields(StationSettings)
-            if getattr(station, one.name) == getattr(self._for_one_run, one.name)
+        self._instead = {
+            name: value
+            for name, value in self._instead.items()
+            if getattr(station, name) == getattr(before, name)
         }
         try:
             if self._remembers:
-                self._file.save(replace(preferences, station=replace(station, **former)))
+                self._file.save(replace(preferences, station=replace(station, **self._instead)))
         except FileError as error:
             self.not_saved.emit(tr("The preferences could not be saved: {}").format(error))
 

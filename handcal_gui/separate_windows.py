@@ -125,7 +125,8 @@ class SeparateWindows(QObject):
         window.open_requested.connect(self.open_requested)
         window.resume_requested.connect(self.resume_requested)
         window.export_requested.connect(lambda paths: self.export_many(paths, window))
-        window.changed.connect(self._review.read_wearer)
+        for changed in (window.changed, window.finished):  # closing cancels what runs
+            changed.connect(self._review.read_wearer)
         window.finished.connect(self._start.look_for_sessions)
         self._open(window, window.stop)
         return window

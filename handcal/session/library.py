@@ -122,10 +122,11 @@ def correct_wearer(path: Path, name: str) -> None:
     Raises
     ------
     FileError
-        If the session is open in a program, damaged, or cannot be written.
+        If the session is open in a program, cannot be read, or cannot be written.
     ValueError
         If the name is invalid.
     """
+    _require_there(path)
     clean_wearer(name)  # before anything is written
     with Session(path) as session:
         session.correct_wearer(name)
@@ -139,8 +140,7 @@ def delete_session(path: Path) -> Path:
     FileError
         If it is open in a program, or cannot be moved.
     """
-    if not path.exists():
-        raise FileError(f"{path} is no longer there: another program moved or deleted it")
+    _require_there(path)
     if not (path / JOURNAL).is_file():
         raise FileError(f"{path} is not a session; nothing was deleted")
     FileLock(path / "lock").release()  # only a test, or another program would lose its folder
@@ -169,6 +169,11 @@ def deleted_sessions(folder: Path) -> tuple[Path, ...]:
     """Return the deleted sessions of a folder, the most recently deleted one last."""
     found = [journal.parent for journal in (folder / DELETED).glob(f"*/{JOURNAL}")]
     return tuple(sorted(found, key=lambda path: (_changed_ns(path), path.name)))
+
+
+def _require_there(path: Path) -> None:
+    if not path.exists():
+        raise FileError(f"{path} is no longer there: another program moved or deleted it")
 
 
 def _changed_ns(path: Path) -> int:

@@ -280,31 +280,16 @@ class Session(Closable):
         self._notes_sha256 = sha256(data)
 
     def correct_wearer(self, name: str) -> None:
-        """Replace the wearer's name or code; the journal keeps the former one.
-
-        Raises
-        ------
-        FileError
-            If the journal cannot be written.
-        ValueError
-            If the name is invalid.
-        """
-        wearer, before = clean_wearer(name), self._state.wearer
-        if wearer != before:
-            data = {"wearer": wearer, "before": before}
+        """Replace the wearer's name or code; ValueError if it is invalid, else as `save_notes`."""
+        data = {"wearer": clean_wearer(name), "before": self._state.wearer}
+        if data["wearer"] != data["before"]:
             self._append(SessionEvent.WEARER_CORRECTED, data)
 
     def save_facts(self, **facts: Any) -> None:
         """Record facts by their names in `SessionFacts`; each replaces an earlier one.
 
-        The results are discarded if the eye distance or a verification changes.
-
-        Raises
-        ------
-        FileError
-            If the journal cannot be written.
-        ValueError
-            If a name is unknown or a value invalid.
+        The results are discarded if the eye distance or a verification changes. FileError if the
+        journal cannot be written; ValueError if a name is unknown or a value invalid.
         """
         data = facts_json(facts)
         with_facts(SessionFacts(), data)

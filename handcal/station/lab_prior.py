@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,7 @@ from handcal.register.prior import (
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
 from handcal.session.facts import read_facts
-from handcal.session.journal import Event, read_journal
-from handcal.session.state import SessionEvent
+from handcal.session.record import replay
 from handcal.types import EYES, EyeDistance, Float64
 
 MAX_SESSIONS = 300
@@ -68,50 +68,50 @@ def run_learn_prior(
         If it was cancelled.
     """
     journals = sorted(folder.glob("*/journal.jsonl"), key=modified_s, reverse=True)[:MAX_SESSIONS]
-    sessions: list[list[Observed]] = []
-    left_out: dict[str, int] = {}
-    wearers: set[str] = set()
+    found: list[tuple[str, str, list[Observed]]] = []
+    left_out: Counter[str] = Counter()
     for number, journal in enumerate(journals):
         progress.at(number / len(journals), f"Reading session {number + 1} of {len(journals)}")
         try:
-            observed, wearer = _read_session(journal, rig)
-            if wearer and wearer in wearers:
-                raise _NotUsableError("earlier sessions of the same wearer")
+            found.append(_read_session(journal, rig))
         except _NotUsableError as reason:
-            left_out[str(reason)] = left_out.get(str(reason), 0) + 1
-            continue
-        wearers.add(wearer)
-        sessions.append(observed)
-    return LabPrior(learn_prior(sessions, settings), len(sessions), left_out)
+            left_out[str(reason)] += 1
+    # By their start: a corrected name or saved notes change a journal later.
+    newest = {whose: observed for _, whose, observed in sorted(found, key=itemgetter(0))}
+    if len(newest) < len(found):
+        left_out["earlier sessions of the same wearer"] = len(found) - len(newest)
+    return LabPrior(learn_prior(list(newest.values()), settings), len(newest), left_out)
 
 
 class _NotUsableError(Exception):
     """A session that does not count; the text says why."""
 
 
-def _read_session(journal: Path, rig: Rig) -> tuple[list[Observed], str]:
-    """Return the observations of a session, with a measured eye distance, and its wearer."""
+def _read_session(journal: Path, rig: Rig) -> tuple[str, str, list[Observed]]:
+    """Return a session's start, its wearer, and its observations with a measured eye distance.
+
+    A wearer without a name is known by the start, which a repaired copy has in common.
+    """
     try:
-        events = read_journal(journal).events
+        replayed = replay(journal.parent)
         is_same_rig = rig_numbers(read_rig(journal.with_name("rig.yaml"))) == rig_numbers(rig)
     except FileError:
         raise _NotUsableError("not readable") from None
+    state, started = replayed.state, replayed.journal.events[0].time
     if not is_same_rig:
         raise _NotUsableError("of another rig")
-    if not events or events[-1].name != SessionEvent.FINISHED:
+    if not state.is_finished:
         raise _NotUsableError("not finished")
-    results = _newest_results(events)
-    if results is None:
+    if state.results is None or not state.is_solved:
         raise _NotUsableError("not solved")
-    eyes = results.get("eyes")
+    eyes = state.results.get("eyes")
     verdicts = [one.get("verdict") for one in eyes.values()] if isinstance(eyes, dict) else []
     if "contradicted" in verdicts or "implausible" in verdicts:
         raise _NotUsableError("contradicted or implausible")
-    wearer = events[0].data.get("wearer", "")
-    observed = _observations(results.get("observed"))
-    if (eye_distance := _eye_distance(results.get("measured_eye_distance"))) is not None:
+    observed = _observations(state.results.get("observed"))
+    if (eye_distance := _eye_distance(state.results.get("measured_eye_distance"))) is not None:
         observed.append(observe_eye_distance(rig, eye_distance, np.zeros(6)))
-    return observed, wearer if isinstance(wearer, str) else ""
+    return started, state.wearer or started, observed
 
 
 def rig_numbers(rig: Rig) -> list[list[float]]:
@@ -122,24 +122,6 @@ def rig_numbers(rig: Rig) -> list[list[float]]:
         arrays += [display.K, display.H0, display.t_C0_V_m, display.T_V_H]
         arrays.append(np.array([display.z_C0_S_m]))
     return [np.round(array, 9).ravel().tolist() for array in arrays]
-
-
-def _newest_results(events: tuple[Event, ...]) -> dict[str, Any] | None:
-    """Return the results of all alignments at the end of the session, if there are any."""
-    results: dict[str, Any] | None = None
-    for event in events:
-        if event.name == SessionEvent.SOLVED:
-            results = event.data
-        elif event.name in _CHANGE_ALIGNMENTS:
-            results = None
-    return results
-
-
-_CHANGE_ALIGNMENTS = {
-    SessionEvent.ALIGNMENT_SAVED,
-    SessionEvent.ALIGNMENT_DELETED,
-    SessionEvent.ALIGNMENT_RESTORED,
-}
 
 
 def _eye_distance(stored: object) -> EyeDistance | None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
-from handcal.errors import FileError
 from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
 from handcal.session.record import replay
@@ -18,6 +16,7 @@ from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import Eye
 from handcal_gui.control.compare import Comparison
 from handcal_gui.engine.jobs import Job
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow
@@ -62,6 +61,9 @@ class ReviewController(QObject):
         self._progress: QProgressDialog | None = None
         self.record: SessionRecord | None = None
         self._results: Results | None = None
+        # Without an answer, as of a session deleted meanwhile, what is shown stays.
+        self._wearer = LatestJob(lambda path: replay(path).state.wearer, self)
+        self._wearer.answered.connect(self._show_wearer)
         page.residuals.shown.connect(self._show_alignment)
 
     def open(self, path: Path) -> None:
@@ -90,17 +92,19 @@ class ReviewController(QObject):
             self._job.abandon()
             self._job = None
         self._end_progress()
+        self._wearer.stop()
         self.record = None
 
     def read_wearer(self) -> None:
         """Show, and export, the wearer's name as it is stored now: the library corrects it."""
-        if self.record is None:
-            return
-        with suppress(FileError):  # deleted meanwhile: what is shown stays
-            wearer = replay(self.record.path).state.wearer
-            self.record = replace(self.record, wearer=wearer)
-            self._window.panels.session.show_record(self.record, self._results)
-            self._page.show_wearer(wearer)
+        if self.record is not None:
+            self._wearer.ask(self.record.path)
+
+    def _show_wearer(self, _path: Path, wearer: str) -> None:
+        assert self.record is not None
+        self.record = replace(self.record, wearer=wearer)
+        self._window.panels.session.show_record(self.record, self._results)
+        self._page.show_wearer(wearer)
 
     def _show_progress(self, job: Job) -> None:
         """Show a dialog with the progress if opening takes long, with a Cancel button."""

@@ -19,7 +19,8 @@ from handcal.export.many import Exported
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import plain_tooltip, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.numbers import pluralize
 
@@ -32,7 +33,7 @@ class ExportProgress(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._doing = with_name(QLabel(), "doing")
+        self._doing: QLabel = with_name(ElidedLabel(), "doing")
         self._bar = with_name(QProgressBar(maximum=_WHOLE), "progress", tr("Progress"))
         self._end = FindingLine("exportEnd")
         self._files = with_name(QListWidget(), "files", tr("Files"))
@@ -61,7 +62,7 @@ class ExportProgress(QWidget):
         """Show the files written, below the sessions that were not exported."""
         for missing in made.missing:
             item = QListWidgetItem(icon("warning"), missing)
-            item.setToolTip(missing)
+            item.setToolTip(plain_tooltip(missing))
             self._files.addItem(item)
         self._files.addItems([str(path.relative_to(folder)) for path in made.files])
         self._files.show()

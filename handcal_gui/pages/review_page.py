@@ -13,6 +13,7 @@ from handcal.session.session import SessionRecord
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
@@ -46,7 +47,7 @@ class ReviewPage(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("reviewPage")
-        self._title = QLabel()
+        self._title: QLabel = ElidedLabel()
         scale_font(self._title, 1.6, is_bold=True)
         self._task = paragraph("reviewTask")
         self._is_solved = False

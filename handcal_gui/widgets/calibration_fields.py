@@ -51,7 +51,7 @@ class CalibrationFields(QWidget):
     Parameters
     ----------
     explains : bool
-        Whether to show what each field means beside it; the tooltips always do.
+        True if each field's meaning is shown beside it; it is always in the tooltip.
 
     Attributes
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from html import escape
 from typing import TypeVar, cast
 
 from PySide6.QtCore import QEvent, QObject, Qt
@@ -34,6 +35,11 @@ def with_name(field: Field, name: str, label: str = "", help_text: str = "") -> 
     field.setAccessibleName(label)
     field.setToolTip(help_text)
     return field
+
+
+def plain_tooltip(text: str) -> str:
+    """Return a tooltip that shows a text from a file as it is: Qt takes tags for markup."""
+    return f"<p style='white-space: pre'>{escape(text)}</p>" if "<" in text else text
 
 
 def number(

@@ -109,9 +109,9 @@ class RecordTable(QTableView):
         self._records.replace(rows)
         line_px = QFontMetrics(number_font()).lineSpacing() + 1  # rounded up: else it is elided
         least_px = self.verticalHeader().defaultSectionSize()
-        for row, cells in enumerate(rows.values()):
+        for place, cells in enumerate(rows.values()):
             more = max(cell.count("\n") for cell in cells)
-            self.setRowHeight(row, least_px + more * line_px)
+            self.setRowHeight(place, least_px + more * line_px)
         if chosen is not None and numbers:
             is_there = chosen in rows
             self.selectRow(numbers.index(chosen) if is_there else min(row, len(numbers) - 1))

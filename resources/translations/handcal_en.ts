@@ -2436,7 +2436,7 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>RMS distance between matched points of hand and cursor at each iteration
-of each alignment (1, 2, …). “consistent” measures it along the surface’s normals,
+of each alignment (1, 2, …). “consistent” measures it along the surface&apos;s normals,
 which is less than the RMS in the table.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4124,7 +4124,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Review it (Return)</source>
+        <source>Review the selected session (Return)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -163,6 +163,8 @@ def test_a_wearers_name_is_corrected_and_the_former_one_kept(
         correct_wearer(path, "A\nB")
     with Session(path), pytest.raises(FileError, match="in use by process"):
         correct_wearer(path, "Ada")
+    with pytest.raises(FileError, match="no longer there"):
+        correct_wearer(tmp_path / "gone", "Ada")
 
 
 def test_a_repaired_copy_keeps_the_names(make: Callable[..., Path], tmp_path: Path) -> None:

@@ -15,7 +15,10 @@ from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_position_m, 
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.rig_types import Rig
+from handcal.session.library import correct_wearer
+from handcal.session.repair import repair_session
 from handcal.session.session import Session
+from handcal.station import lab_prior
 from handcal.station.lab_prior import run_learn_prior
 from handcal.types import EYES, Alignment, EyeDistance
 
@@ -97,6 +100,27 @@ def test_enough_sessions_make_a_prior(tmp_path: Path, alignment: Alignment) -> N
     # All wearers here have the same eyes: the lab knows better than the default where they are.
     lab, default = eye_prior(PriorSettings(learned=found.learned)), eye_prior(SETTINGS)
     assert np.trace(lab.covariance_m2) < 0.7 * np.trace(default.covariance_m2)
+
+
+def test_a_session_counts_by_its_start_and_under_its_corrected_name(
+    tmp_path: Path, alignment: Alignment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counts: list[list[int]] = []  # of the observations of each session
+    monkeypatch.setattr(
+        lab_prior, "learn_prior", lambda sessions, _: counts.append([*map(len, sessions)])
+    )
+    _session(tmp_path, "old", alignment, wearer="p7", eye_distance=EyeDistance(0.065))
+    _session(tmp_path, "new", alignment, wearer="P7")
+    with Session(tmp_path / "new") as session:
+        session.save_notes("The headset slipped once.")
+    assert run_learn_prior(tmp_path, RIG, SETTINGS).used == 2
+    correct_wearer(tmp_path / "old", "P7")  # its journal is now the newer one
+    found = run_learn_prior(tmp_path, RIG, SETTINGS)
+    assert (found.used, dict(found.left_out)) == (1, {"earlier sessions of the same wearer": 1})
+    assert counts == [[2, 1], [1]]
+    _session(tmp_path, "nameless", alignment)
+    repair_session(tmp_path / "nameless", tmp_path / "copy")
+    assert run_learn_prior(tmp_path, RIG, SETTINGS).used == 2, "a copy is no other wearer"
 
 
 def test_measured_eye_distances_are_learned_from(tmp_path: Path, alignment: Alignment) -> None:

@@ -52,9 +52,9 @@ class ResultBar(QWidget):
             add_action(self, tr("Copy"), "", self.copy, tooltip=tr("Copy the result as text")),
             add_action(self, tr("Print…"), "", self._ask_printer, tooltip=tr("Print the result")),
         )
+        self._blink_button, *others = map(_button, actions)
         self.buttons = QWidget()
-        hbox(*(made := list(map(_button, actions))), on=self.buttons, margins=0, spacing=SPACING_PX)
-        self._blink_button = made[0]
+        hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)
         vbox(self.card, on=self, margins=0)
 
     def set_target(self, target_arcmin: float) -> None:

@@ -26,7 +26,7 @@ class ConvergencePlot(Plot):
         self.setToolTip(
             tr(
                 "RMS distance between matched points of hand and cursor at each iteration\n"
-                "of each alignment (1, 2, …). “consistent” measures it along the surface’s "
+                "of each alignment (1, 2, …). “consistent” measures it along the surface's "
                 "normals,\nwhich is less than the RMS in the table."
             )
         )
@@ -60,7 +60,7 @@ class ConvergencePlot(Plot):
         """Write the alignments' numbers at the ends of lines, one text for those that adjoin."""
         while ends:
             last, rms_mm, _ = ends[0]
-            beside = [one for one in ends if one[0] == last and one[1] - rms_mm < height_mm]
+            beside = [one for one in ends if one[0] == last and one[1] - rms_mm <= height_mm]
             numbers = sorted({number for _, _, number in beside})
             self.add_text(
                 ", ".join(map(str, numbers)), last, float(np.mean([y for _, y, _ in beside]))

@@ -19,6 +19,7 @@ from handcal.types import EYES, VerdictName
 from handcal_gui.theme import number_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.error_bars import error_bars, error_text, picture_text
+from handcal_gui.widgets.fields import plain_tooltip
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
 from handcal_gui.widgets.times import local_time
@@ -225,7 +226,8 @@ class SessionsModel(QAbstractTableModel):
                 path = entry.problem or str(entry.path)
                 errors = (error_text if index.column() else picture_text)(entry.eyes)
                 lines = self._texts[index.row()][index.column()], copy, path, errors
-                return "\n".join(filter(None, lines))  # the cell's text may be elided
+                # The cell's text may be elided.
+                return plain_tooltip("\n".join(filter(None, lines)))
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font
             case Qt.ItemDataRole.TextAlignmentRole:

@@ -26,7 +26,7 @@ from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import button, choice, paragraph, with_name
+from handcal_gui.widgets.fields import button, choice, paragraph, plain_tooltip, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import NOTHING
@@ -194,7 +194,7 @@ class LibraryWindow(QDialog):
             last = self._deleted[-1].name if self._deleted else ""
             verb, text = tr("Restore"), tr("Last deleted: {}").format(last) if last else ""
         self._undo.setText(verb)
-        self._undo.setToolTip(tr("{} (Ctrl+Z)").format(text))
+        self._undo.setToolTip(plain_tooltip(tr("{} (Ctrl+Z)").format(text)))
         self._undo.setVisible(bool(text))
         self._undo.setEnabled(bool(text) and self._job is None)
         self._change_text.setText(text)
@@ -298,7 +298,9 @@ class LibraryWindow(QDialog):
 
     def _make_actions(self) -> None:
         """Make the actions of the context menu, most of which have a button and some a key."""
-        self._open = self._act(tr("Open"), "Return", self._open_chosen, tr("Review it (Return)"))
+        self._open = self._act(
+            tr("Open"), "Return", self._open_chosen, tr("Review the selected session (Return)")
+        )
         self._resume = self._act(
             tr("Resume"), "", self._resume_chosen, tr("Continue the selected session")
         )

@@ -15,9 +15,11 @@ from pytestqt.qtbot import QtBot
 from handcal.errors import CancelledError
 from handcal.progress import Progress
 from handcal.register.results import Results
-from handcal.session.library import delete_session
+from handcal.session.library import correct_wearer, delete_session
+from handcal.session.record import Replayed, replay
 from handcal.session.session import SessionRecord
 from handcal.station.solve_again import stored_solve_settings
+from handcal_gui.control import review
 from handcal_gui.control.review import _Stored
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
@@ -87,8 +89,34 @@ def test_a_corrected_name_is_shown_and_exported(
     assert titles.count("Ada") == 2  # of the page, and in the session panel
     delete_session(path)
     library.changed.emit()
+    qtbot.waitUntil(lambda: program.review._wearer._job is None, timeout=PATIENCE_MS)
     assert exported() == "Ada"
     library.reject()
+
+
+def test_a_name_corrected_as_the_library_closes_is_read_outside_the_windows_thread(
+    program: Program, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = []
+
+    def replay_slowly(path: Path) -> Replayed:
+        threads.append(threading.current_thread())
+        return replay(path)
+
+    monkeypatch.setattr(review, "replay", replay_slowly)
+    path = copy_example(tmp_path / "sessions")
+    program.open_session(path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    library = program.windows.show_library(path.parent)
+    correct_wearer(path, "Ada")
+    library.reject()
+
+    def is_shown() -> bool:
+        assert program.review.record is not None
+        return program.review.record.wearer == "Ada"
+
+    qtbot.waitUntil(is_shown, timeout=PATIENCE_MS)
+    assert threading.main_thread() not in threads
 
 
 def test_the_example_is_opened_from_the_start_page(

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
+    QLabel,
     QListWidget,
     QProgressBar,
     QPushButton,
@@ -33,6 +34,7 @@ class Exporter:
 
     def __init__(self) -> None:
         self.may_end = threading.Event()
+        self.doing = "Report (PDF)"
         self.failure = ""
         self.missing: tuple[str, ...] = ()
         self.folders: list[Path] = []
@@ -41,7 +43,7 @@ class Exporter:
     def __call__(self, folder: Path, settings: ExportSettings, progress: Progress) -> Exported:
         self.folders.append(folder)
         self.settings.append(settings)
-        progress.at(0.25, "Report (PDF)")
+        progress.at(0.25, self.doing)
         while not self.may_end.wait(0.01):
             progress.check()
         if self.failure:
@@ -161,6 +163,21 @@ def test_sessions_that_were_not_exported_are_named_above_the_files(
     press(dialog, "export").click()
     qtbot.waitUntil(lambda: text(dialog, "doing") == "1 session not exported, see below.")
     assert files(dialog)[:2] == ["bea: it has no alignments", "a.csv"]
+
+
+def test_a_long_name_neither_widens_the_dialog_nor_is_markup(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
+) -> None:
+    least_px = dialog.minimumSizeHint().width()
+    exporter.doing = f"1 of 3: <b>{90 * 'W'}, Report"
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: text(dialog, "doing") == f"{exporter.doing}…")
+    doing = dialog.findChild(QLabel, "doing")
+    assert isinstance(doing, QLabel)
+    assert doing.textFormat() == Qt.TextFormat.PlainText
+    assert dialog.minimumSizeHint().width() == least_px
+    exporter.may_end.set()
+    qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.")
 
 
 def test_cancel_stops_the_export_and_keeps_the_dialog(

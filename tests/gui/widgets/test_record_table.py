@@ -43,10 +43,12 @@ def test_del_asks_for_the_chosen_thing_by_its_number(qtbot: QtBot, table: Record
 
 
 def test_the_next_row_is_chosen_after_a_deletion(table: RecordTable) -> None:
-    table.show_rows(rows_of(1, 2, 3))
+    table.show_rows(rows_of(1, 2, 3, 4))
     table.selectRow(1)
-    table.show_rows(rows_of(1, 3))
+    table.show_rows(rows_of(1, 3, 4))
     assert table.chosen_number() == 3
+    table.show_rows(rows_of(1, 4))
+    assert table.chosen_number() == 4
     table.show_rows(rows_of(1))
     assert table.chosen_number() == 1
     table.show_rows({})

@@ -227,7 +227,7 @@ def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
     qtbot.waitUntil(start.isEnabled)  # all findings are shown
     review = window.findChild(ReviewPage)
     assert isinstance(review, ReviewPage)
-    review.show_session(record, results, 8.0)
+    review.show_session(replace(record, wearer=100 * "W"), results, 8.0)
     for page in ("start", "review"):
         window.show_page(page)
         for area in window.findChildren(QScrollArea):

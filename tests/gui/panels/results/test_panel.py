@@ -151,6 +151,10 @@ def test_lines_that_end_together_share_one_text(solved: ResultsPanel, results: R
     plot.show_results(replace(results, alignments={1: eyes, 2: eyes, 5: eyes}))
     texts = {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
     assert texts == {"1, 2, 5"}
+    exact = replace(eyes["left"], history_m2=np.zeros(2))
+    plot.show_results(replace(results, alignments={1: {"left": exact}, 3: {"left": exact}}))
+    texts = {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
+    assert texts == {"1, 3"}
 
 
 def test_the_map_shows_each_point_of_the_chosen_hand_once(

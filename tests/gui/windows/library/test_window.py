@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QInputDialog, QLineEdit, QPushButton, QTableView
+from PySide6.QtWidgets import QComboBox, QInputDialog, QLabel, QLineEdit, QPushButton, QTableView
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
@@ -285,6 +285,20 @@ def test_a_name_is_corrected_and_brought_back(
     qtbot.waitUntil(child(window, QPushButton, "correctName").isEnabled, timeout=PATIENCE_MS)
     assert child(window, QPushButton, "restoreSession").isHidden()
     assert answer_name(qtbot, window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
+
+
+def test_a_name_is_no_markup(qtbot: QtBot, window: LibraryWindow) -> None:
+    choose(window, "Bea")
+    answer_name(qtbot, window, "<b>Bea")
+    qtbot.waitUntil(lambda: window.chosen[0].wearer == "<b>Bea", timeout=PATIENCE_MS)
+    index = table(window).selectionModel().selectedRows()[0]
+    assert "&lt;b&gt;Bea" in index.data(Qt.ItemDataRole.ToolTipRole)
+    window._former_names = {window.chosen[0].path: "<b>Bea"}
+    window._refresh()
+    assert "Name before: &lt;b&gt;Bea" in child(window, QPushButton, "restoreSession").toolTip()
+    [told] = [one for one in window.findChildren(QLabel) if one.text() == "Name before: <b>Bea"]
+    assert told.textFormat() == Qt.TextFormat.PlainText
+    assert "&lt;b&gt;Bea" in told.toolTip()
 
 
 def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
