@@ -31,6 +31,7 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.progress import Progress
+from handcal.session.library import EyeOutcome
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
@@ -353,7 +354,8 @@ def test_unfinished_and_recent_sessions_are_offered(
 def test_nothing_scrolls_at_1920x1080_with_200_percent(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
 ) -> None:
-    entries = tuple(Entry(tmp_path / name, name) for name in "abcd")
+    eyes = {"left": EyeOutcome("accept", 20, 5, None)}
+    entries = tuple(Entry(tmp_path / name, name, eyes=eyes) for name in "abcd")
     inspector.offers = KnownSessions(entries, entries)
     page = open_page()
     qtbot.waitUntil(find(page, QWidget, "resume").isVisible)
@@ -361,6 +363,8 @@ def test_nothing_scrolls_at_1920x1080_with_200_percent(
     areas = [one for one in page.findChildren(QScrollArea) if one.isVisible()]
     assert len(areas) == 2
     qtbot.waitUntil(lambda: all(one.verticalScrollBar().maximum() == 0 for one in areas))
+    for legend in page.findChildren(QLabel, "legend"):
+        assert legend.fontMetrics().horizontalAdvance(legend.text()) <= legend.width()
 
 
 def test_any_session_folder_can_be_opened(
