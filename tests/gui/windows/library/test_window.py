@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QInputDialog, QLineEdit, QPushButton, QTableView
+from PySide6.QtWidgets import QComboBox, QInputDialog, QLabel, QLineEdit, QPushButton, QTableView
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
@@ -323,4 +323,14 @@ def test_an_empty_folder(qtbot: QtBot, tmp_path_factory: pytest.TempPathFactory)
     qtbot.addWidget(window)
     window.show()
     qtbot.waitUntil(lambda: text(window, "count").startswith("0 sessions"), timeout=PATIENCE_MS)
+    assert text(window, "noSessions").startswith("No session is in this folder yet. Calibrate")
     window.stop()
+
+
+def test_a_search_that_finds_nothing_says_so(window: LibraryWindow) -> None:
+    reason = child(window, QLabel, "noSessions")
+    assert not reason.isVisible()
+    child(window, QLineEdit, "search").setText("nobody")
+    assert reason.isVisible()
+    assert reason.text().startswith("No session matches.")
+    assert reason.visibleRegion().boundingRect() == reason.rect()
