@@ -85,6 +85,7 @@ class ConnectDialog(QDialog):
         self._squares = {eye: _Square(eye) for eye in EYES}
         self._close = button("close", tr("Close"))
         self._lay_out()
+        self._close.setFocus()  # or Enter would replace the code that is being typed or scanned
         self._invite.clicked.connect(self.invite)
         self._close.clicked.connect(self.accept)
         self.finished.connect(self.stop)

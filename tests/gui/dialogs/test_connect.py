@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QCheckBox,
     QLabel,
@@ -89,6 +90,16 @@ def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog)
     assert not child(dialog, QCheckBox, "squareSeen-left").isEnabled()
     assert len(text(dialog, "digits").replace(" ", "")) == 8
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
+
+
+def test_enter_does_not_replace_the_code(qtbot: QtBot, dialog: ConnectDialog) -> None:
+    qtbot.waitUntil(dialog.isActiveWindow)
+    code = text(dialog, "digits")
+    focused = dialog.focusWidget()
+    assert focused is not None
+    qtbot.keyClick(focused, Qt.Key.Key_Return)
+    assert text(dialog, "digits") == code
+    assert not dialog.isVisible()
 
 
 def test_a_headset_pairs_by_the_code_once(
