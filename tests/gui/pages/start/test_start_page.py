@@ -35,9 +35,11 @@ from handcal.session.library import EyeOutcome
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
+from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.session_entries import Entry, KnownSessions
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
+from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.path_field import PathField
 
 KEY = "0123456789abcdef0123456789abcdef"
@@ -424,3 +426,9 @@ def test_a_realsense_is_looked_for_less_often_and_least_by_an_inactive_window(
     assert not inspector.progress.is_cancelled()
     page.stop()
     assert inspector.progress.is_cancelled()  # a process that hangs is not waited for
+
+
+def test_no_card_has_the_sign_of_what_is_done(open_page: Callable[..., StartPage]) -> None:
+    done = icon("check").pixmap(3 * SPACING_PX).toImage()
+    for card in open_page().findChildren(Card):
+        assert all(label.pixmap().toImage() != done for label in card.findChildren(QLabel))
