@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -175,9 +176,9 @@ def test_the_focus_is_seen(theme: Literal["light", "dark", "contrast"], qtbot: Q
     for focused in (field, other):
         qtbot.waitUntil(focused.hasFocus)
         picture = window.grab().toImage()
-        for widget, seen in edges.items():
-            seen.append(picture.pixelColor(widget.x() + 50, widget.y()))
-        qtbot.keyClick(focused, Qt.Key.Key_Tab)
+        for one, seen in edges.items():
+            seen.append(picture.pixelColor(one.x() + 50, one.y()))
+        QTest.keyClick(focused, Qt.Key.Key_Tab)
     ground = window.palette().window().color()
     for with_focus, without in (edges[field], edges[other][::-1]):
         assert contrast(with_focus, ground) >= 3.0

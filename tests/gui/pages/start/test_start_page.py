@@ -35,6 +35,7 @@ from handcal.session.library import EyeOutcome
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
+from handcal.types import Eye
 from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.session_entries import Entry, KnownSessions
 from handcal_gui.pages.start.start_page import StartPage
@@ -356,7 +357,7 @@ def test_unfinished_and_recent_sessions_are_offered(
 def test_nothing_scrolls_at_1920x1080_with_200_percent(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
 ) -> None:
-    eyes = {"left": EyeOutcome("accept", 20, 5, None)}
+    eyes: dict[Eye, EyeOutcome] = {"left": EyeOutcome("accept", 20, 5, None)}
     entries = tuple(Entry(tmp_path / name, name, eyes=eyes) for name in "abcd")
     inspector.offers = KnownSessions(entries, entries)
     page = open_page()
