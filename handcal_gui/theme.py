@@ -195,7 +195,7 @@ def use_theme(theme: Literal["system", "light", "dark", "contrast"]) -> None:
         main.setColor(group, QPalette.ColorRole.ButtonText, QColor("#ffffff"))
     for special, kinds in (
         (fields, _BOXES),
-        (items, _ITEMS),
+        (items, (*_ITEMS, "QToolButton") if theme == "contrast" else _ITEMS),
         (buttons, ("QPushButton",)),
         (main, ("MainButton",)),
     ):

@@ -185,6 +185,13 @@ def test_the_focus_is_seen(theme: Literal["light", "dark", "contrast"], qtbot: Q
         if theme == "contrast":
             assert contrast(without, ground) >= 7.0
         assert with_focus != without
+    if theme == "contrast":
+        tool = tool_button()
+        tool.setParent(window)
+        tool.setGeometry(10, 90, 100, 24)
+        tool.show()
+        edge = tool.grab().toImage().pixelColor(50, 0)
+        assert contrast(edge, ground) >= 7.0
     selected = field.palette()
     assert contrast(selected.highlight().color(), selected.highlightedText().color()) >= 4.5
 
