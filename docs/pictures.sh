@@ -36,6 +36,7 @@ looks)
         take "artefacts/looks/1920x1080-200-percent-$theme" 1920 1080 "$theme" 2
         take "artefacts/looks/3840x2160-$theme" 3840 2160 "$theme" 1
     done
+    take artefacts/looks/1366x768-contrast 1366 768 contrast 1
     ;;
 *)
     echo "pictures.sh: there is nothing but guide and looks" >&2

@@ -89,7 +89,7 @@ _CONTRAST = Colors(
 
 @dataclass(frozen=True, slots=True)
 class _Shades:
-    """The colours of a palette; Fusion draws the edge of a box a little darker than `box_edge`."""
+    """The colours of a palette; Fusion draws edges a little darker than `box_edge` and `focus`."""
 
     window: str
     base: str
@@ -101,6 +101,9 @@ class _Shades:
     accent: str
     link: str
     box_edge: str
+    focus: str
+    """Edge of what has the focus, and background of text selected in it."""
+    on_focus: str
 
 
 _LIGHT_SHADES = _Shades(
@@ -114,6 +117,8 @@ _LIGHT_SHADES = _Shades(
     accent=_LIGHT.live,
     link=_LIGHT.live,
     box_edge="#b6bcc5",
+    focus="#1657b8",
+    on_focus="#ffffff",
 )
 _DARK_SHADES = _Shades(
     window="#26282c",
@@ -126,6 +131,8 @@ _DARK_SHADES = _Shades(
     accent="#2f6fb5",
     link=_DARK.live,
     box_edge="#99a1ab",
+    focus="#2f8aff",
+    on_focus="#101418",
 )
 _CONTRAST_SHADES = _Shades(
     window="#000000",
@@ -138,6 +145,8 @@ _CONTRAST_SHADES = _Shades(
     accent="#0060c0",
     link=_CONTRAST.live,
     box_edge="#ffffff",
+    focus="#ffe000",
+    on_focus="#000000",
 )
 _MAIN_BUTTON = "#0b3f8f"
 """Fusion lightens it; white text still has enough contrast."""
@@ -154,6 +163,8 @@ _BOXES = (
     "VerdictCard",
 )
 """Widgets whose edges must be visible in the dark theme, too."""
+_ITEMS = "QListWidget", "QTableView"
+"""Of these, those whose selection looks the same with the focus and without it."""
 
 
 def use_theme(theme: Literal["system", "light", "dark", "contrast"]) -> None:
@@ -173,12 +184,21 @@ def use_theme(theme: Literal["system", "light", "dark", "contrast"]) -> None:
         shades = _CONTRAST_SHADES
     palette = _palette(shades)
     QApplication.setPalette(palette)
-    boxes, main = QPalette(palette), QPalette(palette)
-    boxes.setColor(QPalette.ColorRole.Window, QColor(shades.box_edge))
+    items, fields = QPalette(palette), QPalette(palette)
+    fields.setColor(QPalette.ColorRole.Highlight, QColor(shades.focus))
+    fields.setColor(QPalette.ColorRole.HighlightedText, QColor(shades.on_focus))
+    buttons, main = QPalette(fields), QPalette(fields)
+    for edged in (items, fields, *([buttons] if theme == "contrast" else [])):
+        edged.setColor(QPalette.ColorRole.Window, QColor(shades.box_edge))
     for group in (QPalette.ColorGroup.Active, QPalette.ColorGroup.Inactive):
         main.setColor(group, QPalette.ColorRole.Button, QColor(_MAIN_BUTTON))
         main.setColor(group, QPalette.ColorRole.ButtonText, QColor("#ffffff"))
-    for special, kinds in ((boxes, _BOXES), (main, ("MainButton",))):
+    for special, kinds in (
+        (fields, _BOXES),
+        (items, (*_ITEMS, "QToolButton") if theme == "contrast" else _ITEMS),
+        (buttons, ("QPushButton",)),
+        (main, ("MainButton",)),
+    ):
         for kind in kinds:  # as text; PySide's stub is wrong
             QApplication.setPalette(special, kind)  # type: ignore[arg-type]
     _THEME.changed.emit()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication, QWidget
 
 from handcal.errors import FileError
 from handcal.io.files import make_folder
@@ -44,6 +45,8 @@ class Screenshots:
 
     def save(self, name: str, widget: QWidget | None = None) -> None:
         """Save a widget, by default the window; raise FileError if it cannot be written."""
+        # A view that is just changing would be pictured with the layout of the former one.
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
         path = self._folder / f"{name}.png"
         if not (widget or self._window).grab().save(str(path)):
             raise FileError(f"cannot write {path}")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QRegularExpression, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QTabWidget, QWidget
+from PySide6.QtWidgets import QApplication, QListWidget, QTabWidget, QWidget
 
 from handcal.errors import FileError
 from handcal_gui.autopilot.screenshots import Screenshots
 from handcal_gui.dialogs.export import ExportDialog
+from handcal_gui.dialogs.keys import KeysDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.panels.camera.panel import Mode
 from handcal_gui.program import Program
@@ -20,6 +21,8 @@ _LOOK_MS = 600
 _TURN_MS = 50
 _PATIENCE_MS = 20_000
 _STEPS = 6
+_RAIL = QRegularExpression("Rail$")
+"""Name of a list that chooses a window's page."""
 
 Walk = Iterator[int]
 """Actions in pieces; each yields the milliseconds to wait before the next."""
@@ -106,20 +109,23 @@ class Tour(QObject):
         yield _LOOK_MS
         self._save("review")
         preferences = PreferencesDialog(program.preferences, program.window)
-        preferences.show()
-        yield _LOOK_MS
-        self._save("preferences", preferences)
-        preferences.close()
+        for name, one in {"preferences": preferences, "keys": KeysDialog(program.window)}.items():
+            one.show()
+            yield _LOOK_MS
+            self._save(name, one)
+            one.close()
         yield from self._dialogs()
         program.show_start()
         yield 2 * _LOOK_MS
         self._save("start-next-wearer")
 
     def _dialogs(self) -> Walk:
-        """Save the dialogs and windows that the menus open."""
+        """Save the dialogs and windows that the menus open, with each of their pages."""
         program = self._program
+        assert program.windows.record is not None
+        sessions = program.windows.record.path.absolute().parent
         opened: dict[str, Callable[[], QWidget | None]] = {
-            "sessions": program.windows.show_library,
+            "sessions": lambda: program.windows.show_library(sessions),
             "connect": program.windows.connect_headset,
             "rig": program.windows.calibrate_rig,
             "evaluate": program.windows.evaluate,
@@ -128,9 +134,15 @@ class Tour(QObject):
         for name, open_dialog in opened.items():
             dialog = open_dialog()
             yield _LOOK_MS
-            if dialog is not None:  # without a network, no headset can be connected
-                self._save(name, dialog)
-                dialog.close()
+            if dialog is None:  # without a network, no headset can be connected
+                continue
+            self._save(name, dialog)
+            for rail in dialog.findChildren(QListWidget, _RAIL):
+                for row in range(1, rail.count()):
+                    rail.setCurrentRow(row)
+                    yield _LOOK_MS
+                    self._save(f"{name}-{row + 1}", dialog)
+            dialog.close()
         program.manual.open("docs/guide.md")
         program.manual.search.setText("target")
         yield _LOOK_MS

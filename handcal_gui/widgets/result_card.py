@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.register.results import Results
@@ -170,9 +170,12 @@ class _Column(QWidget):
         self.refresh()
 
     def refresh(self) -> None:
-        shade = getattr(colors(), VERDICT_COLORS[self._result.verdict]) if self._result else ""
-        self._verdict.setStyleSheet(f"color: {shade}" if shade else "")
-        self.details.setStyleSheet(f"color: {colors().muted}")
+        """Take the colours of the theme; style sheets would keep the size of the text."""
+        shade = VERDICT_COLORS[self._result.verdict] if self._result else "muted"
+        for label, role in ((self._verdict, shade), (self.details, "muted")):
+            palette = QPalette()
+            palette.setColor(QPalette.ColorRole.WindowText, QColor(getattr(colors(), role)))
+            label.setPalette(palette)
         self._bars.update()
 
 

@@ -2603,7 +2603,15 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Refused: {}. {}</source>
+        <source>confirmation</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>confirmations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} refused. {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2627,7 +2635,7 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Saved ✓</source>
+        <source>✓ Saved</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4125,6 +4133,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Review the selected session (Return)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No session matches. Search for something else, or choose All sessions.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No session is in this folder yet. Calibrate a wearer, or choose another session folder on the start page.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

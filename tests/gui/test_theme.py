@@ -9,8 +9,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.types import Float64
@@ -157,6 +159,41 @@ def test_every_colour_with_a_meaning_is_readable_as_text(
             shade = QColor(getattr(colors(), field.name))
             assert contrast(shade, ground) >= least, field.name
     assert contrast(QGuiApplication.palette().windowText().color(), ground) >= 7.0
+
+
+@pytest.mark.usefixtures("themes")
+@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
+def test_the_focus_is_seen(theme: Literal["light", "dark", "contrast"], qtbot: QtBot) -> None:
+    use_theme(theme)
+    window = QWidget()
+    field, other = QLineEdit("field", window), QPushButton("button", window)
+    for widget, top in ((field, 10), (other, 50)):
+        widget.setGeometry(10, top, 100, 24)
+    qtbot.addWidget(window)
+    window.show()
+    field.setFocus()
+    edges: dict[QWidget, list[QColor]] = {field: [], other: []}
+    for focused in (field, other):
+        qtbot.waitUntil(focused.hasFocus)
+        picture = window.grab().toImage()
+        for one, seen in edges.items():
+            seen.append(picture.pixelColor(one.x() + 50, one.y()))
+        QTest.keyClick(focused, Qt.Key.Key_Tab)
+    ground = window.palette().window().color()
+    for with_focus, without in (edges[field], edges[other][::-1]):
+        assert contrast(with_focus, ground) >= 3.0
+        if theme == "contrast":
+            assert contrast(without, ground) >= 7.0
+        assert with_focus != without
+    if theme == "contrast":
+        tool = tool_button()
+        tool.setParent(window)
+        tool.setGeometry(10, 90, 100, 24)
+        tool.show()
+        edge = tool.grab().toImage().pixelColor(50, 0)
+        assert contrast(edge, ground) >= 7.0
+    selected = field.palette()
+    assert contrast(selected.highlight().color(), selected.highlightedText().color()) >= 4.5
 
 
 @pytest.mark.usefixtures("themes")

@@ -66,7 +66,7 @@ class SessionList(QWidget):
         self._button.clicked.connect(self._choose)
         self._empty = paragraph("empty", empty)
         self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
-        layout = vbox(
+        self._layout = vbox(
             (self._empty, 1), (self._list, 1), on=self, margins=0, spacing=SPACING_PX // 2
         )
         self._legend = with_name(ElidedLabel(), "legend")
@@ -76,7 +76,7 @@ class SessionList(QWidget):
         self._buttons.addWidget(self._legend, 1)
         self._buttons.addStretch()
         self._buttons.addWidget(self._button)
-        layout.addLayout(self._buttons)
+        self._layout.addLayout(self._buttons)
         self._entries: Sequence[Entry] = ()
         follow_theme(self, lambda: self.show_entries(self._entries))
 
@@ -106,8 +106,9 @@ class SessionList(QWidget):
         self._refresh()
 
     def add_button(self, added: QPushButton) -> None:
-        """Add a button before the list's own."""
-        self._buttons.insertWidget(2, added)
+        """Add a button before the list's own; the legend then has a line of its own."""
+        self._layout.insertWidget(2, self._legend)
+        self._buttons.insertWidget(1, added)
 
     def _choose(self) -> None:
         item = self._list.currentItem()

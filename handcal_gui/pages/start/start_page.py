@@ -104,7 +104,7 @@ class StartPage(QWidget):
         self._open.body.addWidget(self._opened, 1)
         self._open.add_to_head(library)
         self._evaluate = Card(
-            tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "check"
+            tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "results"
         )
         evaluate = button(
             "evaluate", tr("Evaluate…"), help_text=tr("Measure the accuracy of calibrations")

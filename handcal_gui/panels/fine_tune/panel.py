@@ -368,7 +368,9 @@ class _ControlsArea(QScrollArea):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Leave the keys to the tooltip where they would have to be scrolled to."""
-        keys_px = self._keys.heightForWidth(self.width() - 2 * SPACING_PX)
+        # Beside a scroll bar, too: Qt keeps one that the text needs only because of the bar.
+        bar_px = self.verticalScrollBar().sizeHint().width()
+        keys_px = self._keys.heightForWidth(self.width() - bar_px - 2 * SPACING_PX)
         least_px = self._controls.totalMinimumSize().height() + keys_px + SPACING_PX
         self._keys.setVisible(least_px <= self.height())
         super().resizeEvent(event)

@@ -18,6 +18,7 @@ from handcal_gui.panels.rotation.turning_hand import TurningHand
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.sentence import sentence
 
@@ -136,7 +137,8 @@ class RotationPanel(QWidget):
             self._refusals.setText(tr("No confirmation refused."))
         else:
             # The journal may follow the refusal by a frame.
-            self._refusals.setText(tr("Refused: {}. {}").format(max(count, 1), last))
+            refused = pluralize(max(count, 1), tr("confirmation"), tr("confirmations"))
+            self._refusals.setText(tr("{} refused. {}").format(refused, last).strip())
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)

@@ -83,5 +83,7 @@ class NotesEditor(QWidget):
         elif self._too_many() > 0:
             text = tr("⚠ Too long by {:,} characters: not saved").format(self._too_many())
         else:
-            text = tr("Saved ✓") if self._edit.toPlainText() == self._saved else tr("Not saved yet")
+            written = self._edit.toPlainText()
+            saved = tr("✓ Saved") if written else ""  # nothing is written yet
+            text = saved if written == self._saved else tr("Not saved yet")
         self._state.setText(text)

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QWidget
 from handcal.station.snapshot import Snapshot
 from handcal.station.wearer_view import EyeView, Overlay
 from handcal.types import EYES, Eye
-from handcal_gui.panels.wearer_view.eye_canvas import LINES, EyeCanvas
+from handcal_gui.panels.wearer_view.eye_canvas import LINES, EyeCanvas, show_alike
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -71,6 +71,7 @@ class WearerViewPanel(QWidget):
             message = _CLOSED if is_closed else missing
             is_solved = procedure.results is not None and eye in procedure.results.eyes
             column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
+        show_alike([column.canvas for column in self._eyes.values()])
 
     def _lay_out(self, whole: QCheckBox, before: QCheckBox) -> None:
         options, eyes, legend = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()

@@ -31,7 +31,6 @@ class ResultsView(QWidget):
         self._pages: list[QWidget] = []
         self._empty = with_name(QLabel(tr("Figures and numbers will be shown here.")), "noResults")
         self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._empty.setEnabled(False)
         self._lead = paragraph("lead")
         self._lead.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._tabs = with_name(QTabWidget(), "figures", tr("Results"))

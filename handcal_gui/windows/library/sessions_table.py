@@ -13,7 +13,8 @@ from handcal.session.library import LibraryEntry
 from handcal_gui.theme import SPACING_PX, flat_header, number_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.error_bars import PICTURE_PX
-from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.fields import paragraph, with_name
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.windows.library.sessions_model import COLUMNS, SessionsFilter, SessionsModel
 
 _MOST_SHOWN_PX = 300
@@ -55,6 +56,9 @@ class SessionsTable(QTableView):
         across.setHighlightSections(False)
         across.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         across.setStretchLastSection(True)
+        self._reason = paragraph("noSessions")
+        self._reason.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        vbox((self._reason, 1), on=self.viewport(), margins=2 * SPACING_PX)
 
     @property
     def chosen(self) -> list[LibraryEntry]:
@@ -71,6 +75,11 @@ class SessionsTable(QTableView):
                 wanted.select(place, place)
         flags = QItemSelectionModel.SelectionFlag
         self.selectionModel().select(wanted, flags.Select | flags.Rows)
+
+    def show_reason(self, reason: str) -> None:
+        """Show the reason why the table is empty; an empty one if it is not."""
+        self._reason.setText(reason)
+        self._reason.setVisible(bool(reason))
 
     def fit_columns(self) -> None:
         """Show every column's contents; long names are cut as far as the room demands."""

@@ -180,6 +180,7 @@ class LibraryWindow(QDialog):
         )
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
         shown_count = tr("{} in {}{}").format(count, self._folder, selected)
+        self._table.show_reason(_reason_for_none(shown, total) if self._is_read else "")
         self._count.setText(
             shown_count if self._is_read else tr("Reading {}…").format(self._folder)
         )
@@ -375,6 +376,18 @@ class LibraryWindow(QDialog):
             spacing=SPACING_PX,
         )
         self.resize(130 * SPACING_PX, 84 * SPACING_PX)
+
+
+def _reason_for_none(shown: int, total: int) -> str:
+    """Return the reason why no session is shown, and what to do; empty if one is."""
+    if shown:
+        return ""
+    if total:
+        return tr("No session matches. Search for something else, or choose All sessions.")
+    return tr(
+        "No session is in this folder yet. Calibrate a wearer, or choose another session folder "
+        "on the start page."
+    )
 
 
 def _button(name: str, text: str) -> QPushButton:

@@ -56,3 +56,13 @@ def test_a_bar_within_the_target_is_painted_otherwise(qtbot: QtBot, results: Res
         card.show_results(results, target_arcmin)
         pictures.append(card.grab().toImage())
     assert pictures[0] != pictures[1]
+
+
+def test_all_texts_grow_with_the_card(qtbot: QtBot, results: Results) -> None:
+    card = show(qtbot, ResultCard(), 600, 240)
+    card.show_results(results, 8.0)
+    font = card.font()
+    font.setPointSizeF(2.0 * font.pointSizeF())
+    card.setFont(font)
+    sizes = {label.font().pointSizeF() for label in card.findChildren(QLabel)}
+    assert sizes == {font.pointSizeF()}

@@ -31,12 +31,16 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.progress import Progress
+from handcal.session.library import EyeOutcome
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
+from handcal.types import Eye
+from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.session_entries import Entry, KnownSessions
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
+from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.widgets.path_field import PathField
 
 KEY = "0123456789abcdef0123456789abcdef"
@@ -353,7 +357,8 @@ def test_unfinished_and_recent_sessions_are_offered(
 def test_nothing_scrolls_at_1920x1080_with_200_percent(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], tmp_path: Path
 ) -> None:
-    entries = tuple(Entry(tmp_path / name, name) for name in "abcd")
+    eyes: dict[Eye, EyeOutcome] = {"left": EyeOutcome("accept", 20, 5, None)}
+    entries = tuple(Entry(tmp_path / name, name, eyes=eyes) for name in "abcd")
     inspector.offers = KnownSessions(entries, entries)
     page = open_page()
     qtbot.waitUntil(find(page, QWidget, "resume").isVisible)
@@ -361,6 +366,8 @@ def test_nothing_scrolls_at_1920x1080_with_200_percent(
     areas = [one for one in page.findChildren(QScrollArea) if one.isVisible()]
     assert len(areas) == 2
     qtbot.waitUntil(lambda: all(one.verticalScrollBar().maximum() == 0 for one in areas))
+    for legend in page.findChildren(QLabel, "legend"):
+        assert legend.fontMetrics().horizontalAdvance(legend.text()) <= legend.width()
 
 
 def test_any_session_folder_can_be_opened(
@@ -420,3 +427,9 @@ def test_a_realsense_is_looked_for_less_often_and_least_by_an_inactive_window(
     assert not inspector.progress.is_cancelled()
     page.stop()
     assert inspector.progress.is_cancelled()  # a process that hangs is not waited for
+
+
+def test_no_card_has_the_sign_of_what_is_done(open_page: Callable[..., StartPage]) -> None:
+    done = icon("check").pixmap(3 * SPACING_PX).toImage()
+    for card in open_page().findChildren(Card):
+        assert all(label.pixmap().toImage() != done for label in card.findChildren(QLabel))

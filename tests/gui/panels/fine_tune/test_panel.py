@@ -266,3 +266,12 @@ def test_the_keys_are_told_where_there_is_room_for_them(panel: FineTunePanel, sh
     assert body is not None
     assert body.toolTip() == keys.text()
     assert area.verticalScrollBar().maximum() == 0
+
+
+def test_a_panel_that_grows_loses_its_scroll_bar(panel: FineTunePanel, show: Show) -> None:
+    show()
+    [area] = panel.findChildren(QScrollArea)
+    for height_px in (200, 302):  # of the dock at 1366x768
+        panel.resize(409, height_px)
+        QApplication.processEvents()
+    assert area.verticalScrollBar().maximum() == 0

@@ -144,9 +144,9 @@ def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapsh
     counted = replace(record, events=(*record.events, *refused))
     turned = {"refusal": "Your hand is turned."}
     panel.show_snapshot(snapshot(procedure=turned, record=counted))
-    assert text(panel, "refusals") == "Refused: 2. Your hand is turned."
+    assert text(panel, "refusals") == "2 confirmations refused. Your hand is turned."
     panel.show_snapshot(snapshot(procedure={"refusal": "The headset draws something else."}))
-    assert text(panel, "refusals") == "Refused: 1. The headset draws something else."
+    assert text(panel, "refusals") == "1 confirmation refused. The headset draws something else."
 
 
 def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:

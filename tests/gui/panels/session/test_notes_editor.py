@@ -40,6 +40,7 @@ def test_saves_once_after_the_last_key(
     qtbot: QtBot, notes: NotesEditor, edit: QPlainTextEdit
 ) -> None:
     notes.show_saved(ONE, "")
+    assert state(notes) == ""  # there is nothing to save
     asked: list[str] = []
     notes.changed.connect(asked.append)
     QTest.keyClicks(edit, "with glasses")
@@ -48,7 +49,7 @@ def test_saves_once_after_the_last_key(
     qtbot.waitUntil(lambda: bool(asked), timeout=5 * SAVE_MS)
     assert asked == ["with glasses"]
     notes.show_saved(ONE, "with glasses")
-    assert state(notes) == "Saved ✓"
+    assert state(notes) == "✓ Saved"
 
 
 def test_what_is_being_written_is_not_replaced(notes: NotesEditor, edit: QPlainTextEdit) -> None:
@@ -58,7 +59,7 @@ def test_what_is_being_written_is_not_replaced(notes: NotesEditor, edit: QPlainT
     assert edit.toPlainText() == "ba"
     notes.show_saved(OTHER, "c")
     assert edit.toPlainText() == "c"
-    assert state(notes) == "Saved ✓"
+    assert state(notes) == "✓ Saved"
 
 
 def test_flush_saves_at_once_what_was_written(

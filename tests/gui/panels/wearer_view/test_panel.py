@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from PySide6.QtWidgets import QCheckBox, QLabel
 from pytestqt.qtbot import QtBot
@@ -157,3 +158,14 @@ def test_numbers_of_three_digits_have_room(panel: WearerViewPanel, snapshot: Mak
     panel.show_snapshot(snapshot(views=views))
     assert _texts(panel, "left")[1:3] == ["123.4 px", "172.5′"]
     assert panel.minimumSizeHint().width() == width
+
+
+def test_both_eyes_are_shown_in_one_scale(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
+    now = snapshot()
+    right = now.views["right"]
+    left_part = right.hand_px[right.hand_px[:, 0] < np.median(right.hand_px[:, 0])]
+    drawn = replace(right.drawn, outline_px=left_part)
+    cut = replace(right, hand_px=left_part, drawn=drawn)  # by the edge of its display
+    panel.show_snapshot(replace(now, views={**now.views, "right": cut}))
+    left_px, right_px = (_canvas(panel, eye).crop_px.size() for eye in EYES)
+    assert left_px == right_px

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QTabWidget
+from PySide6.QtWidgets import QLabel, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.report.document import Column, Report, Section, Table
@@ -32,3 +32,8 @@ def test_a_tab_says_what_its_numbers_are_of(
     view.show_outcome(Outcome(Path(), Report("", "", "", [Section("", tables)]), []))
     tabs = child(view, QTabWidget)
     assert [tabs.tabText(place) for place in range(tabs.count())] == titles
+
+
+def test_the_text_of_an_empty_view_is_no_greyed_control(qtbot: QtBot) -> None:
+    view = show(qtbot, ResultsView(), 500, 400)
+    assert child(view, QLabel, "noResults").isEnabled()

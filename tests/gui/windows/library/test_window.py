@@ -337,4 +337,14 @@ def test_an_empty_folder(qtbot: QtBot, tmp_path_factory: pytest.TempPathFactory)
     qtbot.addWidget(window)
     window.show()
     qtbot.waitUntil(lambda: text(window, "count").startswith("0 sessions"), timeout=PATIENCE_MS)
+    assert text(window, "noSessions").startswith("No session is in this folder yet. Calibrate")
     window.stop()
+
+
+def test_a_search_that_finds_nothing_says_so(window: LibraryWindow) -> None:
+    reason = child(window, QLabel, "noSessions")
+    assert not reason.isVisible()
+    child(window, QLineEdit, "search").setText("nobody")
+    assert reason.isVisible()
+    assert reason.text().startswith("No session matches.")
+    assert reason.visibleRegion().boundingRect() == reason.rect()
