@@ -80,3 +80,8 @@ def say(program: Program, snapshot: Snapshot, view: WizardView) -> None:
 def press(window: MainWindow, key: Qt.Key, modifiers: Qt.KeyboardModifier = _NONE) -> None:
     """Press a key as the window system does."""
     QTest.keyClick(window.windowHandle(), key, modifiers)
+
+
+def shown(window: MainWindow) -> set[str]:
+    """Return the names of the docks that are shown."""
+    return {name for name, dock in window.docks.items() if not dock.isHidden()}

@@ -1,0 +1,167 @@
+"""The window on small screens and with larger texts: nothing scrolls, nothing leaves the screen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Literal
+
+import pytest
+from PySide6.QtCore import QObject, QPoint, QRect
+from PySide6.QtWidgets import QApplication, QPushButton, QScrollArea
+from pytestqt.qtbot import QtBot
+
+from handcal.register.results import Results
+from handcal.session.session import SessionRecord
+from handcal.station.states import State
+from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.pages.wizard.view import Action
+from handcal_gui.program import Program
+from handcal_gui.widgets.result_card import ResultCard
+from handcal_gui.window import MainWindow
+from tests.gui.views import NUDGED, all_views
+from tests.gui.window.conftest import Maker, main_button, say, shown
+
+
+def scrolled_px(area: QObject | None) -> list[int]:
+    """Return how far an area must be scrolled to see all of it."""
+    for _ in range(3):  # a layout may ask for another
+        QApplication.processEvents()
+    assert isinstance(area, QScrollArea)
+    return [bar.maximum() for bar in (area.horizontalScrollBar(), area.verticalScrollBar())]
+
+
+SMALL_PX = [(960, 510), (1280, 690), (1366, 738)]
+EACH_TEXT = pytest.mark.parametrize("text_scale", [1.0, 1.25], indirect=True)
+
+
+@EACH_TEXT
+@pytest.mark.parametrize("arrangement", ["panels", "station"])
+@pytest.mark.parametrize("size_px", SMALL_PX)
+def test_no_step_needs_scrolling(
+    program: Program,
+    snapshot: Maker,
+    size_px: tuple[int, int],
+    arrangement: Literal["panels", "station"],
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.show_page("start")
+    window.resize(*size_px)
+    window.use_arrangement(arrangement)
+    window.show_page("live")
+    window.reset_layout()
+    viewport = guide.parent()
+    assert viewport is not None
+    area = viewport.parent()
+    states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED)
+    for state in states:
+        seen = snapshot(state)
+        guide.show_snapshot(seen)
+        guide.picture.show_snapshot(seen)
+        assert scrolled_px(area) == [0, 0], state
+        assert window.size().toTuple() == size_px
+    card = guide.findChild(ResultCard)
+    assert isinstance(card, ResultCard)
+    assert card.visibleRegion().boundingRect() == card.rect()
+    assert main_button(window).visibleRegion().boundingRect() == main_button(window).rect()
+
+
+def test_a_window_without_panels_may_be_lower_than_one_with_them(window: MainWindow) -> None:
+    window.show_page("live")
+    window.resize(1920, 1050)
+    window.use_arrangement("station")
+    window.resize(960, 510)
+    assert window.size().toTuple() == (960, 510)
+
+
+@pytest.mark.parametrize("text_scale", [1.25], indirect=True)
+@pytest.mark.parametrize("arrangement", ["panels", "station"])
+def test_with_larger_texts_no_view_of_a_small_window_needs_scrolling(
+    program: Program,
+    snapshot: Maker,
+    record: SessionRecord,
+    arrangement: Literal["panels", "station"],
+) -> None:
+    window, picture = program.window, program.wizard_panel.picture
+    window.resize(*SMALL_PX[0])
+    window.use_arrangement(arrangement)
+    window.show_page("live")
+    viewport = program.wizard_panel.parent()
+    assert viewport is not None
+    nudging = snapshot(State.VERIFY, procedure={"verifying": NUDGED})
+    for view in all_views(snapshot, record):
+        seen = nudging if view.main.action is Action.VERIFIED else snapshot(State.APPLIED)
+        say(program, seen, view)
+        picture.show_snapshot(seen)
+        assert scrolled_px(viewport.parent()) == [0, 0], view.sentence
+
+
+@EACH_TEXT
+@pytest.mark.parametrize("size_px", SMALL_PX)
+def test_no_panel_needs_scrolling(
+    program: Program, snapshot: Maker, size_px: tuple[int, int]
+) -> None:
+    window, seen = program.window, snapshot(State.APPLIED)
+    window.resize(*size_px)
+    window.show_page("live")
+    window.panels.link.show_pairing("192.168.178.105:50123", "a pairing key", is_virtual=True)
+    window.panels.fine_tune.set_rig(seen.record.rig)
+    for panel in window.panels.all():
+        panel.show_snapshot(seen)
+    for name, dock in window.docks.items():
+        dock.raise_()
+        for area in dock.findChildren(QScrollArea):
+            assert scrolled_px(area) == [0, 0], name
+
+
+@EACH_TEXT
+def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
+    qtbot: QtBot, program: Program, record: SessionRecord, results: Results
+) -> None:
+    window = program.window
+    window.resize(*SMALL_PX[0])
+    start = window.findChild(QPushButton, "start")
+    assert isinstance(start, QPushButton)
+    qtbot.waitUntil(start.isEnabled)  # all findings are shown
+    review = window.findChild(ReviewPage)
+    assert isinstance(review, ReviewPage)
+    review.show_session(replace(record, wearer=100 * "W"), results, 8.0)
+    for page in ("start", "review"):
+        window.show_page(page)
+        for area in window.findChildren(QScrollArea):
+            if area.isVisible():
+                assert scrolled_px(area) == [0, 0], page
+
+
+@pytest.mark.parametrize("text_scale", [1.25, 1.5], indirect=True)
+def test_larger_texts_need_no_larger_window(window: MainWindow) -> None:
+    window.resize(1280, 690)
+    window.show_page("live")
+    QApplication.processEvents()
+    assert window.size().toTuple() == (1280, 690)
+    assert len(window.tabifiedDockWidgets(window.docks["camera"])) == len(window.docks) - 1
+
+
+@pytest.mark.parametrize("screen_px", [(960, 540), (640, 480)])
+def test_a_layout_of_a_large_screen_does_not_enlarge_the_window_beyond_a_small_one(
+    qtbot: QtBot, program: Program, monkeypatch: pytest.MonkeyPatch, screen_px: tuple[int, int]
+) -> None:
+    window = program.window
+    window.resize(1920, 1050)
+    window.show_page("live")
+    window.show_page("start")
+    screen = QRect(0, 0, *screen_px)
+    small = SimpleNamespace(availableSize=screen.size, availableGeometry=lambda: screen)
+    monkeypatch.setattr(window, "screen", lambda: small)
+    window.resize(screen.width(), screen.height() - 30)
+    window.show_page("live")
+    assert screen.size().boundedTo(window.size()) == window.size()
+    assert shown(window) == set(window.docks), "in the layout of a small window"
+
+
+def test_a_window_that_grows_stays_on_its_screen(qtbot: QtBot, window: MainWindow) -> None:
+    screen = window.screen().availableGeometry()
+    window.resize(500, 250)
+    window.move(screen.bottomRight() - QPoint(500, 250))
+    window.show_page("live")
+    qtbot.waitUntil(lambda: screen.contains(window.frameGeometry()))
