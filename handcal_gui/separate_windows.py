@@ -97,7 +97,7 @@ class SeparateWindows(QObject):
             self.open_requested.emit(Path(folder))
 
     def export(self, folder: Path | None = None) -> ExportDialog | None:
-        """Open the export dialog for the session shown; return None if it has no alignment.
+        """Open the export dialog for the session shown; return None if it has no result.
 
         Parameters
         ----------
@@ -105,8 +105,8 @@ class SeparateWindows(QObject):
             Proposed folder; by default that of the last export, or one beside the session folder.
         """
         record = self.record
-        if record is None or not record.alignments:
-            self._window.banner.show_message(tr("There is no alignment to export yet."))
+        if record is None or not record.is_solvable:
+            self._window.banner.show_message(tr("There is no result to export yet."))
             return None
 
         def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:

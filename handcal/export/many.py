@@ -65,7 +65,7 @@ def _export(
     name = f"{done + 1} of {count}: {path.name}"
     progress.at(done / count, name)
     record = Session.open(path)
-    if not record.alignments:
+    if not record.is_solvable:
         raise FileError("it has no alignments")
     name = f"{done + 1} of {count}: {record.wearer or path.name}"
     named = replace(progress, report=lambda what, share: progress.report(f"{name}, {what}", share))

@@ -29,7 +29,7 @@ from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.session.comparison import read_comparisons
-from handcal.types import EYES, Alignment, Eye, EyeShift, VerdictName
+from handcal.types import EYES, Alignment, Eye, EyeShift, Verdict, VerdictName
 
 _ORIGINS: Mapping[ShiftOrigin, str] = {
     "fine_tuned": "fine-tuned by hand",
@@ -61,6 +61,7 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     yield _shifts(outcome)
     if results is not None:
         yield _solution(outcome, results)
+    if results is not None and results.alignments:
         yield _alignments(outcome, results)
         yield _shift_plots(outcome, results)
         yield _convergence(results)
@@ -169,7 +170,7 @@ def _solution(outcome: SessionOutcome, results: Results) -> Section:
                 f"{1e3 * shift.rms_m:.2f}",
                 f"{100 * shift.inlier_ratio:.0f}",
                 str(shift.iterations),
-                f"{results.verdicts[eye].reason} (stopped: {shift.stop_reason})",
+                _reason(results.verdicts[eye], shift),
             ]
             for eye, shift in results.eyes.items()
         ],
@@ -179,6 +180,13 @@ def _solution(outcome: SessionOutcome, results: Results) -> Section:
     if results.eye_distance_m is not None:
         items.append(f"Implied eye distance: {1e3 * results.eye_distance_m:.1f} mm.")
     return Section("How it was solved", items)
+
+
+def _reason(verdict: Verdict, shift: EyeShift) -> str:
+    """Return why an eye is judged so, and why the solver stopped if it ran."""
+    return (
+        f"{verdict.reason} (stopped: {shift.stop_reason})" if shift.iterations else verdict.reason
+    )
 
 
 def _alignments(outcome: SessionOutcome, results: Results) -> Section:

@@ -79,6 +79,11 @@ class SessionRecord:
     """Parts that are damaged; their contents are missing here, or were read from a copy."""
 
     @property
+    def is_solvable(self) -> bool:
+        """True if it holds an alignment or a verification; a slipped headset is only verified."""
+        return bool(self.alignments or self.facts.verified)
+
+    @property
     def refused(self) -> int:
         """Number of confirmations refused, for any reason."""
         return sum(event.name == "refused" for event in self.events)

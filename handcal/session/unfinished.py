@@ -24,6 +24,8 @@ class UnfinishedSession:
     alignments: int = 0
     trials: int = 0
     """Numbers of those that are not deleted."""
+    verified: int = 0
+    """Number of verified eyes; after a slipped headset they are all there is."""
     damaged: int = 0
     """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
@@ -70,6 +72,7 @@ def _inspect(
         record.wearer,
         len(record.alignments),
         len(record.trials),
+        len(record.facts.verified),
         len(record.damaged),
         is_repaired=is_original and started in copied,
     )

@@ -121,7 +121,7 @@ def solve_again(
     CancelledError
         If it was cancelled.
     """
-    if not record.alignments and not record.facts.verified:
+    if not record.is_solvable:
         return None
     try:
         return solve_session(

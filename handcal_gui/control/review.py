@@ -129,7 +129,7 @@ class ReviewController(QObject):
         self.record = record = stored.record
         self._results = stored.results
         panels = self._window.panels
-        note = "" if stored.results else tr("It contains no alignments yet.")
+        note = "" if record.alignments else tr("It contains no alignments yet.")
         target_arcmin = stored.settings.verdict.target_arcmin
         panels.results.show_results(
             stored.results, record.alignments, record.rig, has_verdicts=False
@@ -140,11 +140,13 @@ class ReviewController(QObject):
         panels.trials.show_record(record)
         panels.cloud.clear(note)  # of the session shown before
         if stored.results is not None:
-            number, last = list(record.alignments.items())[-1]
-            self._show_alignment(number, last.eyes[0])
             self._comparison.use(record, stored.settings)
+            for number, last in [*record.alignments.items()][-1:]:
+                self._show_alignment(number, last.eyes[0])
         # Then: if it is on the screen, it chooses the alignment whose clouds are shown.
-        self._page.show_session(record, stored.results, target_arcmin, note)
+        self._page.show_session(
+            record, stored.results, target_arcmin, "" if stored.results else note
+        )
         self._window.show_page("review")
         self.opened.emit(record.path)
 

@@ -107,9 +107,9 @@ class ReviewPage(QWidget):
             The current activity, or the reason why there are no results.
         """
         self.show_wearer(record.wearer)
-        self._export.setEnabled(bool(record.alignments))
+        self._export.setEnabled(record.is_solvable)
         self._again.setEnabled(results is not None)
-        self._task.setText(_EXPORT if record.alignments else _RESUME)
+        self._task.setText(_EXPORT if record.is_solvable else _RESUME)
         self._card.show_results(results, target_arcmin)
         self._card.setVisible(results is not None)
         if results is not None:
@@ -149,8 +149,11 @@ def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str, str]]:
     yield "Started", tr("Started"), local_time(record.events[0].time)
     yield "Rig", tr("Rig"), record.rig.name
     state = tr("finished") if record.is_finished else tr("not finished")
+    alignments, verified = len(record.alignments), len(record.facts.verified)
     counts = (
-        pluralize(len(record.alignments), tr("alignment"), tr("alignments")),
+        pluralize(verified, tr("verified eye"), tr("verified eyes"))
+        if verified and not alignments
+        else pluralize(alignments, tr("alignment"), tr("alignments")),
         pluralize(len(record.trials), tr("trial"), tr("trials")),
     )
     yield "Contents", tr("Contents"), f"{', '.join(counts)}; {state}"

@@ -767,6 +767,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>verified eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>verified eyes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>alignment</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2950,7 +2958,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>There is no alignment to export yet.</source>
+        <source>There is no result to export yet.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

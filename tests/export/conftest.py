@@ -12,9 +12,10 @@ from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.states import CalibrationSettings
-from handcal.types import Alignment
+from handcal.types import EYES, Alignment, Verification
 
 RIG = example_rig()
+VERIFIED = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0), hand_E_m=(0.0, 0.0, 0.5))
 SETTINGS = {"calibration": settings_json(CalibrationSettings())}
 
 
@@ -50,6 +51,14 @@ def empty(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
     """Return a session without alignments, results or trials."""
     with Session.create(tmp_path_factory.mktemp("sessions"), RIG, SETTINGS) as session:
         pass
+    return Session.open(session.path)
+
+
+@pytest.fixture(scope="session")
+def verified(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
+    """Return a session as after a slipped headset: both eyes are verified, and nothing else."""
+    with Session.create(tmp_path_factory.mktemp("sessions"), RIG, SETTINGS) as session:
+        session.save_facts(verified=dict.fromkeys(EYES, VERIFIED))
     return Session.open(session.path)
 
 

@@ -17,7 +17,7 @@ import pytest
 
 from handcal.errors import CancelledError, FileError
 from handcal.export.export import ExportSettings, export_session
-from handcal.export.formats import FORMATS, Format
+from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.io.settings import read_settings, settings_json
 from handcal.progress import Progress
 from handcal.session.session import SessionRecord
@@ -76,6 +76,18 @@ def tree(folder: Path) -> dict[str, bytes]:
         for path in folder.rglob("*")
         if path.is_file()
     }
+
+
+def test_all_formats_of_a_session_that_was_only_verified(
+    verified: SessionRecord, tmp_path: Path
+) -> None:
+    export_session(verified, tmp_path, ExportSettings((*FORMATS, *TOOL_FORMATS)))
+    made = json.loads((tmp_path / "calibration.json").read_text())
+    assert made["solved_eye_distance_m"] > 0.0
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "How it was solved" in text
+    assert "stopped" not in text  # nothing was iterated
+    assert "Residuals on the hand" not in text
 
 
 def test_everything_is_exported_and_told(tmp_path: Path, record: SessionRecord) -> None:

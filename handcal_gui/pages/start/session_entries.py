@@ -61,7 +61,7 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
         unfinished=tuple(
             _unfinished(session)
             for session in unfinished
-            if (session.problem or session.alignments or session.trials)
+            if (session.problem or session.alignments or session.verified or session.trials)
             and not session.is_repaired  # its copy is resumed; the library names both
         ),
         recent=tuple(islice((entry for entry in offered if entry is not None), MOST_RECENT)),
@@ -74,7 +74,8 @@ def _unfinished(session: UnfinishedSession) -> Entry:
         named = session.problem.replace(str(session.path), name)
         text = named if name in named else f"{name}: {named}"
         return Entry(session.path, text, is_enabled=False)
-    text = _text(session.wearer, session.started, session.alignments, session.trials)
+    counts = session.alignments, session.verified, session.trials
+    text = _text(session.wearer, session.started, *counts)
     if session.damaged:
         text += tr(" · damaged: {} left out").format(
             pluralize(session.damaged, tr("part"), tr("parts"))
@@ -89,15 +90,18 @@ def _recent(path: Path) -> Entry | None:
         return Entry(path, f"{path.name}: {error}", is_enabled=False)
     state, events = replayed.state, replayed.journal.events
     alignments, trials = state.alignments, state.trials
-    if not (alignments.active or alignments.deleted or trials.active or trials.deleted):
+    held = alignments.active, alignments.deleted, trials.active, trials.deleted
+    if not (any(held) or state.facts.verified):
         return None
-    text = _text(state.wearer, events[0].time, len(alignments.active), len(trials.active))
+    counts = len(alignments.active), len(state.facts.verified), len(trials.active)
+    text = _text(state.wearer, events[0].time, *counts)
     return Entry(path, text, wearer=state.wearer, eyes=eye_outcomes(path, replayed))
 
 
-def _text(wearer: str, started: str, alignments: int, trials: int) -> str:
+def _text(wearer: str, started: str, alignments: int, verified: int, trials: int) -> str:
     held = (
         (alignments, tr("alignment"), tr("alignments")),
+        (0 if alignments else verified, tr("verified eye"), tr("verified eyes")),
         (trials, tr("trial"), tr("trials")),
     )
     counts = ", ".join(pluralize(*one) for one in held if one[0])

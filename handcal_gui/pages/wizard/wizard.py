@@ -359,7 +359,8 @@ class _Rail(QWidget):
             label.setText(f"{mark}{step.label}")
             if step is present:
                 label.setText(f"▸ {step.label}")
-                color = self.palette().windowText().color().name()
+                # A change of the theme reaches this widget's own palette only later.
+                color = QApplication.palette().windowText().color().name()
             weight = "bold" if step is present else "normal"
             label.setStyleSheet(f"color: {color}; font-weight: {weight}")
 

@@ -164,7 +164,7 @@ class LibraryWindow(QDialog):
         self._open.setEnabled(len(chosen) == len(readable) == 1)
         can_resume = len(readable) == 1 and not readable[0].is_finished
         self._resume.setEnabled(can_resume)
-        self._export.setEnabled(any(entry.alignments for entry in readable))
+        self._export.setEnabled(any(entry.alignments or entry.eyes for entry in readable))
         self._correct.setEnabled(is_free and bool(readable))
         self._show_folder.setEnabled(len(chosen) == 1)
         self._copy.setEnabled(bool(chosen))

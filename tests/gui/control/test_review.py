@@ -15,9 +15,10 @@ from pytestqt.qtbot import QtBot
 from handcal.errors import CancelledError
 from handcal.progress import Progress
 from handcal.register.results import Results
+from handcal.rig.example import example_rig
 from handcal.session.library import correct_wearer, delete_session
 from handcal.session.record import Replayed, replay
-from handcal.session.session import SessionRecord
+from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import stored_solve_settings
 from handcal_gui.control import review
 from handcal_gui.control.review import _Stored
@@ -28,6 +29,7 @@ from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.path_field import PathField
+from tests.gui.views import VERIFIED
 
 PATIENCE_MS = 20_000
 
@@ -308,6 +310,24 @@ def test_a_session_given_up_for_another_does_not_open_later(
     qtbot.wait(200)
     assert program.window.page == "start"
     assert program.review.record is None
+
+
+def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
+    program: Program, qtbot: QtBot, tmp_path: Path
+) -> None:
+    assert program.windows.export() is None
+    assert "no result to export" in program.window.banner.text
+    with Session.create(tmp_path, example_rig(), {}) as session:
+        session.save_facts(verified={"left": replace(VERIFIED, hand_E_m=(0.0, 0.0, 0.5))})
+    program.open_session(session.path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    contents = child(program, QLabel, "reviewContents").text()
+    assert contents.startswith("1 verified eye, 0 trials")
+    assert child(program, QPushButton, "reviewExport").isEnabled()
+    assert program.windows.export() is not None
+    program.window.panels.results.compare_requested.emit("linear")
+    status = child(program, QLabel, "comparison-status")
+    qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
 
 
 def test_a_comparison_is_shown_or_cancelled(

@@ -13,6 +13,7 @@ from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import Alignment
 from handcal_gui.pages.start.session_entries import find_sessions
+from tests.gui.views import VERIFIED
 
 
 def make(folder: Path, wearer: str, alignments: Sequence[Alignment], *, is_done: bool) -> Path:
@@ -35,6 +36,18 @@ def test_unfinished_sessions_are_told_by_wearer_time_and_alignments(
     assert entry.is_enabled
     assert entry.text.startswith(f"Ada · {datetime.now().astimezone():%d %b %Y}")
     assert entry.text.endswith(" · 1 alignment")
+
+
+def test_sessions_that_were_only_verified_are_offered(tmp_path: Path) -> None:
+    for wearer in ("Ada", "Bea"):
+        with Session.create(tmp_path, example_rig(), {}, name=wearer, wearer=wearer) as session:
+            session.save_facts(verified={"left": VERIFIED})
+            if wearer == "Bea":
+                session.finish()
+    found = find_sessions(tmp_path, ())
+    for (entry,), wearer in ((found.unfinished, "Ada"), (found.recent, "Bea")):
+        assert entry.wearer == wearer
+        assert entry.text.endswith(" · 1 verified eye")
 
 
 def test_a_damaged_session_is_reported_with_the_reason(

@@ -95,6 +95,20 @@ def test_the_main_button_has_its_colour_only_where_a_press_is_needed(
         use_theme("system")
 
 
+def test_the_present_step_has_the_colour_of_a_new_theme(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.APPLIED))
+    [step] = (one for one in panel.findChildren(QLabel) if one.text().startswith("▸"))
+    try:
+        for theme in ("light", "dark"):
+            use_theme(theme)
+            QApplication.processEvents()
+            assert QApplication.palette().windowText().color().name() in step.styleSheet()
+    finally:
+        use_theme("system")
+
+
 def test_a_large_guide_has_larger_texts(panel: WizardPanel, snapshot: Maker) -> None:
     panel.show_snapshot(snapshot(State.APPLIED))
     assert panel.shown is not None

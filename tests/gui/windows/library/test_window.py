@@ -22,6 +22,7 @@ from handcal_gui.windows.library.sessions_model import FILTERS
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.helpers import child, text
+from tests.gui.views import VERIFIED
 
 PATIENCE_MS = 10_000
 
@@ -153,6 +154,19 @@ def test_open_and_export_ask_for_what_is_chosen(
     with qtbot.waitSignal(window.open_requested) as opened:
         press(window, "openSession")
     assert opened.args == [folder / "bea"]
+
+
+def test_a_session_that_was_only_verified_is_exported(qtbot: QtBot, tmp_path: Path) -> None:
+    with Session.create(tmp_path, example_rig(), {}, name="a", wearer="Ada") as session:
+        session.save_facts(verified={"left": VERIFIED})
+        session.save_results(results("accept", 4.0, 4.0))
+    window = LibraryWindow(tmp_path)
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitUntil(lambda: table(window).model().rowCount() == 1, timeout=PATIENCE_MS)
+    choose(window, "Ada")
+    assert child(window, QPushButton, "exportSessions").isEnabled()
+    window.stop()
 
 
 def test_an_unreadable_one_among_others_is_left_to_the_export_and_keeps_its_name(
