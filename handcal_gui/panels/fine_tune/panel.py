@@ -124,6 +124,10 @@ class FineTunePanel(QWidget):
         self._begin(_OFFLINE)
         self._refresh()
 
+    def choose_eye(self, eye: Eye) -> None:
+        """Let the keys move this eye."""
+        self._editors[eye].chosen.setChecked(True)
+
     def settle(self) -> None:
         """Send φ as set at once, and end any comparison."""
         if self._shown() is not None:

@@ -65,6 +65,8 @@ class TrialsPanel(QWidget):
     record_action : QAction
     trial_requested : Signal(str, float)
         Eye, and the target's distance in metres.
+    eye_changed : Signal(str)
+        Eye of the next trial, which is to be fine-tuned.
     show_target_requested : Signal(str, float)
         Eye and distance of the target to show in the headset instead of the present one.
     hide_target_requested : Signal()
@@ -78,6 +80,7 @@ class TrialsPanel(QWidget):
     """
 
     trial_requested = Signal(str, float)
+    eye_changed = Signal(str)
     show_target_requested = Signal(str, float)
     hide_target_requested = Signal()
     compare_requested = Signal()
@@ -97,6 +100,7 @@ class TrialsPanel(QWidget):
         self._is_read_only = self._is_doubtful = False
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._shows_target = QCheckBox(tr("Show the target in the headset"))
+        self._eye: Eye | None = None  # of the next trial, as said last
         self._target: tuple[Eye, float] | None = None  # requested
         self._compared = 0
         self._comparison = ComparisonRow()
@@ -147,7 +151,7 @@ class TrialsPanel(QWidget):
     def set_read_only(self, is_read_only: bool) -> None:
         """Prepare for another session, read-only or running."""
         self._is_read_only = is_read_only
-        self._snapshot = None
+        self._snapshot = self._eye = None
         self._table.set_read_only(is_read_only)
         self._show_deletions()
         self._refresh()
@@ -210,6 +214,9 @@ class TrialsPanel(QWidget):
             obstacle or tr("Next: {}").format(EYE_NAMES[self._next_eye()].lower())
         )
         can_show = not (obstacle or (self._record and self._record.is_finished))
+        if not obstacle and self._eye != self._next_eye():
+            self._eye = self._next_eye()
+            self.eye_changed.emit(self._eye)
         self._shows_target.setEnabled(can_show)
         if not can_show:
             self._shows_target.setChecked(False)
@@ -302,10 +309,10 @@ class TrialsPanel(QWidget):
         ):
             tabs.addTab(page, title)
         vbox(
-            self._hint,
             choices,
             hbox(self._shows_target, (self._message, 1), spacing=2 * SPACING_PX),
             self._comparison,
+            self._hint,  # below the buttons, which stay in place when it goes
             (tabs, 1),
             self._summary,
             self._strip,

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QTabBar, QToolButton
+from PySide6.QtWidgets import QApplication, QRadioButton, QTabBar, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
@@ -287,3 +287,13 @@ def test_nothing_moves_the_main_button(
     window.resize(*size_px)
     look()
     assert len(places) == 1
+
+
+def test_the_eye_of_the_next_trial_is_fine_tuned(program: Program) -> None:
+    panels = program.window.panels
+    left, right = panels.fine_tune.findChildren(QRadioButton)
+    assert left.isChecked()
+    panels.trials.eye_changed.emit("right")
+    assert right.isChecked()
+    panels.trials.eye_changed.emit("left")
+    assert left.isChecked()

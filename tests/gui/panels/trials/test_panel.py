@@ -149,13 +149,29 @@ def test_takes_the_eyes_in_turn(
     tried: SessionRecord,
     rig: Rig,
 ) -> None:
+    eyes: list[str] = []
+    panel.eye_changed.connect(eyes.append)
     panel.show_snapshot(tuned(snapshot))
     assert text(panel, "message") == "Next: left eye"
     panel.show_snapshot(replace(tuned(snapshot), record=tried))
+    panel.show_snapshot(replace(tuned(snapshot), record=tried))
     assert text(panel, "message") == "Next: right eye"
+    assert eyes == ["left", "right"]
     with qtbot.waitSignal(panel.trial_requested) as asked:
         button(panel, QToolButton, "Record trial").click()
     assert asked.args[0] == "right"
+
+
+def test_the_button_stays_under_the_mouse(
+    panel: TrialsPanel, snapshot: Callable[..., Snapshot], tried: SessionRecord
+) -> None:
+    panel.show_snapshot(tuned(snapshot))
+    record = button(panel, QToolButton, "Record trial")
+    QApplication.processEvents()
+    before = record.geometry()
+    panel.show_snapshot(replace(tuned(snapshot), record=tried))
+    QApplication.processEvents()
+    assert record.geometry() == before
 
 
 def test_the_target_in_the_headset_follows_the_choices(
