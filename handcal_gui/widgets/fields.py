@@ -7,6 +7,7 @@ from html import escape
 from typing import TypeVar, cast
 
 from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QComboBox,
@@ -87,9 +88,11 @@ def main_button(name: str, text: str = "") -> MainButton:
     return made
 
 
-def tool_button() -> QToolButton:
-    """Return a tool button that stands out while checked, also in the dark theme."""
+def tool_button(action: QAction) -> QToolButton:
+    """Return an action's tool button, which stands out while checked, also in the dark theme."""
     made = QToolButton()
+    made.setDefaultAction(action)
+    made.setAccessibleName(action.text())
     set_style(
         made,
         "QToolButton:checked { background: palette(highlight); color: palette(highlighted-text);"

@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
+from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
@@ -56,7 +56,7 @@ def test_dark_is_dark_and_gives_way_again() -> None:
 def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
     use_theme("light")
     window = QWidget()
-    made = tool_button()
+    made = tool_button(QAction())
     made.setParent(window)  # Qt tells only windows of another palette
     qtbot.addWidget(window)
     window.show()
@@ -186,7 +186,7 @@ def test_the_focus_is_seen(theme: Literal["light", "dark", "contrast"], qtbot: Q
             assert contrast(without, ground) >= 7.0
         assert with_focus != without
     if theme == "contrast":
-        tool = tool_button()
+        tool = tool_button(QAction())
         tool.setParent(window)
         tool.setGeometry(10, 90, 100, 24)
         tool.show()

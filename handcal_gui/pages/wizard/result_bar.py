@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QAction, QGuiApplication, QTextDocument
+from PySide6.QtGui import QGuiApplication, QTextDocument
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter
 from PySide6.QtWidgets import QDialog, QWidget
 
@@ -52,7 +52,7 @@ class ResultBar(QWidget):
             add_action(self, tr("Copy"), "", self.copy, tooltip=tr("Copy the result as text")),
             add_action(self, tr("Print…"), "", self._ask_printer, tooltip=tr("Print the result")),
         )
-        self._blink_button, *others = map(_button, actions)
+        self._blink_button, *others = map(tool_button, actions)
         self.buttons = QWidget()
         hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)
         vbox(self.card, on=self, margins=0)
@@ -104,9 +104,3 @@ def _head(record: SessionRecord) -> Mapping[str, str]:
         tr("Rig"): record.rig.name,
         tr("Session"): record.path.name,
     }
-
-
-def _button(action: QAction) -> QWidget:
-    button = tool_button()
-    button.setDefaultAction(action)
-    return button

@@ -116,8 +116,7 @@ class CameraPanel(QWidget):
 
     def _lay_out(self) -> None:
         top = hbox(self._mode, (self._status.name, 1), spacing=SPACING_PX)
-        freeze = tool_button()
-        freeze.setDefaultAction(self._freeze)
+        freeze = tool_button(self._freeze)
         freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         top.addWidget(freeze)
         vbox(

@@ -32,7 +32,7 @@ from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
@@ -382,21 +382,8 @@ class _ControlsArea(QScrollArea):
 
 def _row(*items: QWidget | QAction | None, spacing: int = SPACING_PX) -> QHBoxLayout:
     """Return a row of widgets and buttons for actions; None is a stretch."""
-    row = QHBoxLayout()
-    row.setSpacing(spacing)
-    for item in items:
-        if item is None:
-            row.addStretch(1)
-        elif isinstance(item, QAction):
-            button = tool_button()
-            button.setDefaultAction(item)
-            button.setAccessibleName(item.text())
-            if not item.icon().isNull():
-                button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
-            row.addWidget(button)
-        else:
-            row.addWidget(item)
-    return row
+    made = (tool_button(one) if isinstance(one, QAction) else one or 1 for one in items)
+    return hbox(*made, spacing=spacing)
 
 
 def _obstacle(snapshot: Snapshot) -> str:

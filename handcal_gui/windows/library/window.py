@@ -162,8 +162,7 @@ class LibraryWindow(QDialog):
         readable = [entry for entry in chosen if not entry.problem]
         is_free = self._job is None
         self._open.setEnabled(len(chosen) == len(readable) == 1)
-        can_resume = len(readable) == 1 and not readable[0].is_finished
-        self._resume.setEnabled(can_resume)
+        self._resume.setEnabled(len(readable) == 1 and not readable[0].is_finished)
         self._export.setEnabled(any(entry.alignments or entry.eyes for entry in readable))
         self._correct.setEnabled(is_free and bool(readable))
         self._show_folder.setEnabled(len(chosen) == 1)
@@ -181,9 +180,8 @@ class LibraryWindow(QDialog):
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
         shown_count = tr("{} in {}{}").format(count, self._folder, selected)
         self._table.show_reason(_reason_for_none(shown, total) if self._is_read else "")
-        self._count.setText(
-            shown_count if self._is_read else tr("Reading {}…").format(self._folder)
-        )
+        reading = tr("Reading {}…").format(self._folder)
+        self._count.setText(shown_count if self._is_read else reading)
         self._show_trend(chosen[0].wearer if chosen else "")
 
     def _refresh_undo(self) -> None:
@@ -203,13 +201,11 @@ class LibraryWindow(QDialog):
     def _show_trend(self, wearer: str) -> None:
         found = calibrations_of(wearer, self._sessions.entries)
         self._trend.setVisible(len(found) > 1)
+        text = tr("Select a wearer with several calibrations to see how the errors changed.")
         if len(found) > 1:
-            self._trend_title.setText(tr("{}: {} calibrations").format(wearer, len(found)))
+            text = tr("{}: {} calibrations").format(wearer, len(found))
             self._trend.show_calibrations(found)
-        else:
-            self._trend_title.setText(
-                tr("Select a wearer with several calibrations to see how the errors changed.")
-            )
+        self._trend_title.setText(text)
 
     def _open_chosen(self) -> None:
         self.open_requested.emit(self.chosen[0].path)
@@ -328,7 +324,8 @@ class LibraryWindow(QDialog):
             tr("Delete"), "Del", self._delete_chosen, tr("Delete the selected sessions (Del)")
         )
         self._table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-        self._undo = _button("restoreSession", tr("Restore"))
+        self._undo = button("restoreSession", tr("Restore"))
+        self._undo.setAutoDefault(False)
         self._undo.clicked.connect(self._undo_last)
         add_action(self, tr("Search"), "Ctrl+F", self._begin_search)
         add_action(self, tr("Undo the last change"), "Ctrl+Z", self._undo.click)
@@ -390,15 +387,10 @@ def _reason_for_none(shown: int, total: int) -> str:
     )
 
 
-def _button(name: str, text: str) -> QPushButton:
-    made = button(name, text)
-    made.setAutoDefault(False)
-    return made
-
-
 def _button_of(name: str, action: QAction) -> QPushButton:
     """Return a button that triggers an action, and is enabled while the action is."""
-    made = _button(name, action.text())
+    made = button(name, action.text())
+    made.setAutoDefault(False)
     made.setToolTip(action.toolTip())
     made.setEnabled(action.isEnabled())
     made.clicked.connect(action.trigger)
