@@ -182,6 +182,8 @@ class Program(QObject):
         self.live.opened.connect(self._current.add_session)
         self.live.export_requested.connect(lambda: self.windows.export())
         self.live.next_wearer_requested.connect(self.show_start)
+        # What was said of the former wearer.
+        self.live.next_wearer_requested.connect(self.window.banner.clear)
         self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.windows.export())

@@ -92,7 +92,7 @@ class MainWindow(QMainWindow):
     ) -> None:
         super().__init__()
         self.setObjectName("mainWindow")
-        self.setWindowTitle("handcal")
+        self.show_wearer("")
         self.panels = panels
         self.banner = Banner()
         self._pages: dict[Page, QWidget] = {"start": start, "live": wizard, "review": review}
@@ -147,10 +147,16 @@ class MainWindow(QMainWindow):
         page, self._page = self._page, "start"
         self.show_page(page)
 
+    def show_wearer(self, name: str) -> None:
+        """Name the wearer whose session is shown in the title; empty for none."""
+        self.setWindowTitle(tr("{} – handcal").format(name) if name else "handcal")
+
     def show_page(self, page: Page) -> None:
         """Show a page with its docks, in the layout used last."""
         self._keep_layout()
         self._page = page
+        if page == "start":
+            self.show_wearer("")
         size_px = self.size()
         self.statusBar().setVisible(page == "live")
         self._stack.setCurrentIndex(list(self._pages).index(page))

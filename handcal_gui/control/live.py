@@ -222,6 +222,7 @@ class CalibrationController(QObject):
         snapshot = self._conditions.calm(snapshot)
         if self._snapshot is None or snapshot.record is not self._snapshot.record:
             self._comparison.use(snapshot.record, self._solve_settings)
+            self._window.show_wearer(snapshot.record.wearer)
         self._snapshot = snapshot
         panels = self._window.panels
         # Even while hidden: they may be used before the next snapshot.

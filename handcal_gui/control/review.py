@@ -105,6 +105,7 @@ class ReviewController(QObject):
         self.record = replace(self.record, wearer=wearer)
         self._window.panels.session.show_record(self.record, self._results)
         self._page.show_wearer(wearer)
+        self._window.show_wearer(wearer)
 
     def _show_progress(self, job: Job) -> None:
         """Show a dialog with the progress if opening takes long, with a Cancel button."""
@@ -148,6 +149,7 @@ class ReviewController(QObject):
             record, stored.results, target_arcmin, "" if stored.results else note
         )
         self._window.show_page("review")
+        self._window.show_wearer(record.wearer)
         self.opened.emit(record.path)
 
     def _show_alignment(self, number: int, eye: Eye) -> None:

@@ -3687,6 +3687,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} – handcal</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Go to</source>
         <translation type="unfinished"></translation>
     </message>

@@ -89,6 +89,7 @@ def test_a_corrected_name_is_shown_and_exported(
     qtbot.waitUntil(lambda: exported() == "Ada", timeout=PATIENCE_MS)
     titles = [one.text() for one in program.window.findChildren(QLabel)]
     assert titles.count("Ada") == 2  # of the page, and in the session panel
+    assert program.window.windowTitle() == "Ada – handcal"
     delete_session(path)
     library.changed.emit()
     qtbot.waitUntil(lambda: program.review._wearer._job is None, timeout=PATIENCE_MS)

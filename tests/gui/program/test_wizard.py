@@ -48,8 +48,11 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
         P = studio.headset.shown.projections[eye].P
         assert not np.allclose(P, live.snapshot.record.rig.eyes[eye].K @ np.eye(3, 4))
     assert live.banner == ""
+    window = live.program.window
+    assert window.windowTitle() == "Ada – handcal"
+    window.banner.show_message("Something about Ada")
     live.press_space_for(Action.NEXT_WEARER)
-    assert live.program.window.page == "start"
+    assert (window.page, window.windowTitle(), live.banner) == ("start", "handcal", "")
     stored, complaint = file.load()
     assert complaint == ""
     assert "Ada" not in file.path.read_text()  # only in the session
