@@ -6,7 +6,7 @@ from html import escape
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QTextDocument
-from PySide6.QtPrintSupport import QPrintDialog, QPrinter
+from PySide6.QtPrintSupport import QPrinter
 from PySide6.QtWidgets import (
     QDialog,
     QHeaderView,
@@ -21,6 +21,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.printing import ask_printer
 
 _FIRST_SIZE = QSize(80 * SPACING_PX, 60 * SPACING_PX)
 _KEYS, _MEANING = range(2)
@@ -53,7 +54,7 @@ class KeysDialog(QDialog):
         close = button("close", tr("Close"))
         close.setDefault(True)
         search.textChanged.connect(self._search)
-        ask.clicked.connect(self._ask_printer)
+        ask.clicked.connect(lambda: ask_printer(self, self.print_to))
         close.clicked.connect(self.accept)
         add_action(self, tr("Search the keys"), "Ctrl+F", search.setFocus)
         vbox(
@@ -87,11 +88,6 @@ class KeysDialog(QDialog):
             is_any |= not group.isHidden()
         self._list.setVisible(is_any)
         self._none.setVisible(not is_any)
-
-    def _ask_printer(self) -> None:
-        printer = QPrinter(QPrinter.PrinterMode.HighResolution)
-        if QPrintDialog(printer, self).exec() == QDialog.DialogCode.Accepted:
-            self.print_to(printer)
 
 
 def _list(groups: dict[str, KeyGroup]) -> QTreeWidget:

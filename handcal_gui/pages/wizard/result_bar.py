@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QGuiApplication, QTextDocument
-from PySide6.QtPrintSupport import QPrintDialog, QPrinter
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtPrintSupport import QPrinter
+from PySide6.QtWidgets import QWidget
 
 from handcal.register.results import Results
 from handcal.register.verdict import VerdictSettings
@@ -18,6 +18,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.printing import ask_printer
 from handcal_gui.widgets.result_card import ResultCard, result_text
 from handcal_gui.widgets.times import local_time
 
@@ -91,10 +92,7 @@ class ResultBar(QWidget):
         document.print_(printer)
 
     def _ask_printer(self) -> None:
-        printer = QPrinter(QPrinter.PrinterMode.HighResolution)
-        dialog = QPrintDialog(printer, self)
-        if dialog.exec() == QDialog.DialogCode.Accepted:
-            self.print_to(printer)
+        ask_printer(self, self.print_to)
 
 
 def _head(record: SessionRecord) -> Mapping[str, str]:
