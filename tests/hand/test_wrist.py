@@ -84,10 +84,12 @@ def limb(width_m: Float32, pitch_m: float = 0.001) -> tuple[Float32, Float32]:
     return points_m.astype(np.float32), np.full(points_m.shape[1], pitch_m**2, np.float32)
 
 
-def find(width_m: Float32, radius_m: float, exit_m: float = np.inf) -> tuple[float, float]:
+def find(
+    width_m: Float32, radius_m: float, exit_m: float = np.inf, end_m: float = np.inf
+) -> tuple[float, float]:
     points_m, area_m2 = limb(width_m)
     palm_m, axis = np.array([[0, 0, 0.5], [1, 0, 0]], np.float32)
-    ends = np.zeros(len(area_m2), bool)
+    ends = np.abs(points_m[0] - end_m) < 0.0015
     return find_wrist_m(points_m, area_m2, ends, palm_m, radius_m, axis, exit_m)
 
 
@@ -99,6 +101,35 @@ def test_the_wrist_is_the_narrow_place() -> None:
     wrist_m, sigma_m = find(width_m, 0.042)
     assert 0.06 < wrist_m < 0.075
     assert 0.0 < sigma_m < 0.02
+
+
+def test_the_narrowest_place_is_just_behind_the_wrist() -> None:
+    sharp_m = (0.045 + 1.2 * np.abs(PLACE_M - 0.07)).clip(0, 0.085).astype(np.float32)
+    wrist_m, _ = find(sharp_m, 0.042)
+    assert wrist_m == pytest.approx(0.066, abs=0.002)
+
+
+def test_the_slanted_end_of_an_arm_that_leaves_the_view_is_not_its_wrist() -> None:
+    width_m = 0.055 + 0.1 * np.abs(PLACE_M - 0.07)
+    slanted_m = np.where(PLACE_M < 0.112, width_m - 1.2 * np.maximum(PLACE_M - 0.1, 0.0), 0.0)
+    whole_m, _ = find(width_m.astype(np.float32), 0.042)
+    cut_m, _ = find(slanted_m.astype(np.float32), 0.042, end_m=0.112)
+    assert cut_m == pytest.approx(whole_m, abs=0.015)
+
+
+def test_seen_from_its_edge_a_limb_says_less_by_its_width() -> None:
+    width_m = (0.05 + 0.3 * np.abs(PLACE_M - 0.07)).clip(0, 0.085).astype(np.float32)
+    _, front_m = find(width_m, 0.042)
+    _, edge_m = find(width_m, 0.018)
+    assert edge_m > 2.0 * front_m
+
+
+@pytest.mark.parametrize("exit_m", [0.12, 0.14])
+def test_seen_from_its_edge_the_wrist_is_up_to_four_centimetres_before_the_box_ends(
+    exit_m: float,
+) -> None:
+    wrist_m, _ = find(np.full(len(PLACE_M), 0.045, np.float32), 0.02, exit_m)
+    assert 0.03 < exit_m - wrist_m < 0.045
 
 
 def test_a_limb_as_wide_everywhere_leaves_the_wrist_uncertain() -> None:
