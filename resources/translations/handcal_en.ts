@@ -579,6 +579,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Defaults</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Shows the default of every field; Cancel keeps the former values.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Target</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1141,6 +1149,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Use the usual gate</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Use the simulator</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1393,10 +1405,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>at forearm&apos;s length, 40 to 60 cm from the eyes</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Draws with a result that should not be used</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1614,6 +1622,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:.0f} to {:.0f} cm from the camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>at forearm&apos;s length, {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -19,11 +19,12 @@ from handcal_gui.pages.wizard.step_views import (
     UNUSABLE,
     align_view,
     connect_view,
+    distance,
     eye_names,
     save_view,
     verification_view,
 )
-from handcal_gui.pages.wizard.steps import DISTANCE, Wizard
+from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import EYE_WORDS, Action, ButtonSpec, Step, WizardView
 from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
@@ -137,7 +138,7 @@ class PlannedWizard(Wizard):
             Step.SHOW_HAND,
             tr(
                 "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
-            ).format(DISTANCE),
+            ).format(distance(snapshot)),
             (hand_found(snapshot), hand_still(snapshot)),
             ButtonSpec(Action.TAKE_STEP, _WAITS_FOR_HAND, False),
             others,

@@ -34,6 +34,9 @@ SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _LEAST_LOOK_NS = 1_500_000_000
 """Time from a drawing to its confirmation: a second press of a key confirms nothing unseen."""
+_GATE_MARGIN_M = 0.05
+"""From the depth gate to where the hand is to be held: its palm, with fingers before and behind."""
+_FOREARM_M = 0.45
 _SENDS_UNUSABLE = tr("Draws with a result that should not be used")
 
 
@@ -216,6 +219,15 @@ def save_view(snapshot: Snapshot) -> WizardView:
         runs_after_s=None if snapshot.problem else READ_S,
         unearned=unearned,
     )
+
+
+def distance(snapshot: Snapshot) -> str:
+    """Return how far from the camera the hand is to be held within the depth gate, in words."""
+    gate_m = snapshot.procedure.segment.reachable_m
+    near_m, far_m = gate_m[0] + _GATE_MARGIN_M, gate_m[1] - _GATE_MARGIN_M
+    text = tr("{:.0f} to {:.0f} cm from the camera").format(100 * near_m, 100 * far_m)
+    is_forearm = near_m <= _FOREARM_M <= far_m
+    return tr("at forearm's length, {}").format(text) if is_forearm else text
 
 
 def eye_names(eyes: Sequence[Eye]) -> str:

@@ -23,6 +23,7 @@ from handcal_gui.pages.wizard.step_views import (
     UNUSABLE,
     align_view,
     connect_view,
+    distance,
     eye_names,
     save_view,
     solve_view,
@@ -44,7 +45,6 @@ PLANS: dict[EyePlan, str] = {
     "left": tr("Left eye only"),
     "right": tr("Right eye only"),
 }
-DISTANCE = tr("at forearm's length, 40 to 60 cm from the eyes")
 _MOST_BY_ITSELF = 2
 """Most further alignments of an eye that are begun without asking."""
 
@@ -166,7 +166,7 @@ class Wizard:
         return WizardView(
             Step.SHOW_HAND,
             tr("Raise one bare hand {}, palm toward you and fingers a little apart.").format(
-                DISTANCE
+                distance(snapshot)
             ),
             (hand_found(snapshot),),
             ButtonSpec(Action.NEXT, tr("Next"), is_placed(snapshot)),

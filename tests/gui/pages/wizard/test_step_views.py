@@ -8,10 +8,12 @@ from typing import Any, get_args
 import pytest
 
 from handcal.errors import FileError
+from handcal.hand.settings import SegmentSettings
 from handcal.link.nudges import NudgeSum
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName, Verification
+from handcal_gui.pages.wizard.step_views import distance
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from tests.gui.views import NUDGED, Maker, actions, judged
@@ -156,3 +158,12 @@ def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
     view = wizard.view(full)
     assert not view.preconditions[0].holds
     assert view.note == "the disk is full"
+
+
+def test_the_distance_of_the_hand_follows_from_the_depth_gate(snapshot: Maker) -> None:
+    def said(near_m: float, far_m: float) -> str:
+        gate = SegmentSettings(depth_min_m=near_m, depth_max_m=far_m)
+        return distance(snapshot(State.SHOW_HAND, procedure={"segment": gate}))
+
+    assert said(0.35, 0.70) == "at forearm's length, 40 to 65 cm from the camera"
+    assert said(0.55, 2.00) == "60 to 70 cm from the camera"
