@@ -1429,10 +1429,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Put the headset on the wearer and wait until camera and headset are connected.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Begin</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1589,6 +1585,30 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Put the headset on the wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Continue</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This session continues where it stopped, with {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Let the headset sit well on the wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The result of {} is used again: the wearer verifies each eye first, and alignments follow only if they are needed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} and wait until camera and headset are connected.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Send the projections to the headset; {} keeps the offline calibration.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1622,6 +1642,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset uses the offline calibration for {}: φ is 0 there.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1781,15 +1805,19 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Alignments made; a full ring runs the next step</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Draw with the offline calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Hold</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>verified</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>aligned</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1799,6 +1827,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
     </message>
     <message>
         <source>E&amp;yes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments made, or eyes verified; a full ring runs the next step</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3338,6 +3370,10 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>not measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This result, not used</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

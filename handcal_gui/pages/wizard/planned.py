@@ -21,6 +21,7 @@ from handcal_gui.pages.wizard.step_views import (
     connect_view,
     distance,
     eye_names,
+    kept_fact,
     save_view,
     verification_view,
 )
@@ -48,6 +49,8 @@ _STATES = {
 }
 _FOLLOWS = Step.SHOW_HAND
 """The guide's own step while the plan continues."""
+_OMITTED = frozenset({Step.MAKE_CURSOR, Step.ALIGN, Step.SOLVE})
+"""Steps that a session which begins with a stored result does without."""
 _WAITS_FOR_HAND, _SENDING = tr("Waiting for the hand…"), tr("Sending…")
 _VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
     "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify l&eft eye")),
@@ -104,6 +107,11 @@ class PlannedWizard(Wizard):
 
     def view(self, snapshot: Snapshot) -> WizardView:
         """Return the view of a snapshot."""
+        view = self._view(snapshot)
+        is_former = snapshot.record.facts.former and not snapshot.procedure.alignments
+        return replace(view, omitted=_OMITTED) if is_former else view
+
+    def _view(self, snapshot: Snapshot) -> WizardView:
         step, procedure = self.step(snapshot), snapshot.procedure
         if step is Step.CONNECT:
             return connect_view(snapshot)
@@ -231,11 +239,12 @@ class PlannedWizard(Wizard):
                 *(_VERIFY_AGAIN[eye] for eye in self.usable_eyes),
             ),
             snapshot.problem,
-            fact=_drawn_otherwise(procedure),
+            fact=_drawn_otherwise(procedure) or kept_fact(procedure),
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:
-        view = replace(save_view(snapshot), fact=_drawn_otherwise(snapshot.procedure))
+        view = save_view(snapshot)
+        view = replace(view, fact=_drawn_otherwise(snapshot.procedure) or view.fact)
         if not snapshot.record.is_finished:
             return view
         slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))

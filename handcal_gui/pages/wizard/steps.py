@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 from handcal.register.verdict import Advice
 from handcal.station.snapshot import Snapshot
@@ -25,6 +26,7 @@ from handcal_gui.pages.wizard.step_views import (
     connect_view,
     distance,
     eye_names,
+    kept_fact,
     save_view,
     solve_view,
     verification_view,
@@ -139,7 +141,8 @@ class Wizard:
             case Step.SOLVE:
                 return solve_view(snapshot)
             case Step.VERIFY:
-                return self._verify(snapshot)
+                view = self._verify(snapshot)
+                return replace(view, fact=view.fact or kept_fact(snapshot.procedure))
             case Step.SAVE:
                 return save_view(snapshot)
 
