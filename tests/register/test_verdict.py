@@ -202,6 +202,7 @@ def test_a_verdict_tells_the_error_that_the_verification_found() -> None:
     found = f"the verification found an error of {before_arcmin:.1f}′ and corrected it; "
     assert told.startswith(found)
     unmoved = _fused({"left": replace(GOOD, shift_m=np.array([0.0002, 0.0, 0.0]))})
+    advice = {"left": advise(RIG, unmoved, "left", SETTINGS)}
     kept = judge(RIG, unmoved, advice, SETTINGS, measured=measured)["left"]
     assert kept.name == "keep"
     assert kept.reason.startswith(f"the verification found an error of {before_arcmin:.1f}′; the")
