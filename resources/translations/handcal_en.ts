@@ -16,7 +16,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>frames per second: only {:.0f} of the camera&apos;s {:.0f} are used; close other programs</source>
+        <source>fewer than two thirds of the camera&apos;s frames are used; close other programs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -28,7 +28,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>frames per second: only {:.0f} of the {:.0f} that are needed; {}</source>
+        <source>frames per second: often fewer than the {:.0f} that are needed; {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
