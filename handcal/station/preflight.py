@@ -225,7 +225,7 @@ def _rig(settings: StationSettings) -> Finding:
 def _sessions(settings: StationSettings) -> Finding:
     if not settings.sessions:
         return _broken("no folder is chosen", "choose one")
-    folder = Path(settings.sessions).expanduser().absolute()
+    folder = settings.sessions_path.absolute()
     there = next(path for path in (folder, *folder.parents) if path.exists())
     if not there.is_dir():
         return _broken(f"{there} is a file", "choose a folder")

@@ -298,6 +298,19 @@ def test_a_depth_gate_without_room_for_a_hand_is_refused(settings: StationSettin
     assert "before the cursors of the recommended plan" in find("camera", planned).found
 
 
+def test_a_folder_of_the_user_is_the_same_checked_and_used(
+    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    mine = replace(settings, sessions="~/mine", rig="~/rig.yaml")
+    assert (mine.sessions_path, mine.rig_path) == (tmp_path / "mine", tmp_path / "rig.yaml")
+    assert "will be created" in find("sessions", mine).found
+    nobody = replace(settings, sessions="~nosuchuser/mine")
+    assert nobody.sessions_path == Path("~nosuchuser/mine")
+    assert find("sessions", nobody).found
+
+
 @pytest.mark.skipif(not Path("/proc").exists(), reason="Linux has it")
 def test_a_folder_that_is_on_no_disk_is_refused(
     settings: StationSettings, monkeypatch: pytest.MonkeyPatch
