@@ -2115,6 +2115,10 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Click here to use the arrow keys</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Sending to the headset…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2810,6 +2814,18 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The wearer holds the hand up, and looks at the first drawing and at the second. The answers follow once both have been shown.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ask the wearer which drawing fits the hand better. Both can be shown again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the first and the second drawing before the answer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Blinded comparison</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2850,7 +2866,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>This session is open read-only.</source>
+        <source>This session is only shown. To record trials, resume it or calibrate again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
