@@ -118,7 +118,7 @@ class SeparateWindows(QObject):
 
     def show_library(self, folder: Path | None = None) -> LibraryWindow:
         """Show the sessions of a folder, by default of the session folder."""
-        folder = folder or Path(self._start.new.settings.sessions)
+        folder = folder or self._start.new.settings.sessions_path
         from handcal_gui.windows.library.window import LibraryWindow
 
         window = LibraryWindow(folder, self._window)
@@ -204,7 +204,7 @@ class SeparateWindows(QObject):
 
     def make_support_bundle(self) -> SupportDialog:
         """Open the dialog that writes a file to send with a bug report."""
-        sessions = Path(self._start.new.settings.sessions)
+        sessions = self._start.new.settings.sessions_path
         folder = self._current.folder
         settings = SupportSettings(folder, (sessions,))
         dialog = SupportDialog(settings, Path.home(), self._window)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from handcal.camera.color import ColorCamera, Tell
 from handcal.camera.folder import DESCRIPTION
 from handcal.camera.live import is_live, open_live
@@ -13,6 +11,7 @@ from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.ros import ros_recording
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera, open_viewpoint
+from handcal.io.files import user_path
 
 REALSENSE = "realsense"
 
@@ -49,7 +48,7 @@ def open_view_source(
         return ColorCamera(open_live(source), tell)
     if source.isdecimal():
         return open_viewpoint(int(source))
-    path = Path(source).expanduser()
+    path = user_path(source)
     is_folder = (path / DESCRIPTION).is_file() or ros_recording(path) is not None
     if is_folder or path.suffix.lower() in RECORDING_SUFFIXES:
         return ColorCamera(open_recording(path, playback), tell)

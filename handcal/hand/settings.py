@@ -11,6 +11,9 @@ _LEAST_POINTS, _MOST_POINTS = 200, 40_000
 NEARER_M = 0.05
 """A hand that the detector has seen may be this much nearer than the depth gate."""
 
+REACH_M = 0.20, 0.75
+"""Distances from the depth camera at which wearers can hold a hand under a cursor."""
+
 Roi = Literal["detector", "left", "right", "depth"]
 
 
@@ -46,6 +49,11 @@ class SegmentSettings:
     ends at the wrist, but part of the arm is needed to locate the wrist."""
     points: int = 5000
     """Approximate number of points of the cloud."""
+
+    @property
+    def reachable_m(self) -> tuple[float, float]:
+        """The part of the depth gate in which a wearer can hold a hand; empty if none is."""
+        return max(self.depth_min_m, REACH_M[0]), min(self.depth_max_m, REACH_M[1])
 
     def __post_init__(self) -> None:
         if not 0.0 < self.depth_min_m < self.depth_max_m:

@@ -24,6 +24,14 @@ _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}", re.DOTALL)
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
 
+def user_path(text: str | Path) -> Path:
+    """Return a path as typed, with ``~`` for a user's folder; that of no user stays as it is.
+
+    `Path.expanduser` raises RuntimeError then, which nobody expects of a typed path.
+    """
+    return Path(os.path.expanduser(text))  # noqa: PTH111
+
+
 def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write `data` so that `path` always holds either the old content or all of the new.
 

@@ -44,7 +44,10 @@ class FileLock:
         try:
             file = path.open("a+b", buffering=0)
         except OSError as error:
-            raise FileError(f"cannot lock {path}: {error.strerror or error}") from error
+            is_gone = isinstance(error, FileNotFoundError)
+            advice = "" if is_gone else "; let it be writable, or use a copy of it elsewhere"
+            why = error.strerror or error
+            raise FileError(f"cannot lock {path.parent}: {why}{advice}") from error
         try:
             _try_lock(file)
         except OSError as error:

@@ -11,6 +11,7 @@ from typing import Literal, TypeAlias
 
 from handcal.errors import FileError
 from handcal.hand.settings import Roi
+from handcal.io.files import user_path
 from handcal.types import Eye
 
 Size: TypeAlias = Literal["full", "quick"]
@@ -125,4 +126,4 @@ def output_folder(text: str) -> Path:
     """Return the folder for results; FileError if there is none."""
     if not text:
         raise FileError("choose a folder for the results")
-    return Path(text).expanduser().absolute()
+    return user_path(text).absolute()

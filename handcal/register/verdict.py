@@ -209,7 +209,8 @@ def judge(
     }
     for eye, (before, _) in measured.items():
         found = verdicts[eye]
-        told = f"the verification found an error of {before:.1f}′ and corrected it; {found.reason}"
+        corrected = "" if found.name == "keep" else " and corrected it"
+        told = f"the verification found an error of {before:.1f}′{corrected}; {found.reason}"
         if found.name in ("accept", "repeat", "keep"):
             verdicts[eye] = replace(found, reason=told)
     return verdicts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,16 +33,25 @@ class UnfinishedSession:
     """True if a repaired copy of this damaged session is in the same folder."""
 
 
-def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
-    """Return the unfinished sessions among the folders in `parent`, the newest first."""
+def unfinished_and_repaired(parent: Path) -> tuple[list[UnfinishedSession], set[Path]]:
+    """Return the unfinished sessions among the folders in `parent`, the newest first.
+
+    Also return the folders of all sessions, finished or not, of which it holds a repaired copy.
+    """
     outlines = {journal.parent: _outline(journal) for journal in parent.glob(f"*/{JOURNAL}")}
     copied = {began for began, names in outlines.values() if SessionEvent.REPAIRED in names}
-    found = [_inspect(path, *outline, copied) for path, outline in outlines.items()]
-    return sorted(
+    repaired = {
+        path
+        for path, (began, names) in outlines.items()
+        if began in copied and SessionEvent.REPAIRED not in names
+    }
+    found = [_inspect(path, *outline, path in repaired) for path, outline in outlines.items()]
+    unfinished = sorted(
         (session for session in found if session is not None),
         key=lambda session: (session.started, session.path.name),
         reverse=True,
     )
+    return unfinished, repaired
 
 
 def _outline(journal: Path) -> tuple[str, tuple[str, ...]]:
@@ -56,7 +64,7 @@ def _outline(journal: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _inspect(
-    path: Path, started: str, names: tuple[str, ...], copied: Collection[str]
+    path: Path, started: str, names: tuple[str, ...], has_copy: bool
 ) -> UnfinishedSession | None:
     if [name for name in names if name not in ASIDE][-1:] == [SessionEvent.FINISHED]:
         return None
@@ -65,7 +73,6 @@ def _inspect(
         record = Session.open(path)
     except FileError as error:
         return UnfinishedSession(path, started, problem=str(error))
-    is_original = bool(record.damaged) and SessionEvent.REPAIRED not in names
     return UnfinishedSession(
         path,
         started,
@@ -74,5 +81,5 @@ def _inspect(
         len(record.trials),
         len(record.facts.verified),
         len(record.damaged),
-        is_repaired=is_original and started in copied,
+        is_repaired=bool(record.damaged) and has_copy,
     )

@@ -34,7 +34,7 @@ def resume_or_create(settings: StationSettings, wearer: str, resume: Path | None
     rig = read_rig(settings.rig_path)
     station = settings_json(settings)
     stored = {"calibration": station.pop("calibration"), "station": station}
-    return Session.create(Path(settings.sessions), rig, stored, wearer=wearer)
+    return Session.create(settings.sessions_path, rig, stored, wearer=wearer)
 
 
 def with_session_prior(
@@ -167,5 +167,5 @@ def _lab_prior(settings: StationSettings) -> PriorSettings:
     prior = settings.calibration.solve.fuse.prior
     if not settings.learn_prior or prior.learned is not None:
         return prior
-    found = run_learn_prior(Path(settings.sessions), read_rig(settings.rig_path), prior)
+    found = run_learn_prior(settings.sessions_path, read_rig(settings.rig_path), prior)
     return replace(prior, learned=found.learned)

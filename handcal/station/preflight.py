@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from ipaddress import ip_address
@@ -15,6 +16,7 @@ from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.ros import ros_recording
 from handcal.camera.sdk_devices import choose_device, devices_by_child, librealsense
 from handcal.errors import HandcalError, LinkError
+from handcal.hand.settings import REACH_M
 from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
@@ -24,6 +26,9 @@ from handcal.rig.rig_file import read_rig
 from handcal.station.doctor import Finding, Health, examine_camera, examine_disk, with_rig
 from handcal.station.settings import StationSettings
 
+_LEAST_GATE_M = 0.15
+"""Least part of the depth gate within a wearer's reach: a hand, and room to move it."""
+_HALF_HAND_M, _ROUNDING_M = 0.05, 1e-6
 Part: TypeAlias = Literal["camera", "headset", "rig", "sessions"]
 PARTS: dict[Part, str] = {
     "camera": "Camera",
@@ -52,13 +57,39 @@ def check_station(
         "camera": _look("camera", lambda: _camera(settings, progress), "or use the simulator"),
         "headset": _look("headset", lambda: _headset(settings, pairing_key), "choose another port"),
         "rig": _look("rig", lambda: _rig(settings), "choose another rig file"),
-        "sessions": _look("sessions", lambda: _sessions(settings), "choose another folder"),
+        "sessions": check_sessions(settings),
     }
+
+
+def check_sessions(settings: StationSettings) -> Finding:
+    """Check the session folder; never raises. Takes long only on a slow network drive."""
+    return _look("sessions", lambda: _sessions(settings), "choose another folder")
 
 
 def is_ready(findings: Mapping[Part, Finding]) -> bool:
     """Return whether a station with these findings can be opened."""
     return all(finding.health is not Health.BROKEN for finding in findings.values())
+
+
+def gate_problem(settings: StationSettings) -> Finding | None:
+    """Return why no hand can be calibrated within the depth gate, or None."""
+    gate = settings.calibration.segment
+    near_m, far_m = gate.reachable_m
+    if far_m - near_m < _LEAST_GATE_M - _ROUNDING_M:
+        return _broken(
+            f"the depth gate, {gate.depth_min_m:.2f} to {gate.depth_max_m:.2f} m, leaves a hand "
+            "too little room",
+            f"let it contain at least {_LEAST_GATE_M:.2f} m of a wearer's reach, which is "
+            f"{REACH_M[0]:.2f} to {REACH_M[1]:.2f} m from the camera",
+        )
+    first_m = settings.plan.placement.nearest_m + _HALF_HAND_M
+    if settings.plan.name == "recommended" and far_m < first_m - _ROUNDING_M:
+        return _broken(
+            f"the depth gate ends at {gate.depth_max_m:.2f} m, before the cursors of the "
+            "recommended plan",
+            f"let it end at {first_m:.2f} m or beyond, or choose the paper's plan",
+        )
+    return None
 
 
 def _look(part: Part, look: Callable[[], Finding], advice: str) -> Finding:
@@ -86,6 +117,8 @@ def _broken(found: str, advice: str) -> Finding:
 
 
 def _camera(settings: StationSettings, progress: Progress) -> Finding:
+    if (problem := gate_problem(settings)) is not None:
+        return problem
     match settings.source:
         case "realsense":
             device = choose_device(devices_by_child(progress), settings.realsense.serial)
@@ -192,11 +225,13 @@ def _rig(settings: StationSettings) -> Finding:
 def _sessions(settings: StationSettings) -> Finding:
     if not settings.sessions:
         return _broken("no folder is chosen", "choose one")
-    folder = Path(settings.sessions).expanduser().absolute()
+    folder = settings.sessions_path.absolute()
     there = next(path for path in (folder, *folder.parents) if path.exists())
     if not there.is_dir():
         return _broken(f"{there} is a file", "choose a folder")
     if not os.access(there, os.W_OK | os.X_OK):
         return _broken(f"cannot write to {there}", "choose another folder")
+    if shutil.disk_usage(there).total == 0:  # such as /proc, which lets its owner write
+        return _broken(f"nothing can be stored in {there}", "choose another folder")
     disk = examine_disk(there)
     return disk if there == folder else replace(disk, found=f"{disk.found}; will be created")

@@ -9,6 +9,7 @@ from typing import Literal
 from handcal.camera.hololens2 import hololens2_settings
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
+from handcal.io.files import user_path
 from handcal.io.resources import resource_path
 from handcal.sim.hand import Side
 from handcal.station.faults import Fault
@@ -69,7 +70,12 @@ class StationSettings:
     @property
     def rig_path(self) -> Path:
         """Path of the rig file to read."""
-        return Path(self.rig) if self.rig else resource_path("example_rig.yaml")
+        return user_path(self.rig) if self.rig else resource_path("example_rig.yaml")
+
+    @property
+    def sessions_path(self) -> Path:
+        """Path of the folder for sessions."""
+        return user_path(self.sessions)
 
 
 def with_source(settings: StationSettings, source: str) -> StationSettings:

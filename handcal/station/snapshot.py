@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from handcal.camera.feed import CameraStatus
+from handcal.hand.settings import SegmentSettings
 from handcal.link.statistics import LinkStatistics
 from handcal.register.results import Results
 from handcal.session.comparison import Place
@@ -14,7 +15,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.hands import PlacedHand
 from handcal.station.plan import NextStep
 from handcal.station.procedure import Calibration
-from handcal.station.states import Observation, State
+from handcal.station.states import CalibrationSettings, Observation, State
 from handcal.station.verifying import VerifyingView
 from handcal.station.wearer_view import EyeView
 from handcal.types import Alignment, Eye, Float64, Frame, PlanName, Verification
@@ -42,6 +43,8 @@ class Procedure:
     """each (3,); φ that the headset renders with."""
     is_applied: bool
     """True if the headset has acknowledged it."""
+    segment: SegmentSettings = field(default_factory=SegmentSettings)
+    """Settings with which the hand is looked for."""
     plan: PlanName = "paper"
     next_step: NextStep | None = None
     """The plan's next step; None before the first frame."""
@@ -54,7 +57,10 @@ class Procedure:
 
 
 def read_procedure(
-    calibration: Calibration, guard_limit_rad: float, plan: PlanName, next_step: NextStep | None
+    calibration: Calibration,
+    settings: CalibrationSettings,
+    plan: PlanName,
+    next_step: NextStep | None,
 ) -> Procedure:
     """Return the present state of a calibration; the other arguments are as in `Procedure`."""
     return Procedure(
@@ -63,11 +69,12 @@ def read_procedure(
         cursor=calibration.cursor,
         refusal=calibration.refusal,
         refused=calibration.refused,
-        guard_limit_rad=guard_limit_rad,
+        guard_limit_rad=settings.guard.limit_rad,
         alignments=calibration.alignments,
         results=calibration.results,
         applied_shift_m=calibration.applied_shift_m,
         is_applied=calibration.is_applied,
+        segment=settings.segment,
         plan=plan,
         next_step=next_step,
         verifying=None if calibration.verifying is None else calibration.verifying.view(),

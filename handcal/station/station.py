@@ -213,7 +213,7 @@ class Station(Closable):
             contradiction=self._contradiction(observation),
             procedure=read_procedure(
                 self.calibration,
-                self.settings.calibration.guard.limit_rad,
+                self.settings.calibration,
                 self.plan.settings.name,
                 self._next_step,
             ),

@@ -124,7 +124,7 @@ class Conditions:
             if self.is_slow:
                 # Frames that the camera counted, but nobody took, are lost in this computer.
                 is_camera = self._is_usb and lost_hz == 0.0
-                self._slow_text = _slow_text(rate_hz, lost_hz, is_camera=is_camera)
+                self._slow_text = _slow_text(rate_hz, is_camera=is_camera)
 
     def _lost_hz(self, camera: CameraStatus, now_s: float) -> float:
         """Return the frames per second that were lost recently."""
@@ -135,12 +135,11 @@ class Conditions:
         return (camera.dropped - before) / max(now_s - since_s, _LOST_OVER_S)
 
 
-def _slow_text(rate_hz: float, lost_hz: float, *, is_camera: bool) -> str:
+def _slow_text(rate_hz: float, *, is_camera: bool) -> str:
+    """Return the warning; without the rate, which changes and which the camera panel shows."""
     if rate_hz >= _SLOW_HZ:
-        return tr(
-            "frames per second: only {:.0f} of the camera's {:.0f} are used; close other programs"
-        ).format(rate_hz, rate_hz + lost_hz)
+        return tr("fewer than two thirds of the camera's frames are used; close other programs")
     advice = tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
-    return tr("frames per second: only {:.0f} of the {:.0f} that are needed; {}").format(
-        rate_hz, _SLOW_HZ, advice
+    return tr("frames per second: often fewer than the {:.0f} that are needed; {}").format(
+        _SLOW_HZ, advice
     )

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidg
 
 from handcal.export.export import ExportSettings
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
+from handcal.io.files import user_path
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import number, with_name
@@ -91,7 +92,7 @@ class ExportChoices(QWidget):
     @property
     def folder(self) -> Path:
         """The parent folder chosen."""
-        return Path(self._folder.path).expanduser().absolute()
+        return user_path(self._folder.path).absolute()
 
     @property
     def target(self) -> Path:

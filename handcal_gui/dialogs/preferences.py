@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtGui import QIcon
+from PySide6.QtGui import QHideEvent, QIcon, QShowEvent
 from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QWidget
 
 from handcal.bridge.bridges import BridgeSettings
+from handcal.station.doctor import Finding, Health
+from handcal.station.preflight import check_sessions, gate_problem
+from handcal.station.settings import StationSettings
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
 from handcal_gui.widgets.fields import choice, number, whole_number, with_name
+from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import scrollable, vbox
 from handcal_gui.widgets.path_field import PathField
 
@@ -48,6 +53,8 @@ _LSL_HELP = tr(
 class PreferencesDialog(QDialog):
     """Theme, session folder, bridges, and the settings of future calibrations.
 
+    Settings with which no calibration could start are refused beside their fields.
+
     Parameters
     ----------
     preferences : Preferences
@@ -60,58 +67,35 @@ class PreferencesDialog(QDialog):
         self.setWindowTitle(tr("Preferences"))
         self._preferences = preferences
         self._theme = choice("theme", tr("Theme"), _THEMES)
-        self._theme.setCurrentIndex(self._theme.findData(preferences.theme))
         self._sessions = PathField(tr("Session folder"), "folder")
-        self._sessions.set_path(preferences.station.sessions)
+        self._sessions_found = FindingLine("sessions")
+        self._sessions_found.hide()
         self._calibration = CalibrationFields(explains=True)
-        self._calibration.show_settings(preferences.station.calibration)
         self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
-        self._target.setValue(preferences.station.calibration.solve.verdict.target_arcmin)
         self._learn = with_name(
             QCheckBox(tr("Learn from earlier sessions")), "learnPrior", help_text=_LEARN_HELP
         )
-        self._learn.setChecked(preferences.station.learn_prior)
-        bridges = preferences.bridges
-        hosts = {**_SLICER}
-        hosts.setdefault(bridges.slicer_host, bridges.slicer_host)  # typed into the file
+        host = preferences.bridges.slicer_host
+        hosts = _SLICER if host in _SLICER else {**_SLICER, host: host}  # typed into the file
         self._slicer = choice("slicer", "OpenIGTLink", hosts, _SLICER_HELP)
-        self._slicer.setCurrentIndex(self._slicer.findData(bridges.slicer_host))
         self._port = whole_number("slicerPort", 1, 65535, _PORT_HELP)
-        self._port.setValue(bridges.slicer_port)
-        self._port.setEnabled(bool(bridges.slicer_host))
         self._slicer.currentIndexChanged.connect(
             lambda: self._port.setEnabled(bool(self._slicer.currentData()))
         )
         self._lsl = with_name(QCheckBox(tr("Send events")), "lsl", help_text=_LSL_HELP)
-        self._lsl.setChecked(bridges.lsl)
-        add = self._calibration.add_row
-        add(
-            tr("Target"),
-            self._target,
-            tr("Largest expected error of an accepted eye; 60′ are 1°."),
+        self._buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Ok
+            | QDialogButtonBox.StandardButton.Cancel
+            | QDialogButtonBox.StandardButton.RestoreDefaults
         )
-        add(tr("Eye box"), self._learn, tr("Expects eyes where those of earlier wearers were."))
-        self._calibration.add_heading(tr("Sent to other programs, from the next calibration on"))
-        add("OpenIGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
-        add(tr("Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
-        add("LSL", self._lsl, tr("Marks events in recordings of other instruments."))
-        self._calibration.add_heading(tr("Program"))
-        add(tr("Theme"), self._theme, tr("Colours of all windows."))
-        add(tr("Session folder"), self._sessions)
-        buttons = QDialogButtonBox(
-            QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
-        )
-        for one in buttons.buttons():
-            one.setIcon(QIcon())  # like all other buttons
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        area = scrollable(self._calibration)
-        vbox((area, 1), buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
-        form, foot = self._calibration.sizeHint(), buttons.sizeHint()
-        self.resize(
-            form.width() + area.verticalScrollBar().sizeHint().width() + 4 * SPACING_PX,
-            form.height() + foot.height() + 6 * SPACING_PX,
-        )
+        self._lay_out()
+        self._is_accepting = self._is_folder_refused = False
+        self._check = LatestJob(check_sessions, self)
+        self._check.answered.connect(self._on_checked)
+        self._show(preferences)
+        self._sessions.changed.connect(self._on_folder_changed)
+        self._calibration.changed.connect(self._refresh)
+        self._refresh()
 
     def preferences(self) -> Preferences:
         """Return the preferences with the values shown."""
@@ -131,4 +115,94 @@ class PreferencesDialog(QDialog):
                 learn_prior=self._learn.isChecked(),
                 calibration=replace(calibration, solve=replace(solve, verdict=verdict)),
             ),
+        )
+
+    def accept(self) -> None:
+        """Close the dialog, unless the session folder is refused once it is checked."""
+        self._is_accepting = True
+        self._check_folder()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Check the session folder."""
+        super().showEvent(event)
+        self._check_folder()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Wait for the end of the check."""
+        super().hideEvent(event)
+        self._check.stop()
+
+    def _show(self, preferences: Preferences) -> None:
+        """Show the values of preferences."""
+        station, bridges = preferences.station, preferences.bridges
+        self._theme.setCurrentIndex(self._theme.findData(preferences.theme))
+        self._sessions.set_path(station.sessions)
+        self._calibration.show_settings(station.calibration)
+        self._target.setValue(station.calibration.solve.verdict.target_arcmin)
+        self._learn.setChecked(station.learn_prior)
+        self._slicer.setCurrentIndex(self._slicer.findData(bridges.slicer_host))
+        self._port.setValue(bridges.slicer_port)
+        self._port.setEnabled(bool(bridges.slicer_host))
+        self._lsl.setChecked(bridges.lsl)
+
+    def _on_folder_changed(self) -> None:
+        self._is_accepting = False
+        self._check_folder()
+
+    def _check_folder(self) -> None:
+        """Check the session folder in a job: it may be on a slow network."""
+        self._check.ask(replace(self._preferences.station, sessions=self._sessions.path))
+
+    def _on_checked(self, asked: StationSettings, found: Finding) -> None:
+        is_broken = found.health is Health.BROKEN
+        # A folder that was good once, as on a stick, does not keep the rest from being changed.
+        self._is_folder_refused = is_broken and asked != self._preferences.station
+        self._sessions_found.setVisible(is_broken)
+        self._sessions_found.show_finding(found)
+        is_accepting, self._is_accepting = self._is_accepting, False
+        self._refresh()
+        if is_accepting and self._ok.isEnabled():
+            super().accept()
+
+    def _refresh(self) -> None:
+        """Show what is wrong with the depth gate, and allow OK unless something is refused."""
+        problem = gate_problem(self.preferences().station)
+        self._calibration.show_gate_problem(problem)
+        self._ok.setEnabled(problem is None and not self._is_folder_refused)
+        for line in (self._calibration.gate_found, self._sessions_found):
+            if not line.isHidden():
+                self._area.ensureWidgetVisible(line)
+
+    def _lay_out(self) -> None:
+        add = self._calibration.add_row
+        add(
+            tr("Target"),
+            self._target,
+            tr("Largest expected error of an accepted eye; 60′ are 1°."),
+        )
+        add(tr("Eye box"), self._learn, tr("Expects eyes where those of earlier wearers were."))
+        self._calibration.add_heading(tr("Sent to other programs, from the next calibration on"))
+        add("OpenIGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
+        add(tr("Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
+        add("LSL", self._lsl, tr("Marks events in recordings of other instruments."))
+        self._calibration.add_heading(tr("Program"))
+        add(tr("Theme"), self._theme, tr("Colours of all windows."))
+        add(tr("Session folder"), self._sessions)
+        self._calibration.add_line(self._sessions_found)
+        buttons = self._buttons
+        for one in buttons.buttons():
+            one.setIcon(QIcon())  # like all other buttons
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        self._ok = buttons.button(QDialogButtonBox.StandardButton.Ok)
+        defaults = buttons.button(QDialogButtonBox.StandardButton.RestoreDefaults)
+        defaults.setText(tr("&Defaults"))
+        defaults.setToolTip(tr("Shows the default of every field; Cancel keeps the former values."))
+        defaults.clicked.connect(lambda: self._show(Preferences()))
+        self._area = area = scrollable(self._calibration)
+        vbox((area, 1), buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
+        form, foot = self._calibration.sizeHint(), buttons.sizeHint()
+        self.resize(
+            form.width() + area.verticalScrollBar().sizeHint().width() + 4 * SPACING_PX,
+            form.height() + foot.height() + 6 * SPACING_PX,
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QFormLayout, QWidget
 
+from handcal.io.files import user_path
 from handcal.progress import Progress
 from handcal.station.support import SupportSettings, run_support
 from handcal_gui.engine.jobs import Job
@@ -74,7 +75,7 @@ class SupportDialog(QDialog):
         """Write the bundle."""
         if self._job is not None:
             return
-        folder = Path(self._folder.path).expanduser()
+        folder = user_path(self._folder.path)
         output = folder / f"handcal-support-{date.today():%Y%m%d}.zip"
         frames = Path(self._frames.path) if self._frames.path else None
         settings = replace(self._settings, frames=frames)

@@ -10,11 +10,13 @@ from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from handcal.hand.settings import Roi
+from handcal.station.doctor import Finding
 from handcal.station.states import CalibrationSettings
 from handcal.types import Method
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, number
+from handcal_gui.widgets.finding_line import FindingLine
 
 _METHODS: dict[Method, str] = {
     "consistent": tr("Consistent (recommended)"),
@@ -56,6 +58,8 @@ class CalibrationFields(QWidget):
     Attributes
     ----------
     changed : Signal()
+    gate_found : FindingLine
+        The problem of the depth gate, hidden while there is none.
     """
 
     changed = Signal()
@@ -92,6 +96,8 @@ class CalibrationFields(QWidget):
         )
         self._roi = choice("roi", tr("Hand found by"), _ROIS, _ROI_HELP)
         self._method = choice("method", tr("Solver"), _METHODS, _METHOD_HELP)
+        self.gate_found = FindingLine("gate")
+        self.gate_found.hide()
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setHorizontalSpacing(2 * SPACING_PX if explains else SPACING_PX)
@@ -115,10 +121,12 @@ class CalibrationFields(QWidget):
                 self._far,
                 tr("Farthest distance of the hand from the depth camera."),
             ),
-            (tr("Hand found by"), self._roi, tr("Finds the hand in the camera's images.")),
-            (tr("Solver"), self._method, tr("Computes where the eyes are from each alignment.")),
         ):
             self.add_row(label, field, meaning)
+        self.add_line(self.gate_found)
+        self.add_row(tr("Hand found by"), self._roi, tr("Finds the hand in the camera's images."))
+        solves = tr("Computes where the eyes are from each alignment.")
+        self.add_row(tr("Solver"), self._method, solves)
         self._near.valueChanged.connect(self._push_far)
         self._far.valueChanged.connect(self._push_near)
         for field in (self._guard, self._near, self._far):
@@ -161,6 +169,16 @@ class CalibrationFields(QWidget):
         explained = QLabel(meaning)
         explained.setForegroundRole(QPalette.ColorRole.PlaceholderText)
         self._grid.addWidget(explained, row, 2)
+
+    def add_line(self, line: QWidget) -> None:
+        """Add a widget below that takes the whole width beside the labels."""
+        self._grid.addWidget(line, self._grid.rowCount(), 1, 1, 2)
+
+    def show_gate_problem(self, problem: Finding | None) -> None:
+        """Show what is wrong with the depth gate, below it."""
+        self.gate_found.setVisible(problem is not None)
+        if problem is not None:
+            self.gate_found.show_finding(problem)
 
     def add_heading(self, text: str) -> None:
         """Add a heading below, for the fields added next."""

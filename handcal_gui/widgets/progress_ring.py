@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors
@@ -14,14 +14,14 @@ _STEPS = 60
 
 
 class ProgressRing(QWidget):
-    """Shows a share from 0 to 1, or none, and a short text inside."""
+    """Shows a share from 0 to 1, or none, and two short texts inside, one below the other."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName(name)
         self.setAccessibleName(tr("Progress"))
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self._text = ""
+        self._text = self._unit = ""
         self._part: int | None = None
         self.set_diameter(8 * SPACING_PX)
 
@@ -32,23 +32,20 @@ class ProgressRing(QWidget):
 
     @property
     def text(self) -> str:
-        """The text inside."""
+        """The upper text inside."""
         return self._text
 
     def set_diameter(self, diameter_px: int) -> None:
         """Set the size."""
         self.setFixedSize(QSize(diameter_px, diameter_px))
-        font = self.font()
-        font.setPixelSize(diameter_px // 4)
-        self.setFont(font)
 
-    def show_share(self, share: float | None, text: str) -> None:
-        """Show a share and a text."""
+    def show_share(self, share: float | None, text: str, unit: str) -> None:
+        """Show a share, and a number with the name of what it counts."""
         part = None if share is None else round(_STEPS * share)
-        if (part, text) != (self._part, self._text):
-            self._part, self._text = part, text
+        if (part, text, unit) != (self._part, self._text, self._unit):
+            self._part, self._text, self._unit = part, text, unit
             filled = "" if part is None else f", {100 * part // _STEPS} %"
-            self.setAccessibleDescription(f"{text}{filled}")
+            self.setAccessibleDescription(f"{text} {unit}".rstrip() + filled)
             self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
@@ -67,4 +64,17 @@ class ProgressRing(QWidget):
             painter.setPen(pen)
             painter.drawArc(ring, 90 * 16, -round(360 * 16 * self._part / _STEPS))
         painter.setPen(self.palette().windowText().color())
-        painter.drawText(ring, Qt.AlignmentFlag.AlignCenter, self._text)
+        upper = ring.adjusted(0, 0, 0, -ring.height() / 4 if self._unit else 0)
+        self._write(painter, upper, self._text, self.width() // 4)
+        lower = ring.adjusted(1.3 * width, ring.height() / 2.2, -1.3 * width, -ring.height() / 6)
+        self._write(painter, lower, self._unit, self.width() // 6)
+
+    def _write(self, painter: QPainter, place: QRectF, text: str, height_px: int) -> None:
+        """Write a text in the middle of a place, smaller if it would not fit."""
+        font = self.font()
+        font.setPixelSize(height_px)
+        width_px = QFontMetricsF(font).horizontalAdvance(text)
+        if width_px > place.width():
+            font.setPixelSize(int(height_px * place.width() / width_px))
+        painter.setFont(font)
+        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)

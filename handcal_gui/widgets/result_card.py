@@ -56,16 +56,17 @@ def eye_results(results: Results) -> list[EyeResult]:
         if eye not in results.eyes:
             continue
         benefit, verdict = results.benefits[eye], results.verdicts[eye]
+        unused = tr("This result, not used") if verdict.name == "keep" else ""
         before = Bar(tr("Before, expected"), benefit.without_arcmin)
         if eye in results.measured_arcmin:
             verified, left = results.measured_arcmin[eye]
             bars = (
                 before,
                 Bar(tr("Verification found"), verified),
-                Bar(tr("After verification"), left),
+                Bar(unused or tr("After verification"), left),
             )
         else:
-            after = Bar(tr("After, expected"), benefit.after_arcmin)
+            after = Bar(unused or tr("After, expected"), benefit.after_arcmin)
             bars = before, after, Bar(tr("After, measured"), None)
         another = tr("One more alignment: {:.1f}′ expected").format(
             results.expected_after_another_arcmin[eye]

@@ -16,7 +16,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>frames per second: only {:.0f} of the camera&apos;s {:.0f} are used; close other programs</source>
+        <source>fewer than two thirds of the camera&apos;s frames are used; close other programs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -28,7 +28,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>frames per second: only {:.0f} of the {:.0f} that are needed; {}</source>
+        <source>frames per second: often fewer than the {:.0f} that are needed; {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -576,6 +576,14 @@ local network can read them.</source>
     </message>
     <message>
         <source>Colours of all windows.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Defaults</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Shows the default of every field; Cancel keeps the former values.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1141,6 +1149,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Use the usual gate</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Use the simulator</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1393,10 +1405,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>at forearm&apos;s length, 40 to 60 cm from the eyes</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Draws with a result that should not be used</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1418,10 +1426,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>No pose from the headset yet</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Put the headset on the wearer and wait until camera and headset are connected.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1581,6 +1585,30 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Put the headset on the wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Continue</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This session continues where it stopped, with {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Let the headset sit well on the wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The result of {} is used again: the wearer verifies each eye first, and alignments follow only if they are needed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} and wait until camera and headset are connected.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Send the projections to the headset; {} keeps the offline calibration.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1614,6 +1642,18 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset uses the offline calibration for {}: φ is 0 there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:.0f} to {:.0f} cm from the camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>at forearm&apos;s length, {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1765,15 +1805,19 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Alignments made; a full ring runs the next step</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Draw with the offline calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Hold</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>verified</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>aligned</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1783,6 +1827,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
     </message>
     <message>
         <source>E&amp;yes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments made, or eyes verified; a full ring runs the next step</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2064,6 +2112,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>An eye is being verified; confirm or skip that first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Click here to use the arrow keys</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2762,6 +2814,18 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The wearer holds the hand up, and looks at the first drawing and at the second. The answers follow once both have been shown.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ask the wearer which drawing fits the hand better. Both can be shown again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the first and the second drawing before the answer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Blinded comparison</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2802,7 +2866,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>This session is open read-only.</source>
+        <source>This session is only shown. To record trials, resume it or calibrate again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3322,6 +3386,10 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>not measured</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>This result, not used</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -1,3 +1,4 @@
+import errno
 import os
 import signal
 import subprocess
@@ -62,3 +63,14 @@ def test_a_lock_that_was_deleted_or_replaced_is_noticed(tmp_path: Path) -> None:
         lock.require_held()
     for one in (lock, other):
         one.release()
+
+
+def test_a_folder_that_cannot_be_written_says_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(FileError, match="Read-only file system; let it be writable, or use a copy"):
+        FileLock(tmp_path / "lock")

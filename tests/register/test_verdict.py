@@ -201,6 +201,11 @@ def test_a_verdict_tells_the_error_that_the_verification_found() -> None:
     told = judge(RIG, fused, advice, SETTINGS, measured=measured)["left"].reason
     found = f"the verification found an error of {before_arcmin:.1f}′ and corrected it; "
     assert told.startswith(found)
+    unmoved = _fused({"left": replace(GOOD, shift_m=np.array([0.0002, 0.0, 0.0]))})
+    advice = {"left": advise(RIG, unmoved, "left", SETTINGS)}
+    kept = judge(RIG, unmoved, advice, SETTINGS, measured=measured)["left"]
+    assert kept.name == "keep"
+    assert kept.reason.startswith(f"the verification found an error of {before_arcmin:.1f}′; the")
 
 
 def test_what_is_hardly_better_than_nothing_keeps_the_offline_calibration() -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 from handcal.rig.example import example_rig
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
-from handcal.session.unfinished import unfinished_sessions
+from handcal.session.unfinished import unfinished_and_repaired
 from handcal.types import Alignment
 
 
@@ -28,7 +28,7 @@ def test_only_those_not_finished_are_listed_the_newest_first(
     (tmp_path / "other").mkdir()
     (tmp_path / "file").write_text("not a folder")
 
-    newest, oldest = unfinished_sessions(tmp_path)
+    newest, oldest = unfinished_and_repaired(tmp_path)[0]
     assert (newest.path, oldest.path) == (tmp_path / "a-second", tmp_path / "b-first")
     assert (oldest.wearer, oldest.alignments, oldest.trials, oldest.problem) == ("P7", 1, 0, "")
     assert oldest.started == Session.open(oldest.path).events[0].time
@@ -47,8 +47,8 @@ def test_a_session_that_cannot_be_resumed_gives_the_reason(
     (tmp_path / "foreign" / "journal.jsonl").write_text(event + "\n")
     (tmp_path / "empty" / "journal.jsonl").write_text("")
     with make(tmp_path, "running"):
-        problems = {one.path.name: one.problem for one in unfinished_sessions(tmp_path)}
-        parts = {one.path.name: one.damaged for one in unfinished_sessions(tmp_path)}
+        problems = {one.path.name: one.problem for one in unfinished_and_repaired(tmp_path)[0]}
+        parts = {one.path.name: one.damaged for one in unfinished_and_repaired(tmp_path)[0]}
     assert set(problems) == {"damaged", "foreign", "empty", "running"}
     assert (problems["damaged"], parts["damaged"]) == ("", 1)
     assert "has version 9" in problems["foreign"]
@@ -65,13 +65,17 @@ def test_a_damaged_session_knows_of_its_repaired_copy(tmp_path: Path, alignment:
     for name in ("one", "other"):
         (tmp_path / name / "alignments" / "1.npz").unlink()
     repair_session(tmp_path / "one", tmp_path / "copy")
-    found = {session.path.name: session.is_repaired for session in unfinished_sessions(tmp_path)}
+    found = {
+        session.path.name: session.is_repaired for session in unfinished_and_repaired(tmp_path)[0]
+    }
     assert found == {"one": True, "copy": False, "other": False}
     with Session(tmp_path / "copy") as copy:
         copy.finish()
-    found = {session.path.name: session.is_repaired for session in unfinished_sessions(tmp_path)}
+    found = {
+        session.path.name: session.is_repaired for session in unfinished_and_repaired(tmp_path)[0]
+    }
     assert found == {"one": True, "other": False}
 
 
 def test_a_folder_that_is_not_there_has_none(tmp_path: Path) -> None:
-    assert unfinished_sessions(tmp_path / "missing") == []
+    assert unfinished_and_repaired(tmp_path / "missing")[0] == []

@@ -21,12 +21,14 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.sdk_devices import Device
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.errors import LinkError
+from handcal.hand.settings import SegmentSettings
 from handcal.io.resources import resource_path
 from handcal.link.pairing import new_pairing_key
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.station import preflight
 from handcal.station.doctor import Finding, Health
+from handcal.station.plan import PlanSettings
 from handcal.station.preflight import PARTS, Part, check_station, is_ready
 from handcal.station.settings import StationSettings, with_source
 from handcal.types import CameraIdentity, Frame, Intrinsics
@@ -277,3 +279,42 @@ def test_the_session_folder_must_take_a_session(
     full = shutil.disk_usage(tmp_path)._replace(free=100 * 2**20)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
     assert find("sessions", settings).health is Health.BROKEN
+
+
+def _with_gate(settings: StationSettings, near_m: float, far_m: float) -> StationSettings:
+    segment = SegmentSettings(depth_min_m=near_m, depth_max_m=far_m)
+    return replace(settings, calibration=replace(settings.calibration, segment=segment))
+
+
+def test_a_depth_gate_without_room_for_a_hand_is_refused(settings: StationSettings) -> None:
+    for near_m, far_m in ((0.90, 0.95), (0.10, 0.30), (0.40, 0.50), (0.65, 2.0)):
+        found = find("camera", _with_gate(settings, near_m, far_m))
+        assert found.health is Health.BROKEN
+        assert f"{near_m:.2f} to {far_m:.2f} m, leaves a hand too little room" in found.found
+    assert find("camera", _with_gate(settings, 0.6, 2.0)).health is Health.GOOD
+    near = _with_gate(settings, 0.20, 0.40)
+    assert find("camera", near).health is Health.GOOD
+    planned = replace(near, plan=PlanSettings("recommended"))
+    assert "before the cursors of the recommended plan" in find("camera", planned).found
+
+
+def test_a_folder_of_the_user_is_the_same_checked_and_used(
+    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    mine = replace(settings, sessions="~/mine", rig="~/rig.yaml")
+    assert (mine.sessions_path, mine.rig_path) == (tmp_path / "mine", tmp_path / "rig.yaml")
+    assert "will be created" in find("sessions", mine).found
+    nobody = replace(settings, sessions="~nosuchuser/mine")
+    assert nobody.sessions_path == Path("~nosuchuser/mine")
+    assert find("sessions", nobody).found
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="Linux has it")
+def test_a_folder_that_is_on_no_disk_is_refused(
+    settings: StationSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: True)  # as for root
+    found = find("sessions", replace(settings, sessions="/proc/x"))
+    assert (found.health, found.found) == (Health.BROKEN, "nothing can be stored in /proc")

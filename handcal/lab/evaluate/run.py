@@ -11,7 +11,7 @@ from typing import Any
 from handcal.errors import FileError, HandcalError
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
-from handcal.io.files import make_folder, require_suffix
+from handcal.io.files import make_folder, require_suffix, user_path
 from handcal.io.images import write_png
 from handcal.io.resources import resource_path
 from handcal.lab.evaluate.cube_report import cube_report
@@ -92,7 +92,7 @@ def run_cube_test(settings: CubeTestSettings, progress: Progress = Progress()) -
     """
     output = free_of_studies(output_folder(settings.output))
     if settings.captures:
-        folder = Path(settings.captures).expanduser()
+        folder = user_path(settings.captures)
         return _evaluate_captures(settings, folder, output, progress, 0.0)
     with TemporaryDirectory() as rendered:
         render_captures(settings, Path(rendered), progress.part(0.0, _RENDERING))
@@ -130,7 +130,7 @@ def run_user_test(settings: UserTestSettings, progress: Progress = Progress()) -
         If no session holds a trial, or the results would go into a study's folder.
     """
     output = free_of_studies(output_folder(settings.output))
-    folders = [Path(folder).expanduser() for folder in settings.folders]
+    folders = [user_path(folder) for folder in settings.folders]
     test = read_user_test(folders, progress.part(0.0, _READING))
     result = evaluate_user_test(test)
     report = user_test_report(test, result)
@@ -151,11 +151,11 @@ def run_segmentation_test(
         If a file cannot be used or written, or the report would go into a study's folder.
     """
     output = free_of_studies(output_folder(settings.output)) if settings.output else None
-    sheet = Path(settings.sheet).expanduser() if settings.sheet else None
+    sheet = user_path(settings.sheet) if settings.sheet else None
     if sheet is not None:  # before the long work, whose result would be lost
         require_suffix(sheet, ".png")
         make_folder(sheet.parent)
-    folder = Path(settings.folder).expanduser()
+    folder = user_path(settings.folder)
     segmenting = SegmentSettings(roi=settings.roi)
     described = read_masked_names(folder)
     rows, tiles = [], []
@@ -231,4 +231,4 @@ def _rig(settings: CubeTestSettings) -> Rig:
 
 
 def _file(chosen: str, otherwise: Path) -> Path:
-    return Path(chosen).expanduser() if chosen else otherwise
+    return user_path(chosen) if chosen else otherwise

@@ -11,7 +11,7 @@ from handcal.errors import FileError
 from handcal.io.files import modified_s
 from handcal.session.library import EyeOutcome, eye_outcomes
 from handcal.session.record import replay
-from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
+from handcal.session.unfinished import UnfinishedSession, unfinished_and_repaired
 from handcal.types import Eye
 from handcal_gui.preferences import MOST_RECENT
 from handcal_gui.translation import tr
@@ -50,19 +50,22 @@ class KnownSessions:
 def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
     """Return the unfinished sessions in a folder, and the recent ones; may take a while.
 
-    Recent are those opened last, then the newest others in the folder. Empty sessions are left out.
+    Recent are those opened last, then the newest others in the folder. Left out are empty sessions,
+    and damaged ones of which there is a repaired copy: the library names both.
     """
-    unfinished = unfinished_sessions(folder)
+    unfinished, repaired = unfinished_and_repaired(folder)
     listed = {path.absolute() for path in (*recent, *(session.path for session in unfinished))}
     journals = sorted(folder.glob("*/journal.jsonl"), key=modified_s, reverse=True)
     others = (path.parent for path in journals if path.parent.absolute() not in listed)
-    offered = (_recent(path) for path in chain(recent, others) if path.exists())
+    hidden = {path.absolute() for path in repaired}
+    found = (path for path in chain(recent, others) if path.absolute() not in hidden)
+    offered = (_recent(path) for path in found if path.exists())
     return KnownSessions(
         unfinished=tuple(
             _unfinished(session)
             for session in unfinished
             if (session.problem or session.alignments or session.verified or session.trials)
-            and not session.is_repaired  # its copy is resumed; the library names both
+            and not session.is_repaired
         ),
         recent=tuple(islice((entry for entry in offered if entry is not None), MOST_RECENT)),
     )

@@ -175,12 +175,12 @@ class StartPage(QWidget):
             text.setVisible(is_high)
 
     def _look_in_another_folder(self) -> None:
-        if Path(self.new.settings.sessions) != self._folder:
+        if self.new.settings.sessions_path != self._folder:
             self.look_for_sessions()
 
     def look_for_sessions(self) -> None:
         """Search for sessions again."""
-        self._folder = Path(self.new.settings.sessions)
+        self._folder = self.new.settings.sessions_path
         self._find.ask((self._folder, self._recent))
 
     def _show_sessions(self, _question: object, offers: KnownSessions) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QWidget
 
+from handcal.hand.settings import SegmentSettings
 from handcal.station.doctor import Finding, Health
-from handcal.station.preflight import PARTS, Part
+from handcal.station.preflight import PARTS, Part, gate_problem
 from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.advanced_fields import AdvancedFields
 from handcal_gui.pages.start.camera_field import CameraField
@@ -155,9 +156,12 @@ def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:
     grid.addWidget(field, row, 1)
 
 
-def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, dict[str, str]]:
+def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, dict[str, Any]]:
     """Return a fix for a part: a button's label and changed settings; empty if there is none."""
     is_broken = finding.health is Health.BROKEN
+    if part == "camera" and gate_problem(settings) is not None:
+        usual = replace(settings.calibration, segment=SegmentSettings())
+        return tr("Use the usual gate"), {"calibration": usual}
     is_simulated, is_virtual = settings.source == "simulator", settings.headset == "virtual"
     if part == "camera" and is_broken:
         return tr("Use the simulator"), {"source": "simulator", "headset": "virtual"}

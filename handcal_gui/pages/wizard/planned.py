@@ -19,11 +19,13 @@ from handcal_gui.pages.wizard.step_views import (
     UNUSABLE,
     align_view,
     connect_view,
+    distance,
     eye_names,
+    kept_fact,
     save_view,
     verification_view,
 )
-from handcal_gui.pages.wizard.steps import DISTANCE, Wizard
+from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import EYE_WORDS, Action, ButtonSpec, Step, WizardView
 from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
@@ -47,6 +49,8 @@ _STATES = {
 }
 _FOLLOWS = Step.SHOW_HAND
 """The guide's own step while the plan continues."""
+_OMITTED = frozenset({Step.MAKE_CURSOR, Step.ALIGN, Step.SOLVE})
+"""Steps that a session which begins with a stored result does without."""
 _WAITS_FOR_HAND, _SENDING = tr("Waiting for the hand…"), tr("Sending…")
 _VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
     "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify l&eft eye")),
@@ -103,6 +107,11 @@ class PlannedWizard(Wizard):
 
     def view(self, snapshot: Snapshot) -> WizardView:
         """Return the view of a snapshot."""
+        view = self._view(snapshot)
+        is_former = snapshot.record.facts.former and not snapshot.procedure.alignments
+        return replace(view, omitted=_OMITTED) if is_former else view
+
+    def _view(self, snapshot: Snapshot) -> WizardView:
         step, procedure = self.step(snapshot), snapshot.procedure
         if step is Step.CONNECT:
             return connect_view(snapshot)
@@ -137,7 +146,7 @@ class PlannedWizard(Wizard):
             Step.SHOW_HAND,
             tr(
                 "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
-            ).format(DISTANCE),
+            ).format(distance(snapshot)),
             (hand_found(snapshot), hand_still(snapshot)),
             ButtonSpec(Action.TAKE_STEP, _WAITS_FOR_HAND, False),
             others,
@@ -230,11 +239,12 @@ class PlannedWizard(Wizard):
                 *(_VERIFY_AGAIN[eye] for eye in self.usable_eyes),
             ),
             snapshot.problem,
-            fact=_drawn_otherwise(procedure),
+            fact=_drawn_otherwise(procedure) or kept_fact(procedure),
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:
-        view = replace(save_view(snapshot), fact=_drawn_otherwise(snapshot.procedure))
+        view = save_view(snapshot)
+        view = replace(view, fact=_drawn_otherwise(snapshot.procedure) or view.fact)
         if not snapshot.record.is_finished:
             return view
         slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handcal.station.snapshot import Snapshot
+from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName
@@ -34,6 +34,9 @@ SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _LEAST_LOOK_NS = 1_500_000_000
 """Time from a drawing to its confirmation: a second press of a key confirms nothing unseen."""
+_GATE_MARGIN_M = 0.05
+"""From the depth gate to where the hand is to be held: its palm, with fingers before and behind."""
+_FOREARM_M = 0.45
 _SENDS_UNUSABLE = tr("Draws with a result that should not be used")
 
 
@@ -58,11 +61,23 @@ def connect_view(snapshot: Snapshot) -> WizardView:
     is_ready = all(one.holds for one in preconditions)
     if snapshot.contradiction and not camera.problem:
         preconditions = (Precondition(sentence(snapshot.contradiction), False), *preconditions[1:])
+    procedure, former = snapshot.procedure, snapshot.record.facts.former
+    puts_on, label, fact = tr("Put the headset on the wearer"), tr("Begin"), ""
+    if begun := _made(procedure):
+        label = tr("Continue")
+        fact = tr("This session continues where it stopped, with {}.").format(begun)
+    elif former:
+        puts_on = tr("Let the headset sit well on the wearer")
+        fact = tr(
+            "The result of {} is used again: the wearer verifies each eye first, and alignments "
+            "follow only if they are needed."
+        ).format(former)
     return WizardView(
         Step.CONNECT,
-        tr("Put the headset on the wearer and wait until camera and headset are connected."),
+        tr("{} and wait until camera and headset are connected.").format(puts_on),
         preconditions,
-        ButtonSpec(Action.NEXT, tr("Begin"), is_ready),
+        ButtonSpec(Action.NEXT, label, is_ready),
+        fact=fact,
     )
 
 
@@ -194,8 +209,9 @@ def save_view(snapshot: Snapshot) -> WizardView:
         *eyes_accepted(snapshot),
     )
     others = (ButtonSpec(Action.EXPORT, tr("E&xport…")), ButtonSpec(Action.BACK, tr("&Back")))
-    is_accepted = len(preconditions) > 1 and all(one.holds for one in preconditions[1:])
-    is_verified = is_accepted and len(snapshot.procedure.verifications) == len(preconditions) - 1
+    judged = preconditions[1:]
+    is_settled = bool(judged) and all(one.verdict in ("accept", "keep") for one in judged)
+    is_verified = is_settled and len(snapshot.procedure.verifications) == len(judged)
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
     if snapshot.record.is_finished:
         return WizardView(
@@ -204,6 +220,7 @@ def save_view(snapshot: Snapshot) -> WizardView:
             preconditions,
             ButtonSpec(Action.NEXT_WEARER, tr("Next wearer")),
             others,
+            fact=kept_fact(snapshot.procedure),
             unearned=unearned,
         )
     return WizardView(
@@ -213,9 +230,41 @@ def save_view(snapshot: Snapshot) -> WizardView:
         ButtonSpec(Action.FINISH, tr("Finish session")),
         others,
         snapshot.problem,
+        fact=kept_fact(snapshot.procedure),
         runs_after_s=None if snapshot.problem else READ_S,
         unearned=unearned,
     )
+
+
+def kept_fact(procedure: Procedure) -> str:
+    """Return which eyes have the offline calibration by their verdicts; empty if none."""
+    results = procedure.results
+    if results is None or procedure.state is not State.APPLIED:
+        return ""
+    kept = tuple(eye for eye, verdict in results.verdicts.items() if verdict.name == "keep")
+    if not kept:
+        return ""
+    return tr("The headset uses the offline calibration for {}: φ is 0 there.").format(
+        eye_names(kept)
+    )
+
+
+def _made(procedure: Procedure) -> str:
+    """Return the alignments and verifications so far, in words; empty if there are none."""
+    held = (
+        (len(procedure.alignments), tr("alignment"), tr("alignments")),
+        (len(procedure.verifications), tr("verified eye"), tr("verified eyes")),
+    )
+    return ", ".join(pluralize(*one) for one in held if one[0])
+
+
+def distance(snapshot: Snapshot) -> str:
+    """Return how far from the camera the hand is to be held within the depth gate, in words."""
+    gate_m = snapshot.procedure.segment.reachable_m
+    near_m, far_m = gate_m[0] + _GATE_MARGIN_M, gate_m[1] - _GATE_MARGIN_M
+    text = tr("{:.0f} to {:.0f} cm from the camera").format(100 * near_m, 100 * far_m)
+    is_forearm = near_m <= _FOREARM_M <= far_m
+    return tr("at forearm's length, {}").format(text) if is_forearm else text
 
 
 def eye_names(eyes: Sequence[Eye]) -> str:

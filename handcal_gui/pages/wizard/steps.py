@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 from handcal.register.verdict import Advice
 from handcal.station.snapshot import Snapshot
@@ -23,7 +24,9 @@ from handcal_gui.pages.wizard.step_views import (
     UNUSABLE,
     align_view,
     connect_view,
+    distance,
     eye_names,
+    kept_fact,
     save_view,
     solve_view,
     verification_view,
@@ -44,7 +47,6 @@ PLANS: dict[EyePlan, str] = {
     "left": tr("Left eye only"),
     "right": tr("Right eye only"),
 }
-DISTANCE = tr("at forearm's length, 40 to 60 cm from the eyes")
 _MOST_BY_ITSELF = 2
 """Most further alignments of an eye that are begun without asking."""
 
@@ -139,7 +141,8 @@ class Wizard:
             case Step.SOLVE:
                 return solve_view(snapshot)
             case Step.VERIFY:
-                return self._verify(snapshot)
+                view = self._verify(snapshot)
+                return replace(view, fact=view.fact or kept_fact(snapshot.procedure))
             case Step.SAVE:
                 return save_view(snapshot)
 
@@ -166,7 +169,7 @@ class Wizard:
         return WizardView(
             Step.SHOW_HAND,
             tr("Raise one bare hand {}, palm toward you and fingers a little apart.").format(
-                DISTANCE
+                distance(snapshot)
             ),
             (hand_found(snapshot),),
             ButtonSpec(Action.NEXT, tr("Next"), is_placed(snapshot)),

@@ -130,3 +130,5 @@ class WizardView:
     """Time until the enabled main button is pressed automatically; None if never."""
     unearned: frozenset[Step] = frozenset()
     """Earlier steps that were left without what they are for."""
+    omitted: frozenset[Step] = frozenset()
+    """Steps that this session has not needed so far."""

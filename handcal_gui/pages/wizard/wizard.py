@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from functools import partial
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
@@ -250,12 +249,20 @@ class WizardPanel(QWidget):
         """Press the main button once an automatic step has waited long enough."""
         now_s = 1e-9 * snapshot.t_host_ns
         share = self._automatic.share(view, now_s)
-        done = len(snapshot.procedure.alignments)
-        planned = 2 if self.wizard.plan == "each" else 1
-        self._ring.show_share(share, f"{done}/{max(planned, done)}")
+        self._ring.show_share(share, *self._count(snapshot, view))
         if share == 1.0 and QApplication.activeModalWidget() is None:
             self._automatic.note_pressed(now_s)
             self.press_main()
+
+    def _count(self, snapshot: Snapshot, view: WizardView) -> tuple[str, str]:
+        """Return the alignments made and planned, or the eyes verified, and their name."""
+        procedure = snapshot.procedure
+        if view.omitted:
+            eyes = len(self.wizard.usable_eyes) if isinstance(self.wizard, PlannedWizard) else 2
+            return f"{len(procedure.verifications)}/{eyes}", tr("verified")
+        done = len(procedure.alignments)
+        planned = 2 if self.wizard.plan == "each" else 1
+        return f"{done}/{max(planned, done)}", tr("aligned")
 
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
@@ -282,7 +289,9 @@ class WizardPanel(QWidget):
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addSpacing(SPACING_PX)
         layout.addLayout(head)
-        self._ring.setToolTip(tr("Alignments made; a full ring runs the next step"))
+        self._ring.setToolTip(
+            tr("Alignments made, or eyes verified; a full ring runs the next step")
+        )
         texts = vbox(
             self._sentence, *self._rows, self._fact, self._note, 0, spacing=SPACING_PX // 2
         )
@@ -294,7 +303,7 @@ class WizardPanel(QWidget):
         view = self.shown
         if view is None:
             return
-        self._rail.show_step(view.step, view.unearned)
+        self._rail.show_step(view)
         self._title.setText(view.step.label)
         self._sentence.setText(view.sentence)
         # The result card gives the verdicts, with their reasons.
@@ -349,11 +358,13 @@ class _Rail(QWidget):
         """Set the gap between steps."""
         self._row.setSpacing(gap_px)
 
-    def show_step(self, present: Step, unearned: Collection[Step]) -> None:
+    def show_step(self, view: WizardView) -> None:
+        present = view.step
         place = STEPS.index(present)
         for i, (step, label) in enumerate(self._labels.items()):
-            mark, color = ("✓ ", colors().good) if i < place else ("", colors().muted)
-            if step in unearned:
+            is_done = i < place and step not in view.omitted
+            mark, color = ("✓ ", colors().good) if is_done else ("", colors().muted)
+            if step in view.unearned:
                 mark, color = "– ", colors().warning
             label.setText(f"{mark}{step.label}")
             if step is present:

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
     QButtonGroup,
     QComboBox,
     QFrame,
@@ -23,12 +25,12 @@ from PySide6.QtWidgets import (
 from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
 from handcal.rig_types import Rig
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import MAX_HAND_SET_SHIFT_M, State
+from handcal.station.states import MAX_HAND_SET_SHIFT_M
 from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
-from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream
+from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream, find_obstacle
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
@@ -50,13 +52,7 @@ _KEYS = tr(
     "Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). "
     "Click here first; E changes the eye."
 )
-_OBSTACLES = {
-    State.ALIGN: tr("Confirm the alignment, solve and apply it first."),
-    State.ALIGNED: tr("Solve and apply the alignment first."),
-    State.SOLVED: tr("Apply the solved projections first."),
-    State.APPLYING: tr("The headset is receiving the solved projections."),
-    State.VERIFY: tr("An eye is being verified; confirm or skip that first."),
-}
+_CLICK = tr("Click here to use the arrow keys")
 _ARRIVALS = {
     Arrival.SENDING: ("wait", tr("Sending to the headset…")),
     Arrival.ARRIVED: ("check", tr("In the headset")),
@@ -140,14 +136,17 @@ class FineTunePanel(QWidget):
         """Show the headset's φ, unless it was set here, and whether it has arrived."""
         results = snapshot.procedure.results
         solved = {eye: shift.shift_m for eye, shift in results.eyes.items()} if results else {}
-        obstacle = _obstacle(snapshot)
+        obstacle = find_obstacle(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:
             self._begin(snapshot.procedure.applied_shift_m)
         if is_new or obstacle != self._obstacle or not same_shifts(solved, self._solved):
             self._obstacle, self._solved = obstacle, solved
             self._refresh()
-        self._show_status(*(("wait", obstacle) if obstacle else _ARRIVALS[self._stream.arrival]))
+        arrival = self._stream.arrival
+        sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
+        is_calm = self._is_editable() and arrival is Arrival.ARRIVED
+        self._show_status(sign, _CLICK if is_calm and not self._has_keys() else text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Move the selected eye by arrow keys."""
@@ -159,10 +158,23 @@ class FineTunePanel(QWidget):
             eye = next(eye for eye in EYES if self._editors[eye].chosen.isChecked())
             self._move(eye, axis, direction * self.step_m)
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Take the arrow keys from buttons, which would pass the focus on."""
+        if not (isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress):
+            return super().eventFilter(watched, event)
+        is_move = event.key() in _MOVES
+        if is_move:
+            self.keyPressEvent(event)
+        return is_move
+
     def hideEvent(self, event: QHideEvent) -> None:
         """End any comparison, so that the headset keeps φ as set."""
         super().hideEvent(event)
         self.settle()
+
+    def _has_keys(self) -> bool:
+        focused = QApplication.focusWidget()
+        return focused is self or (focused is not None and self.isAncestorOf(focused))
 
     def _draw_icons(self) -> None:
         for action, name in ((self._undo, "undo"), (self._redo, "redo")):
@@ -348,6 +360,8 @@ class FineTunePanel(QWidget):
         status = _row(self._sign, self._status)
         status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 4)
         vbox((_ControlsArea(controls), 1), status, on=self, margins=0)
+        for one in self.findChildren(QAbstractButton):
+            one.installEventFilter(self)
 
 
 class _ControlsArea(QScrollArea):
@@ -384,10 +398,3 @@ def _row(*items: QWidget | QAction | None, spacing: int = SPACING_PX) -> QHBoxLa
     """Return a row of widgets and buttons for actions; None is a stretch."""
     made = (tool_button(one) if isinstance(one, QAction) else one or 1 for one in items)
     return hbox(*made, spacing=spacing)
-
-
-def _obstacle(snapshot: Snapshot) -> str:
-    """Return the reason why φ cannot be set by hand now; empty if it can."""
-    if not snapshot.link.connected:
-        return snapshot.link_problem or tr("The headset is not connected; see Link.")
-    return _OBSTACLES.get(snapshot.procedure.state, "")

@@ -8,11 +8,20 @@ from enum import Enum
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
+from handcal_gui.translation import tr
 
 PERIOD_MS = 33
 SETTLE_MS = 700
 _LATE_NS = 2_000_000_000
+_OBSTACLES = {
+    State.ALIGN: tr("Confirm the alignment, solve and apply it first."),
+    State.ALIGNED: tr("Solve and apply the alignment first."),
+    State.SOLVED: tr("Apply the solved projections first."),
+    State.APPLYING: tr("The headset is receiving the solved projections."),
+    State.VERIFY: tr("An eye is being verified; confirm or skip that first."),
+}
 
 
 class Arrival(Enum):
@@ -97,3 +106,10 @@ def _timer(parent: QObject, interval_ms: int) -> QTimer:
     timer.setSingleShot(True)
     timer.setInterval(interval_ms)
     return timer
+
+
+def find_obstacle(snapshot: Snapshot) -> str:
+    """Return the reason why φ cannot be set by hand now; empty if it can."""
+    if not snapshot.link.connected:
+        return snapshot.link_problem or tr("The headset is not connected; see Link.")
+    return _OBSTACLES.get(snapshot.procedure.state, "")

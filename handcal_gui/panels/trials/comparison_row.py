@@ -24,6 +24,14 @@ _COMPARE_HELP = tr(
 )
 
 
+_LOOK = tr(
+    "The wearer holds the hand up, and looks at the first drawing and at the second. The answers "
+    "follow once both have been shown."
+)
+_ASK = tr("Ask the wearer which drawing fits the hand better. Both can be shown again.")
+_NOT_YET = tr("Show the first and the second drawing before the answer")
+
+
 class ComparisonRow(QWidget):
     """Begins blinded comparisons, switches between the drawings, and takes the answer.
 
@@ -58,8 +66,10 @@ class ComparisonRow(QWidget):
             one.clicked.connect(lambda _=False, place=place: self._ask(place))
         for answer, one in self._answers.items():
             one.clicked.connect(lambda _=False, answer=answer: self.answered.emit(answer))
+        self._how = paragraph("comparisonHow")
         self._running = QWidget()
         vbox(
+            self._how,
             hbox(*self._show.values(), self._end, 1, spacing=SPACING_PX),
             hbox(*self._answers.values(), 1, spacing=SPACING_PX),
             on=self._running,
@@ -86,8 +96,10 @@ class ComparisonRow(QWidget):
         )
         for place, one in self._show.items():
             one.setChecked(place == shown)
+        self._how.setText(_ASK if has_seen_both else _LOOK)
         for one in self._answers.values():
             one.setEnabled(has_seen_both)
+            one.setToolTip("" if has_seen_both else _NOT_YET)
 
     def _ask(self, place: Place) -> None:
         """Request a drawing; its button is checked once the station shows it."""

@@ -166,7 +166,7 @@ class TrialsPanel(QWidget):
     def _obstacle(self) -> str:
         """Return the reason why no trial can be recorded now; empty if one can."""
         if self._is_read_only:
-            return tr("This session is open read-only.")
+            return tr("This session is only shown. To record trials, resume it or calibrate again.")
         if self._snapshot is None:
             return tr("Trials are recorded while a session runs.")
         procedure, eye = self._snapshot.procedure, self._next_eye()

@@ -149,7 +149,12 @@ class EyeCanvas(QWidget):
         """Return the transform that fits the crop into the widget, close to the title above."""
         crop, display = self._shown, _display(self._view) if self._view else self._shown
         scale = min(self.width() / crop.width(), self.height() / crop.height())
-        left = self.width() / 2 - scale * crop.center().x()
+        # A display that fits is centred, as its title is: one that follows the hand would jump.
+        is_whole = scale * display.width() <= self.width()
+        middle = display.center().x() if is_whole else crop.center().x()
+        left = self.width() / 2 - scale * middle
+        if not is_whole:  # no gap on one side while the other is cut off
+            left = min(max(left, self.width() - scale * display.right()), -scale * display.left())
         top = min(self.height() / 2 - scale * crop.center().y(), -scale * display.top())
         return QTransform.fromTranslate(left, top).scale(scale, scale)
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
+from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_capture import RestWatch, instruction, keep_capture
 from handcal.lab.evaluate.cube_folder import GRID, CapturePlan, PlannedCapture, missing_captures
 from handcal.lab.evaluate.run import cube_and_grid, position_warp
@@ -74,7 +74,7 @@ class CaptureDialog(PreparationDialog):
         self.setObjectName("captureDialog")
         self.setWindowTitle(tr("Take captures"))
         self.entries = entries
-        self._folder = Path(entries.captures).expanduser()
+        self._folder = user_path(entries.captures)
         self._plan: CapturePlan | None = None
         self._plan_problem = ""
         self._looked_for: tuple[Cube, Grid] | None = None

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
+from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_folder import find_captures
 from handcal.lab.evaluate.run import run_cube_test, run_segmentation_test, run_user_test
 from handcal.lab.settings import SegmentationTestSettings
@@ -114,11 +114,11 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
 
 def _missing_captures(entries: CubeEntries) -> str:
     for file in filter(None, (entries.cube, entries.camera, entries.rig)):
-        if not Path(file).expanduser().is_file():
+        if not user_path(file).is_file():
             return tr("there is no file {}: choose another, or leave the field empty").format(file)
     if not entries.captures:
         return ""
-    folder = Path(entries.captures).expanduser()
+    folder = user_path(entries.captures)
     if not folder.exists():
         return tr("there is no folder {} yet: press Capture… to create it").format(folder)
     find_captures(folder)  # raises an error if they are not usable
@@ -137,7 +137,7 @@ def _missing_folder(folder: str, request: str) -> str:
     """Return a request to choose a folder; empty if there is the one entered."""
     if not folder:
         return request
-    if not Path(folder).expanduser().is_dir():
+    if not user_path(folder).is_dir():
         return tr("there is no folder {}: {}").format(folder, request)
     return ""
 

@@ -13,6 +13,7 @@ from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 from scipy.spatial.transform import Rotation
 
+from handcal.io.files import user_path
 from handcal.progress import Progress
 from handcal.station.cube_tracking import CubeSight, CubeTracking, TrackingOrder, track_cube
 from handcal.station.doctor import Finding, Health
@@ -174,7 +175,7 @@ class TrackDialog(PreparationDialog):
 
 
 def _path(text: str) -> Path | None:
-    return Path(text).expanduser() if text else None
+    return user_path(text) if text else None
 
 
 def _finding(sight: CubeSight) -> Finding:

@@ -6,12 +6,12 @@ import queue
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TypeAlias
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QWidget
 
+from handcal.io.files import user_path
 from handcal.progress import Progress
 from handcal.session.journal import JOURNAL
 from handcal.session.trial import Trial
@@ -137,7 +137,7 @@ class TrialsDialog(PreparationDialog):
         self._record = record
         self._desk: _Desk | None = None
         self._step: _Step | None = None
-        self._has_session = (Path(entries.sessions).expanduser() / JOURNAL).is_file()
+        self._has_session = (user_path(entries.sessions) / JOURNAL).is_file()
         self.form = EntriesForm(
             {
                 "headset": (
@@ -188,8 +188,8 @@ class TrialsDialog(PreparationDialog):
         """Connect, and begin with the first distance."""
         entries = self.entries
         order = TrialOrder(
-            Path(entries.sessions).expanduser(),
-            Path(entries.cube).expanduser() if entries.cube else None,
+            user_path(entries.sessions),
+            user_path(entries.cube) if entries.cube else None,
         )
         connect = None if entries.headset == "virtual" else paired_headset
 

@@ -11,6 +11,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QSplitter, QWidget
 
+from handcal.io.files import user_path
 from handcal.io.resources import resource_path
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
@@ -146,7 +147,7 @@ class ImagesPanel(QWidget):
 
     def look(self, folders: Sequence[str], board: Board, dropped: Sequence[str]) -> None:
         """Search folders for the board, unless just done; do nothing if a folder is missing."""
-        paths = tuple(Path(folder).expanduser() for folder in folders if folder)
+        paths = tuple(user_path(folder) for folder in folders if folder)
         question = (paths, board)
         if question == self._question:
             return

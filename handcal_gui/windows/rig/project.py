@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.errors import FileError, HandcalError
-from handcal.io.files import read_json
+from handcal.io.files import read_json, user_path
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
 from handcal_gui.translation import tr
@@ -64,7 +64,7 @@ class RigProject(QObject):
     def camera_file(self) -> Path:
         """File of the viewpoint camera's intrinsics, once they are known."""
         given = self.inputs.viewpoint.intrinsics
-        return Path(given).expanduser() if given else self.folder.viewpoint
+        return user_path(given) if given else self.folder.viewpoint
 
     @property
     def camera_verdict(self) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from handcal.errors import FileError
-from handcal.io.files import make_folder, read_json, write_json
+from handcal.io.files import make_folder, read_json, user_path, write_json
 from handcal.io.resources import resource_path
 from handcal.io.settings import read_settings, settings_json
 from handcal.rig.board import Board
@@ -172,7 +172,7 @@ class ProjectFolder:
 
 def entered_path(text: str) -> Path | None:
     """Return the entered path; None if the field is empty."""
-    return Path(text).expanduser() if text else None
+    return user_path(text) if text else None
 
 
 def _set_aside(path: Path) -> str:

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.errors import FileError, HandcalError
+from handcal.io.files import user_path
 from handcal.rig.check import MAX_TEXT
 from handcal.rig.report import report_rig
 from handcal.rig.rig_file import read_rig, write_rig
@@ -162,7 +163,7 @@ class ResultPage(QWidget):
             )
             return
         try:
-            other = read_rig(Path(self._other.path).expanduser())
+            other = read_rig(user_path(self._other.path))
         except FileError as error:
             self._compared.show_finding(Finding("", Health.BROKEN, str(error)))
             return

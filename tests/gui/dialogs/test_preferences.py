@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
+    QDialog,
+    QDialogButtonBox,
     QDoubleSpinBox,
     QLabel,
+    QPushButton,
     QScrollArea,
     QSpinBox,
     QWidget,
@@ -103,3 +108,74 @@ def test_every_field_is_explained_in_sight_on_a_small_screen(qtbot: QtBot) -> No
 
 def _middle(widget: QWidget, dialog: QWidget) -> int:
     return widget.mapTo(dialog, widget.rect().center()).y()
+
+
+@pytest.fixture
+def opened(qtbot: QtBot, tmp_path: Path) -> PreferencesDialog:
+    station = replace(BEFORE.station, sessions=str(tmp_path))
+    dialog = PreferencesDialog(replace(BEFORE, station=station))
+    qtbot.addWidget(dialog)
+    show(qtbot, dialog, dialog.width(), dialog.height())
+    return dialog
+
+
+def test_a_gate_without_room_for_a_hand_is_refused_beside_it(opened: PreferencesDialog) -> None:
+    near, far = (child(opened, QDoubleSpinBox, name) for name in ("gateNear", "gateFar"))
+    found, ok = child(opened, QLabel, "gateFound"), _button(opened, "Ok")
+    assert ok.isEnabled()
+    assert not found.isVisible()
+    near.setValue(0.9)
+    far.setValue(0.95)
+    assert found.isVisible()
+    assert "0.90 to 0.95 m, leaves a hand too little room" in found.text()
+    assert not ok.isEnabled()
+    _button(opened, "RestoreDefaults").click()
+    assert (near.value(), far.value()) == (0.35, 0.7)
+    assert not found.isVisible()
+
+
+def test_a_folder_that_cannot_be_created_is_refused_beside_it(
+    opened: PreferencesDialog, qtbot: QtBot, tmp_path: Path
+) -> None:
+    field, found = child(opened, PathField), child(opened, QLabel, "sessionsFound")
+    (tmp_path / "file").touch()
+    field.set_path(str(tmp_path / "file" / "folder"))
+    opened.accept()  # at once: it waits for the check
+    qtbot.waitUntil(found.isVisible)
+    assert "is a file. Choose a folder." in found.text()
+    assert opened.isVisible()
+    assert not _button(opened, "Ok").isEnabled()
+    field.set_path(str(tmp_path / "new"))
+    opened.accept()
+    qtbot.waitUntil(lambda: not opened.isVisible())
+    assert opened.result() == QDialog.DialogCode.Accepted
+    assert opened.preferences().station.sessions == str(tmp_path / "new")
+
+
+def test_a_folder_that_is_gone_lets_other_preferences_change(qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    gone = replace(BEFORE.station, sessions=str(tmp_path / "file" / "folder"))
+    dialog = PreferencesDialog(replace(BEFORE, station=gone))
+    qtbot.addWidget(dialog)
+    dialog.show()
+    qtbot.waitUntil(child(dialog, QLabel, "sessionsFound").isVisible)
+    dialog.accept()
+    qtbot.waitUntil(lambda: not dialog.isVisible())
+
+
+def test_defaults_are_shown_and_taken_only_by_ok(opened: PreferencesDialog) -> None:
+    before = opened.preferences()
+    child(opened, QDoubleSpinBox, "target").setValue(3.0)
+    _button(opened, "RestoreDefaults").click()
+    defaults, shown = Preferences(), opened.preferences()
+    assert shown.theme == defaults.theme != before.theme
+    assert shown.station.sessions == defaults.station.sessions
+    assert shown.station.calibration == defaults.station.calibration
+    assert shown.station.source == before.station.source, "not one of the fields"
+    opened.reject()
+    assert opened.result() == QDialog.DialogCode.Rejected
+
+
+def _button(dialog: PreferencesDialog, name: str) -> QPushButton:
+    box = child(dialog, QDialogButtonBox)
+    return box.button(QDialogButtonBox.StandardButton[name])

@@ -187,8 +187,8 @@ def test_notes_and_shifts_of_the_last_moment_are_saved(live: Technician, studio:
     window.docks["fine_tune"].raise_()
     panel = window.panels.fine_tune
     live.wait(lambda: panel.isVisible() and panel.isEnabled())
-    live.wait(lambda: "In the headset" in live.child(QLabel, "status").text())
     panel.setFocus()
+    live.wait(lambda: "In the headset" in live.child(QLabel, "status").text())
     QTest.keyClick(panel, Qt.Key.Key_Left)
     window.close()
     record = Session.open(path)

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
+from handcal.types import Verdict
 from handcal_gui.widgets.result_card import ResultCard, eye_results, result_text
 from tests.gui.helpers import show, text
 
@@ -66,3 +67,10 @@ def test_all_texts_grow_with_the_card(qtbot: QtBot, results: Results) -> None:
     card.setFont(font)
     sizes = {label.font().pointSizeF() for label in card.findChildren(QLabel)}
     assert sizes == {font.pointSizeF()}
+
+
+def test_a_result_that_is_not_used_is_named_so(results: Results) -> None:
+    kept = dict(results.verdicts) | {"right": Verdict("keep", "as told")}
+    left, right = eye_results(replace(results, verdicts=kept))
+    assert "This result, not used" not in [bar.name for bar in left.bars]
+    assert right.bars[1].name == "This result, not used"

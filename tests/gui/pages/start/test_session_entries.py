@@ -75,6 +75,18 @@ def test_of_a_repaired_session_only_the_copy_is_resumed(
     assert found.recent == ()
 
 
+def test_of_a_finished_damaged_session_only_the_repaired_copy_is_offered(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    path = make(tmp_path, "Ada", [alignment, alignment], is_done=True)
+    (path / "alignments" / "1.npz").unlink()
+    assert [entry.path for entry in find_sessions(tmp_path, (path,)).recent] == [path]
+    repair_session(path, tmp_path / "copy")
+    for recent in ((), (path,)):
+        found = find_sessions(tmp_path, recent)
+        assert [entry.path.name for entry in found.recent] == ["copy"]
+
+
 def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(
     tmp_path: Path, alignment: Alignment
 ) -> None:

@@ -8,10 +8,13 @@ from typing import Any, get_args
 import pytest
 
 from handcal.errors import FileError
+from handcal.hand.settings import SegmentSettings
 from handcal.link.nudges import NudgeSum
+from handcal.session.session import SessionRecord
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName, Verification
+from handcal_gui.pages.wizard.step_views import connect_view, distance, save_view
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from tests.gui.views import NUDGED, Maker, actions, judged
@@ -156,3 +159,45 @@ def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
     view = wizard.view(full)
     assert not view.preconditions[0].holds
     assert view.note == "the disk is full"
+
+
+def test_the_distance_of_the_hand_follows_from_the_depth_gate(snapshot: Maker) -> None:
+    def said(near_m: float, far_m: float) -> str:
+        gate = SegmentSettings(depth_min_m=near_m, depth_max_m=far_m)
+        return distance(snapshot(State.SHOW_HAND, procedure={"segment": gate}))
+
+    assert said(0.35, 0.70) == "at forearm's length, 40 to 65 cm from the camera"
+    assert said(0.55, 2.00) == "60 to 70 cm from the camera"
+
+
+def test_a_kept_offline_calibration_is_named_and_not_unearned(snapshot: Maker) -> None:
+    kept = judged(snapshot, "accept", "keep", State.APPLIED)
+    told = "The headset uses the offline calibration for the right eye: φ is 0 there."
+    assert save_view(kept).fact == told
+    assert not save_view(kept).unearned
+    wizard = Wizard()
+    wizard.view(judged(snapshot, "accept", "keep", State.SOLVED))
+    view = wizard.view(kept)
+    assert (view.step, view.fact) == (Step.VERIFY, told)
+    assert not save_view(judged(snapshot, "accept", "accept", State.APPLIED)).fact
+
+
+def test_a_resumed_session_says_that_it_continues(snapshot: Maker, record: SessionRecord) -> None:
+    new = connect_view(snapshot(State.SHOW_HAND, procedure={"alignments": {}}))
+    assert (new.main.label, new.fact) == ("Begin", "")
+    resumed = connect_view(snapshot(State.APPLIED, procedure={"verifications": {"left": NUDGED}}))
+    count = len(record.alignments)
+    assert resumed.main.label == "Continue"
+    assert resumed.fact == (
+        f"This session continues where it stopped, with {count} alignment{'s' * (count > 1)}, "
+        "1 verified eye."
+    )
+
+
+def test_after_a_slip_the_earlier_result_is_said_to_be_used_again(
+    snapshot: Maker, record: SessionRecord
+) -> None:
+    again = replace(record, facts=replace(record.facts, former="ada-1"), alignments={})
+    view = connect_view(snapshot(State.SHOW_HAND, record=again))
+    assert view.sentence.startswith("Let the headset sit well")
+    assert view.fact.startswith("The result of ada-1 is used again")

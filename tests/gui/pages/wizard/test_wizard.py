@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt
@@ -9,13 +10,16 @@ from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushB
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
+from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
+from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.theme import use_theme
-from tests.gui.views import NUDGED, all_views
+from handcal_gui.widgets.progress_ring import ProgressRing
+from tests.gui.views import NUDGED, VERIFIED, all_views, planned_snapshot
 
 Maker = Callable[..., Snapshot]
 
@@ -256,3 +260,33 @@ def test_the_refusal_is_read(panel: WizardPanel, snapshot: Maker) -> None:
     note = panel.findChild(QLabel, "wizardNote")
     assert isinstance(note, QLabel)
     assert note.text() == "Your hand is turned by 14.0°."
+
+
+def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_eyes(
+    panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    ring = panel.findChild(ProgressRing)
+    assert isinstance(ring, ProgressRing)
+    panel.start(PlannedWizard(), is_held=False)
+    first = planned_snapshot(snapshot, StepName.VERIFY)
+    panel.show_snapshot(first)
+    panel.wizard.move(Action.NEXT, first)
+    panel.show_snapshot(first)
+    assert "✓ Align" in _texts(panel)
+    assert ring.accessibleDescription().startswith("2/2 aligned")
+    again = replace(record, facts=replace(record.facts, former="ada-1"), alignments={})
+    slipped = replace(
+        planned_snapshot(
+            snapshot, StepName.VERIFY, alignments={}, verifications={"left": VERIFIED}
+        ),
+        record=again,
+    )
+    panel.show_snapshot(slipped)
+    texts = _texts(panel)
+    assert "✓ Show hand" in texts
+    assert {"Make cursor", "Align", "Solve"} <= texts
+    assert ring.accessibleDescription().startswith("1/2 verified")
+
+
+def _texts(panel: WizardPanel) -> set[str]:
+    return {label.text() for label in panel.findChildren(QLabel)}

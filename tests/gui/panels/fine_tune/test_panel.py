@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QLabel,
+    QLineEdit,
     QRadioButton,
     QScrollArea,
     QSlider,
@@ -30,6 +31,7 @@ from handcal.types import EYES
 from handcal_gui.panels.fine_tune.history import Shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.fine_tune.stream import PERIOD_MS
+from tests.gui.helpers import child
 from tests.gui.panels.fine_tune.controls import (
     Show,
     action,
@@ -112,6 +114,42 @@ def test_arrow_keys_move_the_chosen_eye(
     expected_m[axis] += sign * 0.001
     np.testing.assert_allclose(changed.args[0]["right"], expected_m, atol=1e-12)
     np.testing.assert_array_equal(changed.args[0]["left"], results.eyes["left"].shift_m)
+
+
+def test_arrow_keys_move_the_eye_while_a_button_has_the_focus(
+    qtbot: QtBot, panel: FineTunePanel, show: Show
+) -> None:
+    show()
+    buttons = [one for one in panel.findChildren(QAbstractButton) if one.isEnabled()]
+    assert len(buttons) > 8
+    for one in buttons:
+        one.setFocus()
+        focused = panel.focusWidget()
+        with qtbot.waitSignal(panel.shift_changed):
+            QTest.keyClick(one, Qt.Key.Key_Left)
+        assert panel.focusWidget() is focused
+        assert child(editor(panel, "left"), QRadioButton).isChecked()
+
+
+def test_the_panel_says_that_a_click_gives_it_the_arrow_keys(
+    qtbot: QtBot, panel: FineTunePanel, show: Show
+) -> None:
+    other = QLineEdit()
+    qtbot.addWidget(other)
+    with qtbot.waitExposed(other):
+        other.show()
+    other.activateWindow()
+    other.setFocus()
+    qtbot.waitUntil(other.hasFocus)
+    show()
+    assert status(panel) == "Click here to use the arrow keys"
+    show(State.ALIGN)
+    assert "Click here" not in status(panel)
+    panel.activateWindow()
+    panel.setFocus()
+    qtbot.waitUntil(panel.hasFocus)
+    show()
+    assert "Click here" not in status(panel)
 
 
 @pytest.mark.parametrize(

@@ -307,6 +307,8 @@ def test_a_blinded_comparison_is_asked_for_step_by_step(
     assert not begin.isVisible()
     better = button(panel, QPushButton, "Second is better")
     assert not better.isEnabled()  # before both were shown
+    assert better.toolTip() == "Show the first and the second drawing before the answer"
+    assert text(panel, "comparisonHow").startswith("The wearer holds the hand up")
     second = button(panel, QPushButton, "Show second")
     with qtbot.waitSignal(panel.show_compared_requested) as asked:
         second.click()
@@ -314,6 +316,8 @@ def test_a_blinded_comparison_is_asked_for_step_by_step(
     assert not second.isChecked()  # until the station shows it
     panel.show_snapshot(replace(first, comparing="second", has_compared_both=True))
     assert second.isChecked()
+    assert better.toolTip() == ""
+    assert text(panel, "comparisonHow").startswith("Ask the wearer which drawing fits")
     with qtbot.waitSignal(panel.comparison_answered) as answered:
         better.click()
     assert answered.args == ["second"]

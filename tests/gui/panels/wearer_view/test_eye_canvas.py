@@ -149,3 +149,12 @@ def test_offline_outline_is_shown_on_demand(canvas: EyeCanvas) -> None:
     assert (_pixels(canvas) != before).any()
     canvas.show_offline(False)
     np.testing.assert_array_equal(_pixels(canvas), before)
+
+
+def test_a_picture_that_fits_stays_in_the_middle_wherever_the_hand_is(canvas: EyeCanvas) -> None:
+    canvas.resize(900, 200)
+    image = np.full((int(DISPLAY.height_px), int(DISPLAY.width_px), 3), 200, np.uint8)
+    for aside_m in (-0.04, 0.04):
+        canvas.show_view(_view(RING_M + np.array([aside_m, 0.0, 0.0]), image=image))
+        columns = np.flatnonzero((_pixels(canvas) == 200).all(axis=2).any(axis=0))
+        assert (columns[0] + columns[-1]) / 2 == pytest.approx(450, abs=2)

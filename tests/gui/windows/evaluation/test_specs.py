@@ -68,6 +68,11 @@ def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
         evaluation.run(entries, Progress())
 
 
+def test_the_folder_of_no_user_is_said_not_to_be_there() -> None:
+    readiness = make_specs()["users"].evaluation.readiness(UserEntries("~nosuchuser", "/u"))
+    assert readiness.finding.found.startswith("there is no folder ~nosuchuser: choose")
+
+
 def test_without_sessions_there_is_no_user_test(tmp_path: Path) -> None:
     evaluation = make_specs()["users"].evaluation
     readiness = evaluation.readiness(UserEntries("", str(tmp_path)))
