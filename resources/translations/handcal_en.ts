@@ -5076,6 +5076,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Doubtful</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not known</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Drawing of the arrangement</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5164,6 +5172,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>not judged: the file has no verdict</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the file cannot be read</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>it was not added to the rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5237,6 +5253,10 @@ one turns out.</source>
     </message>
     <message>
         <source>no doubtful findings</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>; {} are not known</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5564,7 +5584,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the intrinsics are in {}</source>
+        <source>the intrinsics are in {}: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose another file, or solve them</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5593,6 +5617,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Take images of the board with both cameras, and solve where the depth camera is on the headset.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>saved</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -83,11 +83,14 @@ class ImagesPanel(QWidget):
         The images or the set of excluded images have changed.
     again_requested, take_requested : Signal()
         The user requests to search the images again, or to take images.
+    board_found : Signal(Board)
+        The board searched for is in an image.
     """
 
     dropped_changed = Signal()
     again_requested = Signal()
     take_requested = Signal()
+    board_found = Signal(object)
 
     def __init__(
         self, titles: tuple[str, ...], hint: str, drawing: str, parent: QWidget | None = None
@@ -191,6 +194,8 @@ class ImagesPanel(QWidget):
         self._list.show_shots(shots, dropped)
         self._refresh()
         self.dropped_changed.emit()
+        if self._question is not None and not all(shot.problem for shot in shots):
+            self.board_found.emit(self._question[1])
 
     def _search_again(self) -> None:
         self.forget()

@@ -59,6 +59,7 @@ class StepPage(QWidget):
             panel.dropped_changed.connect(self.keep)
             panel.bar.busy_changed.connect(self._refresh)
             panel.again_requested.connect(self.enter)
+            panel.board_found.connect(project.note_found)
         self.box.bar.busy_changed.connect(self._refresh)
         project.rig_changed.connect(self.show_known)
 

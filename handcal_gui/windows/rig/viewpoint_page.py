@@ -13,8 +13,9 @@ from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import lens_field
-from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project import UNREADABLE, RigProject
 from handcal_gui.windows.rig.solve import SolvedPart, solve_viewpoint
+from handcal_gui.windows.rig.solve_box import HEALTHS
 from handcal_gui.windows.rig.step_page import StepPage
 
 _HINT = tr(
@@ -68,10 +69,13 @@ class ViewpointPage(StepPage):
         """Show the file of intrinsics, if there is one."""
         self.box.show_origin(None)
         file = self.project.camera_file
-        if file.exists():
-            self.box.show_finding(
-                Finding("", Health.GOOD, tr("the intrinsics are in {}").format(file))
-            )
+        if verdict := self.project.camera_verdict:
+            found = tr("the intrinsics are in {}: {}").format(file, verdict)
+            finding = Finding("", HEALTHS.get(verdict, Health.LIMITED), found)
+            if verdict == UNREADABLE:
+                advice = tr("choose another file, or solve them")
+                finding = Finding("", Health.BROKEN, found, advice)
+            self.box.show_finding(finding)
 
     def _show_solved(self, solved: SolvedPart) -> None:
         is_bad = solved.verdict.name == "bad"

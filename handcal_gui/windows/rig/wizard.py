@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.rig_types import RIG_PARTS, RigPart
+from handcal.rig_types import RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
@@ -24,7 +24,7 @@ from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
-from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project import NOT_JUDGED, UNREADABLE, RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.result_page import ResultPage
 from handcal_gui.windows.rig.stereo_page import StereoPage
@@ -32,7 +32,15 @@ from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
 
 _FIRST_SIZE = QSize(1240, 760)
 _RAIL_PX = 20 * SPACING_PX
-_SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
+_SAVED = tr("saved")
+_SIGNS = {
+    "good": ("check", "good"),
+    _SAVED: ("check", "good"),
+    "needs more views": ("warning", "warning"),
+    NOT_JUDGED: ("warning", "warning"),
+    "bad": ("cross", "red"),
+    UNREADABLE: ("cross", "red"),
+}
 _BOARD, _VIEWPOINT = tr("Board"), tr("Viewpoint camera")
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
     _BOARD: (tr("Print the board at 100 %, measure a square and enter its size."), None),
@@ -193,11 +201,10 @@ class RigWizard(QDialog):
         if part is not None:
             return origins[part].verdict if part in origins else ""
         if title == _BOARD:
-            return "good" if origins or self.project.camera_verdict else ""  # it was found
+            return "good" if self.project.inputs.board_found else ""
         if title == _VIEWPOINT:
             return self.project.camera_verdict
-        verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}
-        return "good" if verdicts == {"good"} else ""
+        return _SAVED if self.project.saved_file else ""
 
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)

@@ -79,6 +79,9 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     found = part(dialog, QLabel, "acceptedFound")
     qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
     table = part(dialog, QTableWidget, "drawn-against-seen")
+    sign = part(dialog, QLabel, "acceptedHealth")
+    assert sign.accessibleName() == "Note", "the right display was not looked at"
+    assert "right not accepted" in found.text()
     assert table.rowCount() >= 5
     assert (folder / "page" / "report.html").exists()
     dialog.reject()

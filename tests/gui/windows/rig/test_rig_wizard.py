@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,9 @@ from pytestqt.qtbot import QtBot
 
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
+from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Origin
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.step_page import StepPage
@@ -185,6 +187,50 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     wizard.show_step(RESULT)
     found = child(wizard, QLabel, "savedRigFound").text()
     assert "as in the initial rig: left display, right display, depth camera's pose" in found
+    assert "4 are not known" in found
+    signs = child(wizard, QTreeWidget, "rigFindings")
+    rows = [signs.topLevelItem(row) for row in range(signs.topLevelItemCount())]
+    told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
+    assert told["Depth camera"] == "Not known"
+    assert told["left: display"] == ""
+    assert told["Viewpoints"] == "Good"
+
+
+def test_another_board_and_a_changed_rig_lose_their_ticks(
+    qtbot: QtBot, wizard: RigWizard, tmp_path: Path
+) -> None:
+    wizard.show_step(STEREO)
+    wait(qtbot, wizard)
+    assert marks(wizard)[BOARDS] == "good", "it is in the images"
+    wizard.project.enter(board=Board(squares=(5, 4), square_m=0.03))
+    wizard.project.save_rig_as(tmp_path / "ours.yaml")
+    assert marks(wizard)[BOARDS] == "not done yet"
+    assert marks(wizard)[RESULT] == "saved"
+    wizard.project.use_rig(replace(wizard.project.rig, name="another"))
+    assert marks(wizard)[RESULT] == "not done yet"
+
+
+def test_origins_in_the_initial_rig_do_not_tick_the_board(wizard: RigWizard) -> None:
+    origin = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
+    wizard.project.use_rig(replace(wizard.project.rig, origins={"left": origin}))
+    assert marks(wizard)[BOARDS] == "not done yet"
+
+
+def test_intrinsics_that_nobody_judged_are_not_ticked(
+    wizard: RigWizard, photographs: Any, tmp_path: Path
+) -> None:
+    given = tmp_path / "camera.yaml"
+    write_intrinsics(given, photographs.viewpoint, "opencv")
+    wizard.show_step(VIEWPOINT)
+    page = wizard.page
+    assert isinstance(page, StepPage)
+    page.form.enter(images="", intrinsics=str(given))
+    wizard.project.camera_solved()
+    assert "not judged" in marks(wizard)[VIEWPOINT]
+    given.write_text("%YAML:1.0\n")
+    wizard.project.camera_solved()
+    assert marks(wizard)[VIEWPOINT] == "the file cannot be read"
+    assert child(wizard, QLabel, "verdictHealth").accessibleName() == "Problem"
 
 
 def test_a_low_screen_shows_the_buttons_below(wizard: RigWizard) -> None:
