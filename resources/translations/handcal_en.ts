@@ -4808,19 +4808,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Save as PDF…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>To scale, with a ruler to check the print</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>PNG, to show on a screen</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Use another initial rig…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4832,7 +4824,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} inner corners to find</source>
+        <source>Save as &amp;PDF…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save &amp;image…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Use another initial rig…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} inner corners</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no image shows this board yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, found in an image</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4905,14 +4917,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Number of images with a corner of the board in each part of the view. Empty parts give no information about the lens there.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye position, focused on the display. Darken the room and take 3 or more images.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Do not move the viewpoint camera. Switch the display off and take 8 or more images of the board through it while the headset tracks the board. Save the poses in one JSON file.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5000,6 +5004,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Save the grid and show it on this display unscaled. With the viewpoint camera at the eye position, focused on the display, take 3 or more images in the dark.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board, and save the poses in one JSON file.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Measured distance of the virtual screen, in metres.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5036,19 +5048,35 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Grid on the display</source>
+        <source>Ta&amp;ke images…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Camera pose</source>
+        <source>Searc&amp;h again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Save grid…</source>
+        <source>Grid on the &amp;display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ca&amp;mera pose</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>PNG, to show on the display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save &amp;grid…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take images of the grid, or choose their folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take images of the board, or choose their folder or a stereo calibration in Inputs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5088,6 +5116,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Take images…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search &amp;again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Images</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5104,23 +5140,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Arrangement</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Show how the devices are arranged</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Search again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Read the folders again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Take images…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5232,19 +5252,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Save rig file…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Accept…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Check what the displays draw, with a camera at the eye position</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Use for the next calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5268,6 +5276,18 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Save rig file…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Accept…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Use for the next calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>the next calibration uses this rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5277,6 +5297,18 @@ one turns out.</source>
     </message>
     <message>
         <source>compared with {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>C&amp;heck</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nu&amp;mbers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Com&amp;pare</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5460,6 +5492,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Solve</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solved {}: {}; {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5517,6 +5553,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Headset camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Pairs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take pairs of images, or choose both folders in Inputs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5584,11 +5628,19 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>I&amp;mages</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>the intrinsics are in {}: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>choose another file, or solve them</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take images of the board, or choose their folder in Inputs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5612,7 +5664,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Put the viewpoint camera behind the left display, take images of its grid and of the board, enter the screen&apos;s distance in Inputs, and solve.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Right display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do the same behind the right display: take images of its grid and of the board, enter the screen&apos;s distance in Inputs, and solve.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5628,14 +5688,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Put the viewpoint camera behind the left display, take images of its grid and of the board, and solve.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The same behind the right display: images of its grid and of the board, and solve.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Name the rig, look at what is doubtful, save it, and use it.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5644,7 +5696,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Next</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>All entries are kept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cl&amp;ose</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5675,6 +5735,26 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Hidden while the wearer compares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press the large button</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Set-&amp;up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Inputs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbe&amp;rs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, tick an image in which the board was found</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

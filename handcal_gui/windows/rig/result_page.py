@@ -26,6 +26,7 @@ from handcal.rig_types import PART_NAMES, RIG_PARTS, Rig
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
@@ -62,18 +63,19 @@ class ResultPage(QWidget):
         self._differences = NumberTable("differences", tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
-        self._save = main_button("saveRig", tr("Save rig file…"))
+        self.main = main_button("saveRig", tr("&Save rig file…"))
+        self.strip = action_strip(self.main)
         self._accept = button(
             "acceptRig",
-            tr("Accept…"),
+            tr("&Accept…"),
             help_text=tr("Check what the displays draw, with a camera at the eye position"),
         )
-        self._use = button("useRig", tr("Use for the next calibration"))
+        self._use = button("useRig", tr("&Use for the next calibration"))
         self._lay_out()
         self.enter()
         self._other.changed.connect(self._compare)
         self._name.editingFinished.connect(self._on_name_edited)
-        self._save.clicked.connect(self.save)
+        self.main.clicked.connect(self.save)
         self._accept.clicked.connect(self._open_acceptance)
         self._use.clicked.connect(self._ask_to_use)
         project.rig_changed.connect(self.enter)
@@ -165,9 +167,9 @@ class ResultPage(QWidget):
         compare = QWidget()
         vbox(self._other, self._compared, (self._differences, 1), 0, on=compare, spacing=SPACING_PX)
         tabs = QTabWidget(documentMode=True)
-        tabs.addTab(self._findings, tr("Check"))
-        tabs.addTab(self._numbers, tr("Numbers"))
-        tabs.addTab(compare, tr("Compare"))
+        tabs.addTab(self._findings, tr("C&heck"))
+        tabs.addTab(self._numbers, tr("Nu&mbers"))
+        tabs.addTab(compare, tr("Com&pare"))
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.addRow(tr("Name"), self._name)
@@ -176,7 +178,6 @@ class ResultPage(QWidget):
         foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
         foot.addWidget(self._accept)
         foot.addWidget(self._use)
-        foot.addWidget(self._save)
         vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)
 
 
