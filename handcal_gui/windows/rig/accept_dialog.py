@@ -29,13 +29,13 @@ from handcal.station.doctor import Finding, Health
 from handcal.types import EYES, Eye
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.result_rows import EYE_NAMES
-from handcal_gui.windows.rig.images_panel import Drawing
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 

@@ -6,17 +6,15 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QSplitter, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
 
-from handcal.io.resources import resource_path
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.fields import button, choice, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
@@ -27,40 +25,6 @@ from handcal_gui.windows.rig.shot_view import ShotView
 from handcal_gui.windows.rig.shots import Shot, look
 from handcal_gui.windows.rig.solve import SolvedPart
 from handcal_gui.windows.rig.uncertainty_map import UncertaintyMap
-
-
-class Drawing(QWidget):
-    """Shows a shipped SVG drawing, as large as fits.
-
-    Parameters
-    ----------
-    page : str
-        As for `resource_path`.
-    """
-
-    def __init__(self, page: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("drawing")
-        self.setAccessibleName(tr("Drawing of the arrangement"))
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self._renderer = QSvgRenderer(str(resource_path(page)), self)
-        self._renderer.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
-
-    @property
-    def is_readable(self) -> bool:
-        """True if the drawing was found and can be drawn."""
-        return self._renderer.isValid()
-
-    def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw on white, in which the drawings are made."""
-        painter = QPainter(self)
-        size = QSizeF(self._renderer.defaultSize())
-        size.scale(QSizeF(self.size()), Qt.AspectRatioMode.KeepAspectRatio)
-        place = QRectF(QPointF(), size)
-        place.moveCenter(QRectF(self.rect()).center())
-        painter.fillRect(place, Qt.GlobalColor.white)
-        self._renderer.render(painter, place)
-        painter.end()
 
 
 class ImagesPanel(QWidget):

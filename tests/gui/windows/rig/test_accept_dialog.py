@@ -16,8 +16,8 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.acceptance import write_acceptance
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
-from handcal_gui.windows.rig.images_panel import Drawing
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder, ViewpointEntries
 from handcal_gui.windows.rig.take_dialog import TakeDialog

@@ -21,9 +21,10 @@ from pytestqt.qtbot import QtBot
 from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import WorstView
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.coverage_map import CoverageMap
-from handcal_gui.windows.rig.images_panel import Drawing, ImagesPanel
+from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.solve import SolvedPart
 from handcal_gui.windows.rig.uncertainty_map import UncertaintyMap
 
