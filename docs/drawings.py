@@ -212,7 +212,8 @@ def _text(x: float, y: float, text: str) -> str:
 
 def _svg(width: float, height: float, parts: list[str]) -> str:
     size = f"width='{width:.0f}' height='{height:.0f}' viewBox='0 0 {width:.0f} {height:.0f}'"
-    paper = "<rect width='100%' height='100%' fill='#fff'/>"
+    # In numbers: Qt, which shows them in the window, draws shares of the size wrongly.
+    paper = f"<rect width='{width:.0f}' height='{height:.0f}' fill='#fff'/>"
     body = "\n".join([paper, *parts])
     return f"<svg xmlns='http://www.w3.org/2000/svg' {size}>\n{body}\n</svg>\n"
 

@@ -46,7 +46,12 @@ from handcal.types import EYES
 )
 def accept(arguments: argparse.Namespace) -> None:
     """Check a rig without a wearer, with a camera in the eye's place; exit code 1 if it fails."""
-    from handcal.rig.acceptance import AcceptanceSettings, run_acceptance, view_rows
+    from handcal.rig.acceptance import (
+        AcceptanceSettings,
+        passed_words,
+        run_acceptance,
+        view_rows,
+    )
 
     settings = AcceptanceSettings(
         arguments.folder,
@@ -81,7 +86,8 @@ def accept(arguments: argparse.Namespace) -> None:
         console.print(f"depth camera: {found.move.words}, by tracked boards", markup=False)
     if found.cause:
         raise HandcalError(f"the rig fails: {found.cause}")
-    console.print(f"passed: at most {settings.limit_arcmin:g}′ at every distance")
+    passed = passed_words(found.eyes)
+    console.print(f"passed, at most {settings.limit_arcmin:g}′ at every distance: {passed}")
 
 
 @command(

@@ -152,7 +152,8 @@ def check(arguments: argparse.Namespace) -> None:
     console.print(rig.name)
     for one in findings:
         doubt = "" if one.is_fine else f"  → doubtful: {one.expected} is expected"
-        mark = "–" if not one.is_known else "ok" if one.is_fine else "check"
+        judged = ("ok" if one.is_fine else "check") if one.is_judged else ""
+        mark = judged if one.is_known else "–"
         console.print(f"{mark:6} {one.what}: {one.found}{doubt}")
     save(arguments.json, {"findings": [asdict(one) for one in findings]})
     doubtful = sum(not one.is_fine for one in findings)

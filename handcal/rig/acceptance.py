@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -205,7 +205,7 @@ def _page(
     return Report(
         title="Acceptance of a rig",
         subject=f"Rig: {rig.name}",
-        lead=f"FAILED: {cause}." if cause else "PASSED.",
+        lead=f"FAILED: {cause}." if cause else f"PASSED: {passed_words(found)}.",
         sections=[
             Section("", [facts({str(eye): text or "passed" for eye, text in problems.items()})]),
             Section(
@@ -214,6 +214,12 @@ def _page(
             ),
         ],
     )
+
+
+def passed_words(eyes: Collection[Eye]) -> str:
+    """Return the eyes that pass, and the one that was not looked at, in words."""
+    unseen = [f"{eye} not accepted: it has no images" for eye in EYES if eye not in eyes]
+    return "; ".join([" and ".join(eyes), *unseen])
 
 
 def view_rows(found: EyeAcceptance) -> list[tuple[str, str, str, str]]:

@@ -43,6 +43,11 @@ class RigFinding:
     is_known: bool = True
     """False if the file does not contain it: neither fine nor doubtful."""
 
+    @property
+    def is_judged(self) -> bool:
+        """True if it was compared with an expected value; other findings are only stated."""
+        return self.is_known and bool(self.expected)
+
 
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
     """Return the findings about a rig that `check_rig` accepts."""
@@ -109,12 +114,14 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
     yield RigFinding(
         "Depth camera",
         f"{camera.model or 'model not known'}, serial number {camera.serial_number or 'not known'}",
+        is_known=bool(camera.model and camera.serial_number),
     )
     if rig.headset is None:
         yield _not_told("Headset")
     else:
         name, runtime = rig.headset.name or rig.headset.device_id, rig.headset.runtime
-        yield RigFinding("Headset", f"{name}, {runtime or 'runtime not known'}")
+        found = f"{name}, {runtime or 'runtime not known'}"
+        yield RigFinding("Headset", found, is_known=bool(runtime))
     yield depth_finding(rig.depth_check)
     yield display_finding(rig.display_check)
     for part in RIG_PARTS:
@@ -200,8 +207,13 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
         if text
     )
     by = f"by {check.observer}, {check.app or 'app not known'}, {check.made}"
-    eyes = " and ".join(check.problems)
-    return RigFinding(what, f"{found or f'{eyes} as sent'} ({by})", not found, expected)
+    found = found or f"{' and '.join(check.problems)} as sent"
+    unseen = [eye for eye in EYES if eye not in check.problems]
+    if unseen:
+        found += f"; {' and '.join(unseen)} not checked"
+    is_fine = not any(check.problems.values())
+    is_known = not is_fine or not unseen
+    return RigFinding(what, f"{found} ({by})", is_fine, expected, is_known)
 
 
 def _not_told(what: str) -> RigFinding:

@@ -72,7 +72,8 @@ def choice(name: str, label: str, options: Mapping[Option, str], help_text: str 
 
 def button(name: str, text: str = "", label: str = "", help_text: str = "") -> QPushButton:
     """Return a button that Enter also presses while it has the focus."""
-    return with_name(QPushButton(text, autoDefault=True), name, label or text, help_text)
+    label = label or text.replace("&", "")
+    return with_name(QPushButton(text, autoDefault=True), name, label, help_text)
 
 
 class MainButton(QPushButton):
@@ -81,7 +82,7 @@ class MainButton(QPushButton):
 
 def main_button(name: str, text: str = "") -> MainButton:
     """Return a page's main button: large, and pressed by Enter."""
-    made = with_name(MainButton(text, autoDefault=True), name, text)
+    made = with_name(MainButton(text, autoDefault=True), name, text.replace("&", ""))
     scale_font(made, 1.2, is_bold=True)
     made.setMinimumHeight(5 * SPACING_PX)
     made.setDefault(True)

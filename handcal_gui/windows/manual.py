@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QUrl
-from PySide6.QtGui import QImage, QKeyEvent, QTextBlock, QTextCursor, QTextDocument
+from PySide6.QtGui import (
+    QColor,
+    QImage,
+    QKeyEvent,
+    QPainter,
+    QTextBlock,
+    QTextCursor,
+    QTextDocument,
+)
 from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
@@ -20,8 +28,9 @@ from PySide6.QtWidgets import (
 
 from handcal.io.resources import resource_path
 from handcal_gui.keys import add_action
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, is_dark
 from handcal_gui.translation import tr
+from handcal_gui.widgets.drawing import themed_drawing
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
@@ -33,6 +42,8 @@ _BESIDE_PX = 80
 _FOUND_PX = 230
 _COLUMNS_PX = 150, 200, 450
 _MOST_FOUND = 200
+_DIMMED = 0.25
+"""Share of the light that a picture of the light window loses on a dark page."""
 _PAGES = (".md", ".py", ".proto")
 
 
@@ -171,6 +182,7 @@ class ManualPage(QTextBrowser):
         super().__init__(parent)
         self.setObjectName("manualPage")
         self.setOpenExternalLinks(True)
+        follow_theme(self, self._load_again)
 
     def go_to(self, block: QTextBlock) -> None:
         """Scroll until a block is at the top."""
@@ -198,14 +210,38 @@ class ManualPage(QTextBrowser):
             block = block.next()
 
     def loadResource(self, kind: int, name: QUrl | str) -> object:
-        """Return a page or a picture; a wide picture is reduced."""
+        """Return a page or a picture; a wide picture is reduced, a drawing has the theme's colours.
+
+        In dark themes, photographs and pictures of the light window are dimmed and framed.
+        """
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
-        image = QImage(self.source().resolved(QUrl(name)).toLocalFile())
+        path = Path(self.source().resolved(QUrl(name)).toLocalFile())
+        is_drawing = path.suffix == ".svg" and path.is_file()
+        image = QImage.fromData(themed_drawing(path)) if is_drawing else QImage(str(path))
         widest_px = self.window().width() - _BESIDE_PX
-        if image.width() <= widest_px:
-            return image
-        return image.scaledToWidth(widest_px, Qt.TransformationMode.SmoothTransformation)
+        if image.width() > widest_px:
+            image = image.scaledToWidth(widest_px, Qt.TransformationMode.SmoothTransformation)
+        return image if is_drawing or not is_dark() else _dimmed(image)
+
+    def _load_again(self) -> None:
+        """Load the page with its pictures in the colours of the theme."""
+        if self.source().isEmpty():
+            return
+        place = self.verticalScrollBar().value()
+        self.reload()
+        self.verticalScrollBar().setValue(place)
+
+
+def _dimmed(image: QImage) -> QImage:
+    """Return a light picture for a dark page: with less glare, and an edge where it is dark."""
+    image = image.convertToFormat(QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    painter.fillRect(image.rect(), QColor(0, 0, 0, round(255 * _DIMMED)))
+    painter.setPen(QColor(colors().muted))
+    painter.drawRect(image.rect().adjusted(0, 0, -1, -1))
+    painter.end()
+    return image
 
 
 def _lines(page: Path) -> Iterator[Line]:

@@ -4876,19 +4876,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Save as PDF…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>To scale, with a ruler to check the print</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>PNG, to show on a screen</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Use another initial rig…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4900,7 +4892,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} inner corners to find</source>
+        <source>Save as &amp;PDF…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save &amp;image…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Use another initial rig…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} inner corners</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no image shows this board yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, found in an image</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4973,14 +4985,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Number of images with a corner of the board in each part of the view. Empty parts give no information about the lens there.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye position, focused on the display. Darken the room and take 3 or more images.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Do not move the viewpoint camera. Switch the display off and take 8 or more images of the board through it while the headset tracks the board. Save the poses in one JSON file.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5068,6 +5072,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Save the grid and show it on this display unscaled. With the viewpoint camera at the eye position, focused on the display, take 3 or more images in the dark.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board, and save the poses in one JSON file.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Measured distance of the virtual screen, in metres.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5104,19 +5116,35 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Grid on the display</source>
+        <source>Ta&amp;ke images…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Camera pose</source>
+        <source>Searc&amp;h again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Save grid…</source>
+        <source>Grid on the &amp;display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ca&amp;mera pose</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>PNG, to show on the display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save &amp;grid…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take images of the grid, or choose their folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take images of the board, or choose their folder or a stereo calibration in Inputs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5144,7 +5172,23 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Doubtful</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not known</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Drawing of the arrangement</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Take images…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search &amp;again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5164,23 +5208,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Arrangement</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Show how the devices are arranged</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Search again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Read the folders again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Take images…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5229,6 +5257,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Distortion coefficients to solve for.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not judged: the file has no verdict</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the file cannot be read</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5284,19 +5320,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Save rig file…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Accept…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Check what the displays draw, with a camera at the eye position</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Use for the next calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5308,11 +5332,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>; {} are not known</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>; not calibrated here, as in the initial rig: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Save the rig file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Save rig file…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Accept…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Use for the next calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5325,6 +5365,18 @@ one turns out.</source>
     </message>
     <message>
         <source>compared with {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>C&amp;heck</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nu&amp;mbers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Com&amp;pare</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5508,6 +5560,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Solve</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solved {}: {}; {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5565,6 +5621,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Headset camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Pairs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take pairs of images, or choose both folders in Inputs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5632,7 +5696,19 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the intrinsics are in {}</source>
+        <source>I&amp;mages</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the intrinsics are in {}: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose another file, or solve them</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, take images of the board, or choose their folder in Inputs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5656,7 +5732,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Put the viewpoint camera behind the left display, take images of its grid and of the board, enter the screen&apos;s distance in Inputs, and solve.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Right display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do the same behind the right display: take images of its grid and of the board, enter the screen&apos;s distance in Inputs, and solve.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5664,15 +5748,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>saved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Take images of the board with the camera that later takes the eye&apos;s place, and solve its lens.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Put the viewpoint camera behind the left display, take images of its grid and of the board, and solve.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The same behind the right display: images of its grid and of the board, and solve.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5684,7 +5764,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Next</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>All entries are kept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cl&amp;ose</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5715,6 +5803,26 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Hidden while the wearer compares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press the large button</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Set-&amp;up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Inputs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbe&amp;rs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, tick an image in which the board was found</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

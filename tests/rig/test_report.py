@@ -4,9 +4,9 @@ import numpy as np
 
 from handcal.geometry import rigid
 from handcal.rig.example import example_rig
-from handcal.rig.report import missing_parts, report_rig
+from handcal.rig.report import RigFinding, display_finding, missing_parts, report_rig
 from handcal.rig_types import PART_NAMES, RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
-from handcal.types import CameraIdentity, HeadsetIdentity
+from handcal.types import EYES, CameraIdentity, Eye, HeadsetIdentity
 
 RIG = example_rig()
 
@@ -100,4 +100,30 @@ def test_what_the_file_does_not_tell_is_neither_fine_nor_doubtful() -> None:
     bare = replace(RIG, headset=None, depth_check=None, display_check=None, origins={})
     unknown = [one.what for one in report_rig(bare) if not one.is_known]
     parts = [f"Calibration of the {PART_NAMES[part]}" for part in RIG_PARTS]
-    assert unknown == ["Headset", "Depth check", "Display check", *parts]
+    assert unknown == ["Depth camera", "Headset", "Depth check", "Display check", *parts]
+
+
+def test_only_what_was_compared_with_something_is_judged() -> None:
+    known = CameraIdentity("Intel RealSense D415", "123"), HeadsetIdentity("0a1b", runtime="OpenXR")
+    stated = replace(RIG, depth_camera=known[0], headset=known[1])
+    for rig in (RIG, stated, replace(RIG, depth_camera=CameraIdentity("Intel RealSense D415"))):
+        judged = {one.what for one in report_rig(rig) if one.is_judged}
+        assert not judged & {"Depth camera", "Headset", "left: display", "right: display"}
+        assert "Distance of the viewpoints" in judged
+    told = {one.what: one for one in report_rig(stated)}
+    assert told["Depth camera"].is_known
+    assert told["Headset"].is_known
+
+
+def test_a_display_check_of_one_eye_does_not_speak_for_the_other() -> None:
+    def judge(**problems: str) -> RigFinding:
+        eyes: dict[Eye, str] = {eye: problems[eye] for eye in EYES if eye in problems}
+        return display_finding(DisplayCheck("today", "wearer", "0a1b", "", "", eyes))
+
+    one = judge(left="")
+    assert not one.is_judged
+    assert one.found.startswith("left as sent; right not checked")
+    assert judge(left="", right="").is_judged
+    wrong = judge(right="it is mirrored")
+    assert wrong.is_judged
+    assert not wrong.is_fine

@@ -13,7 +13,13 @@ from handcal.errors import HandcalError
 from handcal.io.images import IMAGE_SUFFIXES
 from handcal.progress import Progress
 from handcal.rig.accept import FEWEST_VIEWS
-from handcal.rig.acceptance import Acceptance, AcceptanceSettings, run_acceptance, view_rows
+from handcal.rig.acceptance import (
+    Acceptance,
+    AcceptanceSettings,
+    passed_words,
+    run_acceptance,
+    view_rows,
+)
 from handcal.rig.assemble import screen_of
 from handcal.rig.board import Board
 from handcal.rig.choose import ALIKE, ChooseSettings
@@ -23,13 +29,13 @@ from handcal.station.doctor import Finding, Health
 from handcal.types import EYES, Eye
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.result_rows import EYE_NAMES
-from handcal_gui.windows.rig.images_panel import Drawing
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
@@ -153,8 +159,13 @@ class AcceptDialog(QDialog):
         if found.cause:
             finding = Finding("", Health.BROKEN, tr("the rig fails: {}").format(found.cause))
         else:
-            eyes = ", ".join(EYE_NAMES[eye].lower() for eye in found.eyes)
-            finding = Finding("", Health.GOOD, tr("the rig passes: {}").format(eyes))
+            is_whole = len(found.eyes) == len(EYES)
+            eyes = passed_words(found.eyes)
+            finding = Finding(
+                "",
+                Health.GOOD if is_whole else Health.LIMITED,
+                tr("the rig passes: {}").format(eyes),
+            )
         if found.left_out:
             name, why = next(iter(found.left_out.items()))
             words = tr("{} left out, such as {}: {}").format(len(found.left_out), name, why)

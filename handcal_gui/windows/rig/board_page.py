@@ -26,10 +26,12 @@ from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.fields import (
     button,
     choice,
     fill_row,
+    main_button,
     number,
     paragraph,
     whole_number,
@@ -88,13 +90,13 @@ class BoardPage(QWidget):
             {paper: paper.capitalize() for paper in get_args(Paper)},
             tr("Size of the sheet of the PDF."),
         )
-        self._pdf = button(
-            "savePdf", tr("Save as PDF…"), help_text=tr("To scale, with a ruler to check the print")
-        )
+        self.main = main_button("savePdf", tr("Save as &PDF…"))
+        self.main.setToolTip(tr("To scale, with a ruler to check the print"))
+        self.strip = action_strip(self.main)
         self._picture = button(
-            "savePicture", tr("Save image…"), help_text=tr("PNG, to show on a screen")
+            "savePicture", tr("Save &image…"), help_text=tr("PNG, to show on a screen")
         )
-        self._begin = button("begin", tr("Use another initial rig…"))
+        self._begin = button("begin", tr("&Use another initial rig…"))
         self._rig, self._state = paragraph("initialRig"), paragraph("initialRigState")
         self._found = FindingLine("board")
         self._preview = ImageView(tr("Preview of the board"))
@@ -108,7 +110,7 @@ class BoardPage(QWidget):
         for spin in (self._columns, self._rows, self._square, self._marker):
             spin.valueChanged.connect(self._take)
         self._legacy.toggled.connect(self._take)
-        self._pdf.clicked.connect(self._save_pdf)
+        self.main.clicked.connect(self._save_pdf)
         self._picture.clicked.connect(self._save_picture)
         self._begin.clicked.connect(self._ask_for_rig)
         project.rig_changed.connect(self._show_rig)
@@ -120,7 +122,8 @@ class BoardPage(QWidget):
         self._draw.stop()
 
     def enter(self) -> None:
-        """Do nothing: the board has no images."""
+        """Show whether the board has been found."""
+        self._show_state()
 
     def _show_board(self, board: Board) -> None:
         self._kind.setCurrentIndex(self._kind.findData(board.kind))
@@ -149,12 +152,17 @@ class BoardPage(QWidget):
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
             return
         self._preview.show_text()
-        inner = " × ".join(map(str, board.inner))
-        self._found.show_finding(
-            Finding("", Health.GOOD, tr("{} inner corners to find").format(inner))
-        )
         self._project.enter(board=board, paper=self._paper.currentData())
+        self._show_state()
         self._draw.ask(board)
+
+    def _show_state(self) -> None:
+        inner = " × ".join(map(str, self._project.inputs.board.inner))
+        corners = tr("{} inner corners").format(inner)
+        found = Finding("", Health.LIMITED, corners, tr("no image shows this board yet"))
+        if self._project.inputs.board_found:
+            found = Finding("", Health.GOOD, tr("{}, found in an image").format(corners))
+        self._found.show_finding(found)
 
     def _save_pdf(self) -> None:
         path, _ = QFileDialog.getSaveFileName(
@@ -215,7 +223,7 @@ class BoardPage(QWidget):
     def _lay_out(self) -> None:
         squares, paper = QWidget(), QWidget()
         fill_row(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
-        fill_row(paper, self._paper, self._pdf, self._picture, grows=self._picture)
+        fill_row(paper, self._paper, self._picture, grows=self._picture)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
@@ -230,7 +238,6 @@ class BoardPage(QWidget):
         ):
             form.addRow(label, field)
         left = vbox(form, self._found, spacing=SPACING_PX)
-        left.addSpacing(2 * SPACING_PX)
         left.addWidget(
             paragraph(
                 text=tr(

@@ -22,20 +22,20 @@ from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import DisplayEntries, Distance
-from handcal_gui.windows.rig.solve import SolvedPart, solve_display
-from handcal_gui.windows.rig.step_page import StepPage
+from handcal_gui.windows.rig.solve import CAMERA_MISSING, SolvedPart, solve_display
+from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _DISTANCES: dict[Distance, str] = {
     "measured": tr("measured"),
     "solved": tr("from the squares' angle"),
 }
 _GRID_HINT = tr(
-    "Save the grid and show it on this display unscaled. Put the viewpoint camera at the eye "
-    "position, focused on the display. Darken the room and take 3 or more images."
+    "Save the grid and show it on this display unscaled. With the viewpoint camera at the eye "
+    "position, focused on the display, take 3 or more images in the dark."
 )
 _BOARD_HINT = tr(
-    "Do not move the viewpoint camera. Switch the display off and take 8 or more images of the "
-    "board through it while the headset tracks the board. Save the poses in one JSON file."
+    "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
+    "through it while the headset tracks the board, and save the poses in one JSON file."
 )
 
 
@@ -133,14 +133,15 @@ class DisplayPage(StepPage):
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
         grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display")
-        board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board")
-        panels = {tr("Grid on the display"): grid, tr("Camera pose"): board}
+        keys = tr("Ta&ke images…"), tr("Searc&h again")
+        board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
+        panels = {tr("Grid on the &display"): grid, tr("Ca&mera pose"): board}
         super().__init__(f"{eye}DisplayPage", project, form, panels, parent)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
         self._save = button(
-            "saveGrid", tr("Save grid…"), help_text=tr("PNG, to show on the display")
+            "saveGrid", tr("Save &grid…"), help_text=tr("PNG, to show on the display")
         )
         grid.add_button(self._save)
         self._save.clicked.connect(self._save_grid)
@@ -190,6 +191,19 @@ class DisplayPage(StepPage):
     def show_known(self) -> None:
         """Show the rig's present calibration of this display."""
         self.box.show_origin(self.project.rig.origins.get(self._eye))
+
+    @property
+    def need(self) -> str:
+        """The viewpoint camera's intrinsics, or images, if there are none."""
+        if not self.project.camera_file.exists():
+            return CAMERA_MISSING
+        grid = tr("to solve, take images of the grid, or choose their folder")
+        board = tr(
+            "to solve, take images of the board, or choose their folder or a stereo calibration in "
+            "Inputs"
+        )
+        need = images_needed(self._grid, grid)
+        return need or ("" if self._entries.stereo else images_needed(self._board, board))
 
     def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
         display, place = solved

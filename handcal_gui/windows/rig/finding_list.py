@@ -1,4 +1,4 @@
-"""A list of the findings about a rig, with doubtful ones marked."""
+"""A list of the findings about a rig, with a sign for each that was judged or is not known."""
 
 from __future__ import annotations
 
@@ -38,20 +38,25 @@ class FindingList(QTreeWidget):
         follow_theme(self, self._refresh)
 
     def show_findings(self, findings: Sequence[RigFinding]) -> None:
-        """Replace the list; doubtful findings come first."""
-        self._findings = tuple(sorted(findings, key=lambda one: one.is_fine))
+        """Replace the list; doubtful findings come first, then what is not known."""
+        self._findings = tuple(sorted(findings, key=lambda one: (one.is_fine, one.is_known)))
         self._refresh()
 
     def _refresh(self) -> None:
         self.clear()
         good, doubtful = icon("check", colors().good), icon("warning", colors().warning)
+        unknown = icon("wait", colors().muted)
         blank = QPixmap(self.iconSize())  # or the texts of rows without an icon stand apart
         blank.fill(Qt.GlobalColor.transparent)
         for one in self._findings:
             expected = "" if one.is_fine else one.expected
             item = QTreeWidgetItem([one.what, one.found, expected])
-            known = good if one.is_fine else doubtful
-            item.setIcon(0, known if one.is_known else QIcon(blank))
+            judged = (doubtful, tr("Doubtful")), (good, tr("Good"))
+            sign, word = judged[one.is_fine] if one.is_judged else (QIcon(blank), "")
+            if not one.is_known:
+                sign, word = unknown, tr("Not known")
+            item.setIcon(0, sign)
             for column in range(3):
                 item.setToolTip(column, item.text(column))
+            item.setData(0, Qt.ItemDataRole.AccessibleDescriptionRole, word)
             self.addTopLevelItem(item)

@@ -6,18 +6,16 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QSplitter, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
 
 from handcal.io.files import user_path
-from handcal.io.resources import resource_path
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.fields import button, choice, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
@@ -30,40 +28,6 @@ from handcal_gui.windows.rig.solve import SolvedPart
 from handcal_gui.windows.rig.uncertainty_map import UncertaintyMap
 
 
-class Drawing(QWidget):
-    """Shows a shipped SVG drawing, as large as fits.
-
-    Parameters
-    ----------
-    page : str
-        As for `resource_path`.
-    """
-
-    def __init__(self, page: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("drawing")
-        self.setAccessibleName(tr("Drawing of the arrangement"))
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self._renderer = QSvgRenderer(str(resource_path(page)), self)
-        self._renderer.setAspectRatioMode(Qt.AspectRatioMode.KeepAspectRatio)
-
-    @property
-    def is_readable(self) -> bool:
-        """True if the drawing was found and can be drawn."""
-        return self._renderer.isValid()
-
-    def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw on white, in which the drawings are made."""
-        painter = QPainter(self)
-        size = QSizeF(self._renderer.defaultSize())
-        size.scale(QSizeF(self.size()), Qt.AspectRatioMode.KeepAspectRatio)
-        place = QRectF(QPointF(), size)
-        place.moveCenter(QRectF(self.rect()).center())
-        painter.fillRect(place, Qt.GlobalColor.white)
-        self._renderer.render(painter, place)
-        painter.end()
-
-
 class ImagesPanel(QWidget):
     """Searches folders of images for a board; single images can be excluded.
 
@@ -72,28 +36,41 @@ class ImagesPanel(QWidget):
     titles : sequence of str
         Name of the camera, or names of the two cameras of pairs.
     hint : str
-        Text shown while there are no images.
+        How to take the images.
     drawing : str
-        Name of the drawing of the arrangement in the tutorial, shown while there are no images, and
-        on request.
+        Name of the drawing of the arrangement in the tutorial.
+    take, again : str
+        Texts of the buttons, so that two panels of a page can have different keys.
 
     Attributes
     ----------
+    setup, search : QWidget
+        How to take the images, and how their search goes on; the page places both.
     shots : tuple of Shot
     dropped_changed : Signal()
         The images or the set of excluded images have changed.
     again_requested, take_requested : Signal()
         The user requests to search the images again, or to take images.
+    board_found : Signal(Board)
+        The board searched for is in an image.
     """
 
     dropped_changed = Signal()
     again_requested = Signal()
     take_requested = Signal()
+    board_found = Signal(object)
 
     def __init__(
-        self, titles: tuple[str, ...], hint: str, drawing: str, parent: QWidget | None = None
+        self,
+        titles: tuple[str, ...],
+        hint: str,
+        drawing: str,
+        take: str = tr("&Take images…"),
+        again: str = tr("Search &again"),
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
+        self.setup, self.search = QWidget(), QWidget()
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
         self._list = ShotList(tr("Images"))
@@ -111,30 +88,36 @@ class ImagesPanel(QWidget):
         )
         self._shown_map.currentIndexChanged.connect(self._show_map)
         self._drawing = Drawing(f"docs/pictures/{drawing}.svg")
-        self._arrange = button(
-            "arrangement", tr("Arrangement"), help_text=tr("Show how the devices are arranged")
-        )
-        self._arrange.setCheckable(True)
-        self._arrange.toggled.connect(self._show_drawing)
         self._count = QLabel()
         self._count.setObjectName("count")
         self._hint = paragraph("hint", hint)
         self._trouble = FindingLine("images")
         self._trouble.hide()
-        self._again = button("again", tr("Search again"), help_text=tr("Read the folders again"))
-        self._take = button(
-            "take", tr("Take images…"), help_text=tr("Take images with cameras of this computer")
-        )
+        self._again = button("again", again, help_text=tr("Read the folders again"))
+        self._take = button("take", take, help_text=tr("Take images with cameras of this computer"))
         self._again.clicked.connect(self._search_again)
         self._take.clicked.connect(self.take_requested)
         self.bar = JobBar()
         self.bar.failed.connect(self.show_trouble)
+        self.bar.busy_changed.connect(self.bar.setVisible)
+        self.bar.hide()
         self._list.chosen.connect(self._show_chosen)
         self._list.dropped_changed.connect(self._refresh)
         self._list.dropped_changed.connect(self.dropped_changed)
         self._lay_out()
         self._show_map()
         self._refresh()
+
+    @property
+    def used(self) -> int:
+        """Number of images in which the board was found and that are not excluded."""
+        out = frozenset(self._list.dropped)
+        return sum(not shot.problem and shot.name not in out for shot in self.shots)
+
+    @property
+    def count(self) -> str:
+        """The number of images used, in words; empty without images."""
+        return tr("{} of {} used").format(self.used, len(self.shots)) if self.shots else ""
 
     def dropped_of(self, before: tuple[str, ...]) -> tuple[str, ...]:
         """Return the excluded images; `before` while no images are shown."""
@@ -143,7 +126,7 @@ class ImagesPanel(QWidget):
     def add_button(self, added: QPushButton) -> None:
         """Add a button in front of the panel's own."""
         self._buttons.insertWidget(0, added)
-        self.setTabOrder(self._shown_map, added)
+        QWidget.setTabOrder(added, self._take)
 
     def look(self, folders: Sequence[str], board: Board, dropped: Sequence[str]) -> None:
         """Search folders for the board, unless just done; do nothing if a folder is missing."""
@@ -192,6 +175,8 @@ class ImagesPanel(QWidget):
         self._list.show_shots(shots, dropped)
         self._refresh()
         self.dropped_changed.emit()
+        if self._question is not None and not all(shot.problem for shot in shots):
+            self.board_found.emit(self._question[1])
 
     def _search_again(self) -> None:
         self.forget()
@@ -206,17 +191,7 @@ class ImagesPanel(QWidget):
         for number, shown in enumerate(self._maps):
             found = [one for shot in kept if (one := shot.views[number].found) is not None]
             shown.show_coverage(coverage(found) if found else None)
-        good = sum(not shot.problem for shot in kept)
-        self._count.setText(
-            tr("{} of {} used").format(good, len(self.shots)) if self.shots else tr("No images yet")
-        )
-        self._hint.setVisible(not self.shots)
-        self._show_drawing()
-
-    def _show_drawing(self) -> None:
-        is_shown = not self.shots or self._arrange.isChecked()
-        self._drawing.setVisible(is_shown)
-        self._split.setVisible(not is_shown)
+        self._count.setText(self.count or tr("No images yet"))
 
     def _show_map(self) -> None:
         is_coverage = self._shown_map.currentData() == "coverage"
@@ -227,14 +202,19 @@ class ImagesPanel(QWidget):
 
     def _lay_out(self) -> None:
         side = vbox(self._count, *self._maps, *self._sigmas, self._shown_map, 1, spacing=SPACING_PX)
-        self._split = split = QSplitter(Qt.Orientation.Horizontal)
+        split = QSplitter(Qt.Orientation.Horizontal)
         split.setChildrenCollapsible(False)
         split.addWidget(self._list)
         split.addWidget(self._view)
         split.setStretchFactor(1, 1)
-        row = hbox((split, 1), (self._drawing, 1), side, spacing=2 * SPACING_PX)
-        layout = vbox(self._hint, self._trouble, (row, 1), on=self, margins=0, spacing=SPACING_PX)
-        self._buttons = hbox(
-            self._take, self._again, self._arrange, (self.bar, 1), spacing=SPACING_PX
+        hbox((split, 1), side, on=self, margins=SPACING_PX, spacing=2 * SPACING_PX)
+        self._buttons = hbox(self._take, self._again, 1, spacing=SPACING_PX)
+        vbox(
+            self._hint,
+            (self._drawing, 1),
+            self._buttons,
+            on=self.setup,
+            margins=0,
+            spacing=SPACING_PX,
         )
-        layout.addLayout(self._buttons)
+        vbox(self._trouble, self.bar, on=self.search, margins=0, spacing=0)

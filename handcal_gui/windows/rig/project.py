@@ -12,12 +12,15 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from handcal.camera.settings import RealSenseSettings
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import read_json, user_path
-from handcal.rig.rig_file import read_rig
+from handcal.rig.board import Board
+from handcal.rig.formats import read_intrinsics
+from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig_types import Rig
 from handcal_gui.translation import tr
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.solve import SolvedPart
 
+NOT_JUDGED, UNREADABLE = tr("not judged: the file has no verdict"), tr("the file cannot be read")
 _SETTLE_MS = 500
 
 
@@ -40,7 +43,7 @@ class RigProject(QObject):
     complaint : str
         Message about files that could not be read; empty if there is none.
     rig_changed : Signal()
-        The rig or the viewpoint camera's intrinsics have changed.
+        The rig or the viewpoint camera's intrinsics have changed, or the board was found.
     failed : Signal(str)
         The entries could not be saved.
     """
@@ -70,22 +73,48 @@ class RigProject(QObject):
     def camera_verdict(self) -> str:
         """Verdict on the viewpoint camera's calibration; empty if there is none.
 
-        A file without a verdict counts as good.
+        Without one in the file, as in those by OpenCV or ROS, nobody has judged it.
         """
         file = self.camera_file
         if not file.exists():
             return ""
+        try:
+            read_intrinsics(file)
+        except HandcalError:
+            return UNREADABLE
         with suppress(FileError):
             verdict = read_json(file).get("verdict")
-            return str(verdict.get("name")) if isinstance(verdict, dict) else "good"
-        return "good"  # a file by OpenCV or ROS
+            if isinstance(verdict, dict):
+                return str(verdict.get("name"))
+        return NOT_JUDGED
 
     def enter(self, **changes: Any) -> None:
-        """Replace fields of `RigInputs`."""
+        """Replace fields of `RigInputs`; another board is one that has not been found."""
         inputs = replace(self.inputs, **changes)
+        if inputs.board != self.inputs.board:
+            inputs = replace(inputs, board_found=False)
         if inputs != self.inputs:
             self.inputs = inputs
             self._settle.start()
+
+    @property
+    def saved_file(self) -> Path | None:
+        """The file to which the present rig was saved; None if there is none, or it differs."""
+        path = Path(self.inputs.saved)
+        return path if self.inputs.saved and self.folder.is_rig(path) else None
+
+    def save_rig_as(self, path: Path) -> None:
+        """Save the rig file, or raise FileError."""
+        write_rig(path, self.rig)
+        self.folder.save_rig(self.rig)
+        self.enter(saved=str(path.absolute()))
+        self.rig_changed.emit()
+
+    def note_found(self, board: Board) -> None:
+        """Remember that a board was found in an image, if it is the one entered."""
+        if board == self.inputs.board and not self.inputs.board_found:
+            self.enter(board_found=True)
+            self.rig_changed.emit()
 
     def start_from(self, path: Path) -> None:
         """Start from a rig file, or raise HandcalError; earlier calibrations are discarded."""

@@ -94,11 +94,15 @@ class RigInputs:
     """Everything entered in the rig wizard."""
 
     board: Board = field(default_factory=Board)
+    board_found: bool = False
+    """True once this board was found in an image."""
     paper: Paper = "a4"
     stereo: StereoEntries = field(default_factory=StereoEntries)
     viewpoint: ViewpointEntries = field(default_factory=ViewpointEntries)
     left: DisplayEntries = field(default_factory=DisplayEntries)
     right: DisplayEntries = field(default_factory=DisplayEntries)
+    saved: str = ""
+    """The rig file last saved."""
 
 
 class ProjectFolder:
@@ -168,6 +172,13 @@ class ProjectFolder:
             If it cannot be written.
         """
         write_rig(self._rig, rig)
+
+    def is_rig(self, path: Path) -> bool:
+        """Return whether a file is the same as the rig in this folder."""
+        try:
+            return path.read_bytes() == self._rig.read_bytes()
+        except OSError:
+            return False
 
 
 def entered_path(text: str) -> Path | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,12 +21,13 @@ from PySide6.QtWidgets import (
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import user_path
 from handcal.rig.check import MAX_TEXT
-from handcal.rig.report import report_rig
-from handcal.rig.rig_file import read_rig, write_rig
-from handcal.rig_types import PART_NAMES, RIG_PARTS
+from handcal.rig.report import RigFinding, report_rig
+from handcal.rig.rig_file import read_rig
+from handcal.rig_types import PART_NAMES, RIG_PARTS, Rig
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
@@ -54,7 +56,6 @@ class ResultPage(QWidget):
         super().__init__(parent)
         self.setObjectName("resultPage")
         self._project = project
-        self._saved: Path | None = None
         self._acceptance: AcceptDialog | None = None
         self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", tr("Name of the rig"))
         self._findings = FindingList(tr("Check of the rig"))
@@ -63,18 +64,19 @@ class ResultPage(QWidget):
         self._differences = NumberTable("differences", tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
-        self._save = main_button("saveRig", tr("Save rig file…"))
+        self.main = main_button("saveRig", tr("&Save rig file…"))
+        self.strip = action_strip(self.main)
         self._accept = button(
             "acceptRig",
-            tr("Accept…"),
+            tr("&Accept…"),
             help_text=tr("Check what the displays draw, with a camera at the eye position"),
         )
-        self._use = button("useRig", tr("Use for the next calibration"))
+        self._use = button("useRig", tr("&Use for the next calibration"))
         self._lay_out()
         self.enter()
         self._other.changed.connect(self._compare)
         self._name.editingFinished.connect(self._on_name_edited)
-        self._save.clicked.connect(self.save)
+        self.main.clicked.connect(self.save)
         self._accept.clicked.connect(self._open_acceptance)
         self._use.clicked.connect(self._ask_to_use)
         project.rig_changed.connect(self.enter)
@@ -86,19 +88,12 @@ class ResultPage(QWidget):
         findings = report_rig(rig)
         self._findings.show_findings(findings)
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
-        doubtful = sum(not one.is_fine for one in findings)
-        text = tr("{} of {} findings are doubtful: see Check").format(doubtful, len(findings))
-        missing = [part for part in RIG_PARTS if part not in rig.origins]
-        if not doubtful:
-            text = tr("no doubtful findings")
-        if missing:
-            text += tr("; not calibrated here, as in the initial rig: {}").format(
-                ", ".join(PART_NAMES[part] for part in missing)
-            )
-        health = Health.LIMITED if doubtful or missing else Health.GOOD
-        self._end.show_finding(Finding("", health, text))
-        self._saved = None
-        self._use.setEnabled(False)
+        saved = self._project.saved_file
+        self._use.setEnabled(saved is not None)
+        summary = _summary(rig, findings)
+        if saved is not None:
+            summary = Finding("", Health.GOOD, tr("saved as {}").format(saved))
+        self._end.show_finding(summary)
         self._compare()
 
     def hideEvent(self, event: QHideEvent) -> None:
@@ -118,13 +113,9 @@ class ResultPage(QWidget):
         """Save the rig file."""
         self._on_name_edited()
         try:
-            write_rig(path, self._project.rig)
+            self._project.save_rig_as(path)
         except FileError as error:
             self._end.show_finding(Finding("", Health.BROKEN, tr("not saved: {}").format(error)))
-            return
-        self._saved = path.absolute()
-        self._use.setEnabled(True)
-        self._end.show_finding(Finding("", Health.GOOD, tr("saved as {}").format(path)))
 
     def stop(self) -> None:
         """Close the acceptance, if it is open."""
@@ -146,8 +137,8 @@ class ResultPage(QWidget):
             self._end.show_finding(Finding("", Health.BROKEN, str(error)))
 
     def _ask_to_use(self) -> None:
-        if self._saved is not None:
-            self.rig_saved.emit(self._saved)
+        if (saved := self._project.saved_file) is not None:
+            self.rig_saved.emit(saved)
             text = tr("the next calibration uses this rig")
             self._end.show_finding(Finding("", Health.GOOD, text))
 
@@ -177,9 +168,9 @@ class ResultPage(QWidget):
         compare = QWidget()
         vbox(self._other, self._compared, (self._differences, 1), 0, on=compare, spacing=SPACING_PX)
         tabs = QTabWidget(documentMode=True)
-        tabs.addTab(self._findings, tr("Check"))
-        tabs.addTab(self._numbers, tr("Numbers"))
-        tabs.addTab(compare, tr("Compare"))
+        tabs.addTab(self._findings, tr("C&heck"))
+        tabs.addTab(self._numbers, tr("Nu&mbers"))
+        tabs.addTab(compare, tr("Com&pare"))
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.addRow(tr("Name"), self._name)
@@ -188,5 +179,22 @@ class ResultPage(QWidget):
         foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
         foot.addWidget(self._accept)
         foot.addWidget(self._use)
-        foot.addWidget(self._save)
         vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)
+
+
+def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
+    """Return how many findings are doubtful or not known, and which parts are not calibrated."""
+    doubtful = sum(not one.is_fine for one in findings)
+    missing = [part for part in RIG_PARTS if part not in rig.origins]
+    unknown = sum(not one.is_known for one in findings) - len(missing)
+    text = tr("no doubtful findings")
+    if doubtful:
+        text = tr("{} of {} findings are doubtful: see Check").format(doubtful, len(findings))
+    if unknown:
+        text += tr("; {} are not known").format(unknown)
+    if missing:
+        text += tr("; not calibrated here, as in the initial rig: {}").format(
+            ", ".join(PART_NAMES[part] for part in missing)
+        )
+    health = Health.LIMITED if doubtful or unknown or missing else Health.GOOD
+    return Finding("", health, text)

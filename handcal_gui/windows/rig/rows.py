@@ -166,7 +166,10 @@ def _place_rows(T_H_D: Float64, sigmas: Sequence[float]) -> Iterator[Row]:
 
 
 def _sigmas(covariance: Float64 | None, count: int) -> list[float]:
-    return [np.inf] * count if covariance is None else list(np.sqrt(np.diag(covariance)))
+    """Return the deviations; infinite if unknown, or of other parameters than this method's."""
+    if covariance is None or len(covariance) != count:
+        return [np.inf] * count
+    return list(np.sqrt(np.diag(covariance)))
 
 
 def _rms(rms_px: float) -> Row:

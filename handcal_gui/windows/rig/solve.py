@@ -37,6 +37,8 @@ from handcal_gui.windows.rig.project_folder import (
 from handcal_gui.windows.rig.rows import camera_rows, display_rows, stereo_rows
 from handcal_gui.windows.rig.shots import Shot, excluding
 
+CAMERA_MISSING = tr("the viewpoint camera's intrinsics are missing: solve its step first")
+
 
 @dataclass(frozen=True, slots=True)
 class SolvedPart:
@@ -118,9 +120,7 @@ def solve_display(
 ) -> tuple[SolvedPart, SolvedPart]:
     """Calibrate an eye's display; return its result and the viewpoint camera's pose."""
     if not camera_file.exists():
-        raise HandcalError(
-            tr("the viewpoint camera's intrinsics are missing: solve its step first")
-        )
+        raise HandcalError(CAMERA_MISSING)
     camera = read_intrinsics(camera_file)
     stereo, tracked = entered_path(entries.stereo), entered_path(entries.tracked)
     boards = [] if stereo else [view for (view,) in excluding(board_shots, entries.dropped_board)]

@@ -1,11 +1,13 @@
-"""The bottom of a step: the Solve button and the result."""
+"""The bottom of a step: the verdict on its result, or what is needed to solve it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
 
 from handcal.progress import Progress
 from handcal.rig_types import Origin
@@ -16,7 +18,7 @@ from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import hbox
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.times import local_time
@@ -27,27 +29,35 @@ HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Healt
 
 
 class SolveBox(QWidget):
-    """Solves in a job, and shows verdict, reason, worst image and numbers.
+    """Solves in a job, and shows verdict, reason and worst image.
 
     Attributes
     ----------
     button : MainButton
-        The Solve button, connected and enabled by the page.
+        The Solve button, placed and connected by the page.
     bar : JobBar
+    table : NumberTable
+        The numbers, placed by the page.
+    shown : Signal()
+        Another result is shown, or none.
     """
+
+    shown = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("solveBox")
-        self.button = main_button("solve", tr("Solve"))
+        self.button = main_button("solve", tr("&Solve"))
         self.bar = JobBar()
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
         self._lenses = with_name(ElidedLabel(), "lenses")  # whole, it would hide the images
-        self._table = NumberTable("numbers", tr("Numbers"))
-        self._table.setMinimumWidth(40 * SPACING_PX)
-        self._lay_out()
+        self.table = NumberTable("numbers", tr("Numbers"))
+        self._shown = Finding("", Health.LIMITED, tr("Not solved yet"))
+        self._need = ""
+        parts = self._verdict, self._worst, self._lenses
+        vbox(*parts, on=self, margins=0, spacing=SPACING_PX // 2)
         self.show_origin(None)
 
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
@@ -62,9 +72,7 @@ class SolveBox(QWidget):
 
     def show_origin(self, origin: Origin | None) -> None:
         """Show an earlier result; None if there is none."""
-        self._worst.hide()
-        self._lenses.hide()
-        self._table.hide()
+        self._clear()
         if origin is None:
             self.show_finding(Finding("", Health.LIMITED, tr("Not solved yet")))
             return
@@ -74,8 +82,17 @@ class SolveBox(QWidget):
         self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
 
     def show_finding(self, finding: Finding) -> None:
-        """Show a message about the result."""
-        self._verdict.show_finding(finding)
+        """Show a message about the result, followed by what is needed to solve."""
+        self._shown = finding
+        advice = self._need or finding.advice
+        self._verdict.show_finding(replace(finding, advice=advice))
+
+    def allow(self, need: str, *, is_busy: bool) -> None:
+        """Enable the button, unless something is needed first, or being done."""
+        self.button.setEnabled(not need and not is_busy)
+        if need != self._need:
+            self._need = need
+            self.show_finding(self._shown)
 
     def show_solved(self, solved: SolvedPart, kept: str) -> None:
         """Show a result; `kept` describes its use."""
@@ -90,22 +107,15 @@ class SolveBox(QWidget):
             self._worst.show_finding(Finding("", Health.LIMITED, worst))
         self._lenses.setText(f"{sentence(solved.lenses)}.")
         self._lenses.setVisible(bool(solved.lenses))
-        self._table.show_rows(COLUMNS, solved.rows)
-        self._table.show()
+        self.table.show_rows(COLUMNS, solved.rows)
+        self.shown.emit()
 
     def _show_failure(self, why: str) -> None:
-        self._worst.hide()
-        self._lenses.hide()
-        self._table.hide()
+        self._clear()
         self.show_finding(Finding("", Health.BROKEN, why))
 
-    def _lay_out(self) -> None:
-        left = QVBoxLayout()
-        left.setSpacing(SPACING_PX)
-        row = hbox(self.button, (self.bar, 1), spacing=2 * SPACING_PX)
-        left.addLayout(row)
-        left.addWidget(self._verdict)
-        left.addWidget(self._worst)
-        left.addWidget(self._lenses)
-        left.addStretch(1)
-        hbox((left, 1), self._table, on=self, margins=0, spacing=2 * SPACING_PX)
+    def _clear(self) -> None:
+        self._worst.hide()
+        self._lenses.hide()
+        self.table.show_rows(COLUMNS, ())
+        self.shown.emit()

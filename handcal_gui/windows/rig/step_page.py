@@ -6,21 +6,27 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.layouts import scrollable, vbox
+from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
+_FIRST_PANEL = 2
+"""Place of the first panel of images among the tabs."""
+
 
 class StepPage(QWidget):
-    """Fields at the top, images in the middle, and the result at the bottom.
+    """Tabs with the set-up, the inputs, the images and the numbers, and the verdict below.
 
     Parameters
     ----------
@@ -36,6 +42,9 @@ class StepPage(QWidget):
     form : EntriesForm
     panels : tuple of ImagesPanel
     box : SolveBox
+    main : MainButton
+    strip : QWidget
+        With the main button, for the bottom of the window.
     """
 
     def __init__(
@@ -52,15 +61,25 @@ class StepPage(QWidget):
         self.form = form
         self.panels = tuple(panels.values())
         self.box = SolveBox()
-        self._lay_out(panels)
+        self.main = self.box.button
+        self.strip = action_strip(self.main, bar=self.box.bar)
+        self._tabs = QTabWidget(documentMode=True)
+        self._titles = tuple(panels)
+        self._lay_out()
         form.changed.connect(self.keep)
+        form.changed.connect(self._refresh)
         self.box.button.clicked.connect(self.solve)
         for panel in self.panels:
             panel.dropped_changed.connect(self.keep)
+            panel.dropped_changed.connect(self._refresh)
             panel.bar.busy_changed.connect(self._refresh)
             panel.again_requested.connect(self.enter)
+            panel.board_found.connect(project.note_found)
+            panel.board_found.connect(self._show_images)
         self.box.bar.busy_changed.connect(self._refresh)
+        self.box.shown.connect(self._refresh)
         project.rig_changed.connect(self.show_known)
+        project.rig_changed.connect(self._refresh)
 
     def enter(self) -> None:
         """Search the entered folders, unless already done."""
@@ -77,6 +96,16 @@ class StepPage(QWidget):
     def show_known(self) -> None:
         """Show the rig's present calibration of this part."""
         raise NotImplementedError
+
+    @property
+    def need(self) -> str:
+        """Advice on what is missing before the step can be solved; empty if nothing is."""
+        raise NotImplementedError
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look again whether the step can be solved."""
+        super().showEvent(event)
+        self._refresh()
 
     def stop(self) -> None:
         """End background work."""
@@ -106,20 +135,44 @@ class StepPage(QWidget):
         dialog.finished.connect(end)
         dialog.open()
 
-    def _lay_out(self, panels: Mapping[str, ImagesPanel]) -> None:
-        content = QWidget()
-        layout = vbox(self.form, on=content, margins=0, spacing=SPACING_PX)
-        if len(panels) == 1:
-            layout.addWidget(self.panels[0], 1)
-        else:
-            tabs = QTabWidget(documentMode=True)
-            for title, panel in panels.items():
-                panel.setContentsMargins(*4 * (SPACING_PX,))
-                tabs.addTab(panel, title)
-            layout.addWidget(tabs, 1)
-        # Or a low screen hides the button that solves.
-        vbox((scrollable(content), 1), self.box, on=self, margins=0, spacing=SPACING_PX)
+    def _lay_out(self) -> None:
+        setup, inputs = QWidget(), QWidget()
+        setups = [(panel.setup, 1) for panel in self.panels]
+        hbox(*setups, on=setup, margins=SPACING_PX, spacing=3 * SPACING_PX)
+        vbox(self.form, 1, on=inputs, margins=SPACING_PX)
+        self._tabs.addTab(setup, tr("Set-&up"))
+        self._tabs.addTab(inputs, tr("&Inputs"))
+        for title, panel in zip(self._titles, self.panels, strict=True):
+            self._tabs.addTab(panel, title)
+        self._tabs.addTab(self.box.table, tr("Numbe&rs"))
+        searches = (panel.search for panel in self.panels)
+        tabs = scrollable(self._tabs)
+        vbox((tabs, 1), *searches, self.box, on=self, margins=0, spacing=SPACING_PX // 2)
+
+    def _show_images(self) -> None:
+        """Show the images in place of how to take them, once all are found."""
+        if self._tabs.currentIndex() == 0 and not self._is_looking:
+            found = [place for place, one in enumerate(self.panels, _FIRST_PANEL) if one.shots]
+            self._refresh()
+            self._tabs.setCurrentIndex(found[0])
+
+    @property
+    def _is_looking(self) -> bool:
+        return any(panel.bar.is_busy for panel in self.panels)
 
     def _refresh(self) -> None:
-        is_looking = any(panel.bar.is_busy for panel in self.panels)
-        self.box.button.setEnabled(not is_looking and not self.box.bar.is_busy)
+        panels = zip(self._titles, self.panels, strict=True)
+        for place, (title, panel) in enumerate(panels, _FIRST_PANEL):
+            count = f" ({panel.count})" if panel.count else ""
+            self._tabs.setTabText(place, f"{title}{count}")
+            self._tabs.setTabEnabled(place, bool(panel.shots))
+        self._tabs.setTabEnabled(self._tabs.count() - 1, self.box.table.rowCount() > 0)
+        need = "" if self._is_looking else self.need
+        self.box.allow(need, is_busy=self._is_looking or self.box.bar.is_busy)
+
+
+def images_needed(panel: ImagesPanel, request: str) -> str:
+    """Return a request for images, unless some can be used."""
+    if panel.used:
+        return ""
+    return tr("to solve, tick an image in which the board was found") if panel.shots else request

@@ -15,7 +15,7 @@ from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import intrinsics_field, lens_field
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve import SolvedPart, solve_stereo
-from handcal_gui.windows.rig.step_page import StepPage
+from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _HINT = tr(
     "Take 20 or more pairs of simultaneous images of the board: near and far, in all parts of both "
@@ -69,7 +69,7 @@ class StereoPage(StepPage):
         )
         form.show_entries(project.inputs.stereo)
         panel = ImagesPanel((tr("Depth camera"), tr("Headset camera")), _HINT, "setup-stereo")
-        super().__init__("stereoPage", project, form, {tr("Pairs"): panel}, parent)
+        super().__init__("stereoPage", project, form, {tr("&Pairs"): panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
@@ -94,6 +94,12 @@ class StereoPage(StepPage):
     def show_known(self) -> None:
         """Show the rig's present pose of the depth camera."""
         self.box.show_origin(self.project.rig.origins.get("T_H_D"))
+
+    @property
+    def need(self) -> str:
+        """Pairs of images, if there are none."""
+        request = tr("to solve, take pairs of images, or choose both folders in Inputs")
+        return images_needed(self.panel, request)
 
     def _show_solved(self, solved: SolvedPart) -> None:
         self.box.show_solved(solved, self.project.add_part(solved))

@@ -13,9 +13,10 @@ from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.lens_fields import lens_field
-from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project import UNREADABLE, RigProject
 from handcal_gui.windows.rig.solve import SolvedPart, solve_viewpoint
-from handcal_gui.windows.rig.step_page import StepPage
+from handcal_gui.windows.rig.solve_box import HEALTHS
+from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _HINT = tr(
     "Take 20 or more images of the board with the viewpoint camera, with the focus that it will "
@@ -41,7 +42,7 @@ class ViewpointPage(StepPage):
         )
         form.show_entries(project.inputs.viewpoint)
         panel = ImagesPanel((tr("Viewpoint camera"),), _HINT, "setup-viewpoint")
-        super().__init__("viewpointPage", project, form, {tr("Images"): panel}, parent)
+        super().__init__("viewpointPage", project, form, {tr("I&mages"): panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
@@ -68,10 +69,19 @@ class ViewpointPage(StepPage):
         """Show the file of intrinsics, if there is one."""
         self.box.show_origin(None)
         file = self.project.camera_file
-        if file.exists():
-            self.box.show_finding(
-                Finding("", Health.GOOD, tr("the intrinsics are in {}").format(file))
-            )
+        if verdict := self.project.camera_verdict:
+            found = tr("the intrinsics are in {}: {}").format(file, verdict)
+            finding = Finding("", HEALTHS.get(verdict, Health.LIMITED), found)
+            if verdict == UNREADABLE:
+                advice = tr("choose another file, or solve them")
+                finding = Finding("", Health.BROKEN, found, advice)
+            self.box.show_finding(finding)
+
+    @property
+    def need(self) -> str:
+        """Images, if there are none."""
+        request = tr("to solve, take images of the board, or choose their folder in Inputs")
+        return images_needed(self.panel, request)
 
     def _show_solved(self, solved: SolvedPart) -> None:
         is_bad = solved.verdict.name == "bad"

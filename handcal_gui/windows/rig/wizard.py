@@ -11,20 +11,21 @@ from PySide6.QtWidgets import (
     QLabel,
     QListWidget,
     QListWidgetItem,
+    QSizePolicy,
     QStackedWidget,
     QWidget,
 )
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.rig_types import RIG_PARTS, RigPart
+from handcal.rig_types import RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.fields import button, paragraph, with_name
+from handcal_gui.widgets.fields import MainButton, button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
-from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.project import NOT_JUDGED, UNREADABLE, RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.result_page import ResultPage
 from handcal_gui.windows.rig.stereo_page import StereoPage
@@ -32,7 +33,15 @@ from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
 
 _FIRST_SIZE = QSize(1240, 760)
 _RAIL_PX = 20 * SPACING_PX
-_SIGNS = {"good": ("check", "good"), "needs more views": ("warning", "warning")}
+_SAVED = tr("saved")
+_SIGNS = {
+    "good": ("check", "good"),
+    _SAVED: ("check", "good"),
+    "needs more views": ("warning", "warning"),
+    NOT_JUDGED: ("warning", "warning"),
+    "bad": ("cross", "red"),
+    UNREADABLE: ("cross", "red"),
+}
 _BOARD, _VIEWPOINT = tr("Board"), tr("Viewpoint camera")
 _STEPS: dict[str, tuple[str, RigPart | None]] = {
     _BOARD: (tr("Print the board at 100 %, measure a square and enter its size."), None),
@@ -53,12 +62,15 @@ _STEPS: dict[str, tuple[str, RigPart | None]] = {
     tr("Left display"): (
         tr(
             "Put the viewpoint camera behind the left display, take images of its grid and of the "
-            "board, and solve."
+            "board, enter the screen's distance in Inputs, and solve."
         ),
         "left",
     ),
     tr("Right display"): (
-        tr("The same behind the right display: images of its grid and of the board, and solve."),
+        tr(
+            "Do the same behind the right display: take images of its grid and of the board, enter "
+            "the screen's distance in Inputs, and solve."
+        ),
         "right",
     ),
     tr("Result"): (tr("Name the rig, look at what is doubtful, save it, and use it."), None),
@@ -67,7 +79,10 @@ _STEPS: dict[str, tuple[str, RigPart | None]] = {
 
 
 class RigPage(Protocol):
-    """Interface of a page of the wizard."""
+    """Interface of a page of the wizard; the strip with its main button stands below it."""
+
+    main: MainButton
+    strip: QWidget
 
     def enter(self) -> None:
         """Prepare to be shown."""
@@ -108,7 +123,7 @@ class RigWizard(QDialog):
         self._banner = Banner()
         self._rail = with_name(QListWidget(), "rigRail", tr("Steps"))
         self._title, self._purpose = QLabel(), paragraph("rigPurpose")
-        self._stack = QStackedWidget()
+        self._stack, self._strips = QStackedWidget(), QStackedWidget()
         result = ResultPage(self.project)
         self._pages: list[RigPage] = []
         for page in (
@@ -120,10 +135,11 @@ class RigWizard(QDialog):
             result,
         ):
             self._stack.addWidget(page)
+            self._strips.addWidget(page.strip)
             self._pages.append(page)
-        self._back = button("rigBack", tr("Back"))
-        self._next = button("rigNext", tr("Next"))
-        self._close = button("rigClose", tr("Close"), help_text=tr("All entries are kept"))
+        self._back = button("rigBack", tr("&Back"))
+        self._next = button("rigNext", tr("&Next"))
+        self._close = button("rigClose", tr("Cl&ose"), help_text=tr("All entries are kept"))
         for title in _STEPS:
             self._rail.addItem(QListWidgetItem(title))
         self._lay_out()
@@ -171,6 +187,10 @@ class RigWizard(QDialog):
         self._title.setText(title)
         self._purpose.setText(_STEPS[title][0])
         self._stack.setCurrentIndex(step)
+        self._strips.setCurrentIndex(step)
+        main = self._pages[step].main
+        main.setDefault(False)  # Qt forgets a default set before the button was in a dialog
+        main.setDefault(True)
         self._back.setEnabled(step > 0)
         self._next.setEnabled(step < len(_STEPS) - 1)
         self._pages[step].enter()
@@ -193,11 +213,10 @@ class RigWizard(QDialog):
         if part is not None:
             return origins[part].verdict if part in origins else ""
         if title == _BOARD:
-            return "good" if origins or self.project.camera_verdict else ""  # it was found
+            return "good" if self.project.inputs.board_found else ""
         if title == _VIEWPOINT:
             return self.project.camera_verdict
-        verdicts = {origins[one].verdict if one in origins else "" for one in RIG_PARTS}
-        return "good" if verdicts == {"good"} else ""
+        return _SAVED if self.project.saved_file else ""
 
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
@@ -206,7 +225,9 @@ class RigWizard(QDialog):
         self._rail.setSpacing(SPACING_PX // 2)
         self._rail.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self._rail.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        foot = hbox(1, self._back, self._next, self._close, spacing=SPACING_PX)
-        right = vbox(self._title, self._purpose, (self._stack, 1), foot, spacing=SPACING_PX)
+        self._strips.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        moves = self._close, self._back, self._next
+        foot = hbox(*moves, (self._strips, 1), spacing=SPACING_PX)
+        right = vbox(self._title, self._purpose, (self._stack, 1), spacing=SPACING_PX)
         row = hbox(self._rail, (right, 1), spacing=2 * SPACING_PX)
-        vbox(self._banner, (row, 1), on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
+        vbox(self._banner, (row, 1), foot, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)

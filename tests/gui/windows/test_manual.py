@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QTextDocument
@@ -13,6 +14,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from handcal_gui.theme import use_theme
 from handcal_gui.windows.manual import Manual, find_lines, read_lines
 from tests.helpers import ROOT
 
@@ -27,6 +29,13 @@ def manual(qtbot: QtBot) -> Iterator[Manual]:
     qtbot.addWidget(parent)
     yield Manual(parent)
     assert parent
+
+
+@pytest.fixture
+def dark(qtbot: QtBot) -> Iterator[None]:
+    use_theme("dark")
+    yield
+    use_theme("system")
 
 
 def heading_in_view(manual: Manual) -> str:
@@ -52,6 +61,26 @@ def test_a_picture_is_no_page_and_never_wider_than_the_window(manual: Manual) ->
     picture = manual.page.loadResource(kind, QUrl("pictures/start.png"))
     assert isinstance(picture, QImage)
     assert 0 < picture.width() <= manual.width()
+
+
+def test_in_dark_themes_no_picture_glares(manual: Manual, dark: None) -> None:
+    manual.open("docs/tutorial.md")
+    kind = QTextDocument.ResourceType.ImageResource.value
+
+    def lightness(name: str) -> tuple[int, int]:
+        """Return the lightness of most of a picture and that of its edge."""
+        picture = manual.page.loadResource(kind, QUrl(f"pictures/{name}"))
+        assert isinstance(picture, QImage)
+        inside = [picture.pixelColor(x, 20).lightness() for x in range(5, picture.width() - 5, 9)]
+        return int(np.median(inside)), picture.pixelColor(0, 0).lightness()
+
+    ground = manual.page.palette().base().color().lightness()
+    assert lightness("setup-stereo.svg") == (ground, ground)
+    dimmed, edge = lightness("start.png")
+    assert ground < edge < dimmed < 200
+    use_theme("light")
+    assert lightness("setup-stereo.svg")[0] == 255
+    assert lightness("start.png")[0] > 230
 
 
 def test_a_search_lists_lines_of_all_pages_and_return_goes_from_one_to_the_next(

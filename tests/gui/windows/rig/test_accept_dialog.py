@@ -16,8 +16,8 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.acceptance import write_acceptance
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
-from handcal_gui.windows.rig.images_panel import Drawing
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder, ViewpointEntries
 from handcal_gui.windows.rig.take_dialog import TakeDialog
@@ -79,6 +79,9 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     found = part(dialog, QLabel, "acceptedFound")
     qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
     table = part(dialog, QTableWidget, "drawn-against-seen")
+    sign = part(dialog, QLabel, "acceptedHealth")
+    assert sign.accessibleName() == "Note", "the right display was not looked at"
+    assert "right not accepted" in found.text()
     assert table.rowCount() >= 5
     assert (folder / "page" / "report.html").exists()
     dialog.reject()

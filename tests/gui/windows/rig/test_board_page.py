@@ -44,7 +44,7 @@ def found(page: BoardPage) -> str:
 
 
 def press(page: BoardPage, name: str) -> None:
-    button = page.findChild(QPushButton, name)
+    button = page.findChild(QPushButton, name) or page.strip.findChild(QPushButton, name)
     assert isinstance(button, QPushButton)
     button.click()
 
@@ -63,6 +63,12 @@ def test_the_board_shown_is_the_one_entered(
     expected = Board("checkerboard", (12, 7), 0.0249)
     assert project.inputs.board == expected
     assert "11 × 6" in found(page)
+    assert "No image shows this board yet" in found(page)
+    project.note_found(Board())
+    assert not project.inputs.board_found, "this is another board"
+    project.note_found(expected)
+    page.enter()
+    assert "found in an image" in found(page)
     preview = page.findChild(ImageView)
     assert isinstance(preview, ImageView)
     qtbot.waitUntil(lambda: preview.has_image)

@@ -8,15 +8,23 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTreeWidget, QTreeWidgetItem
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QLabel,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import WorstView
+from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.coverage_map import CoverageMap
-from handcal_gui.windows.rig.images_panel import Drawing, ImagesPanel
+from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.solve import SolvedPart
 from handcal_gui.windows.rig.uncertainty_map import UncertaintyMap
 
@@ -54,7 +62,7 @@ def item(panel: ImagesPanel, row: int) -> QTreeWidgetItem:
     return found
 
 
-def text(panel: ImagesPanel, name: str) -> str:
+def text(panel: QWidget, name: str) -> str:
     label = panel.findChild(QLabel, name)
     assert isinstance(label, QLabel)
     return label.text()
@@ -120,7 +128,7 @@ def test_the_reason_for_no_images_is_reported(
 ) -> None:
     panel.look((str(tmp_path), str(tmp_path)), photographs.work.board, ())
     qtbot.waitUntil(lambda: not panel.bar.is_busy)
-    assert "No PNG or JPEG" in text(panel, "imagesFound")
+    assert "No PNG or JPEG" in text(panel.search, "imagesFound")
     panel.look((str(tmp_path), ""), photographs.work.board, ())
     assert not panel.bar.is_busy
 
@@ -138,20 +146,24 @@ def test_what_was_left_out_of_other_images_is_forgotten(
     assert full.dropped_of(before) == ()
 
 
-def test_the_drawing_is_shown_without_images_and_on_request(
-    qtbot: QtBot, panel: ImagesPanel, photographs: Any
-) -> None:
-    drawing, arrange = panel.findChild(Drawing), panel.findChild(QPushButton, "arrangement")
+def test_the_set_up_shows_a_drawing(qtbot: QtBot, panel: ImagesPanel) -> None:
+    drawing = panel.setup.findChild(Drawing)
     assert isinstance(drawing, Drawing)
-    assert isinstance(arrange, QPushButton)
-    assert drawing.isVisible()
+    panel.setup.resize(700, 400)
+    panel.setup.show()
     image = drawing.grab().toImage()
     shades = {image.pixel(x, y) for x in range(0, image.width(), 3) for y in range(0, 200, 3)}
     assert len(shades) > 3
-    look(panel, photographs)
-    qtbot.waitUntil(lambda: not panel.bar.is_busy and not drawing.isVisible(), timeout=20_000)
-    arrange.setChecked(True)
-    assert drawing.isVisible()
+
+
+def test_a_low_panel_has_lower_maps(qtbot: QtBot, panel: ImagesPanel) -> None:
+    maps = panel.findChildren(CoverageMap)
+    high = [one.height() for one in maps]
+    panel.resize(1000, 240)
+    QApplication.processEvents()
+    assert panel.height() == 240
+    assert all(one.height() < whole for one, whole in zip(maps, high, strict=True))
+    assert max(one.geometry().bottom() for one in maps) < panel.height()
 
 
 @pytest.mark.parametrize("page", sorted(PAGES))

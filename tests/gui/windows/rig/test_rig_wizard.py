@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QRect, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
     QLabel,
@@ -19,13 +20,17 @@ from PySide6.QtWidgets import (
     QPushButton,
     QScrollArea,
     QSpinBox,
+    QTabWidget,
     QTreeWidget,
 )
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
+from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig
+from handcal.rig_types import Origin
+from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.step_page import StepPage
@@ -69,6 +74,12 @@ def solve(qtbot: QtBot, wizard: RigWizard, step: int) -> str:
 def wait(qtbot: QtBot, wizard: RigWizard) -> None:
     bars = wizard.findChildren(JobBar)
     qtbot.waitUntil(lambda: not any(bar.is_busy for bar in bars), timeout=30_000)
+
+
+def show_tab(wizard: RigWizard, title: str) -> None:
+    tabs = child(wizard, QTabWidget, "")
+    (place,) = (i for i in range(tabs.count()) if tabs.tabText(i).replace("&", "") == title)
+    tabs.setCurrentIndex(place)
 
 
 def marks(wizard: RigWizard) -> list[str]:
@@ -185,6 +196,50 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     wizard.show_step(RESULT)
     found = child(wizard, QLabel, "savedRigFound").text()
     assert "as in the initial rig: left display, right display, depth camera's pose" in found
+    assert "4 are not known" in found
+    signs = child(wizard, QTreeWidget, "rigFindings")
+    rows = [signs.topLevelItem(row) for row in range(signs.topLevelItemCount())]
+    told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
+    assert told["Depth camera"] == "Not known"
+    assert told["left: display"] == ""
+    assert told["Viewpoints"] == "Good"
+
+
+def test_another_board_and_a_changed_rig_lose_their_ticks(
+    qtbot: QtBot, wizard: RigWizard, tmp_path: Path
+) -> None:
+    wizard.show_step(STEREO)
+    wait(qtbot, wizard)
+    assert marks(wizard)[BOARDS] == "good", "it is in the images"
+    wizard.project.enter(board=Board(squares=(5, 4), square_m=0.03))
+    wizard.project.save_rig_as(tmp_path / "ours.yaml")
+    assert marks(wizard)[BOARDS] == "not done yet"
+    assert marks(wizard)[RESULT] == "saved"
+    wizard.project.use_rig(replace(wizard.project.rig, name="another"))
+    assert marks(wizard)[RESULT] == "not done yet"
+
+
+def test_origins_in_the_initial_rig_do_not_tick_the_board(wizard: RigWizard) -> None:
+    origin = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
+    wizard.project.use_rig(replace(wizard.project.rig, origins={"left": origin}))
+    assert marks(wizard)[BOARDS] == "not done yet"
+
+
+def test_intrinsics_that_nobody_judged_are_not_ticked(
+    wizard: RigWizard, photographs: Any, tmp_path: Path
+) -> None:
+    given = tmp_path / "camera.yaml"
+    write_intrinsics(given, photographs.viewpoint, "opencv")
+    wizard.show_step(VIEWPOINT)
+    page = wizard.page
+    assert isinstance(page, StepPage)
+    page.form.enter(images="", intrinsics=str(given))
+    wizard.project.camera_solved()
+    assert "not judged" in marks(wizard)[VIEWPOINT]
+    given.write_text("%YAML:1.0\n")
+    wizard.project.camera_solved()
+    assert marks(wizard)[VIEWPOINT] == "the file cannot be read"
+    assert child(wizard, QLabel, "verdictHealth").accessibleName() == "Problem"
 
 
 def test_a_low_screen_shows_the_buttons_below(wizard: RigWizard) -> None:
@@ -219,14 +274,22 @@ def test_a_name_being_typed_is_kept_when_another_step_is_shown(wizard: RigWizard
 
 def test_a_grid_that_has_no_room_is_reported(qtbot: QtBot, wizard: RigWizard) -> None:
     wizard.show_step(LEFT)
+    wait(qtbot, wizard)
+    show_tab(wizard, "Inputs")
     square = child(wizard, QSpinBox, "gridSquare")
     square.setValue(700)
     assert "no room" in child(wizard, QLabel, "imagesFound").text()
+    show_tab(wizard, "Set-up")
+    page = wizard.page
+    assert isinstance(page, StepPage)
     for name in ("saveGrid", "take"):
-        child(wizard, QPushButton, name).click()
+        button = page.panels[0].setup.findChild(QPushButton, name)
+        assert isinstance(button, QPushButton)
+        button.click()
     assert wizard.findChild(TakeDialog) is None
     square.setValue(80)
     wait(qtbot, wizard)
+    show_tab(wizard, "Grid on the display (2 of 2 used)")
     assert "2 of 2 used" in child(wizard, QLabel, "count").text()
 
 
@@ -246,3 +309,68 @@ def test_on_a_small_screen_no_form_is_cut_at_its_side(wizard: RigWizard) -> None
         QApplication.processEvents()
         [area] = [one for one in wizard.findChildren(QScrollArea) if one.isVisible()]
         assert area.horizontalScrollBar().maximum() == 0
+
+
+def test_on_a_small_screen_nothing_scrolls(qtbot: QtBot, wizard: RigWizard) -> None:
+    wizard.resize(960, 510)
+    for step in (STEREO, VIEWPOINT, LEFT):
+        solve(qtbot, wizard, step)
+        tabs = child(wizard, QTabWidget, "")
+        for place in range(tabs.count()):
+            tabs.setCurrentIndex(place)
+            QApplication.processEvents()
+            (area,) = (one for one in wizard.findChildren(QScrollArea) if one.isVisible())
+            assert area.verticalScrollBar().maximum() == 0
+            assert area.horizontalScrollBar().maximum() == 0
+
+
+def test_without_images_nothing_is_solved_and_the_reason_is_in_sight(
+    qtbot: QtBot, tmp_path: Path
+) -> None:
+    wizard = RigWizard(ProjectFolder(tmp_path / "empty"))
+    qtbot.addWidget(wizard)
+    wizard.show()
+    for step, reason in (
+        (STEREO, "take pairs of images"),
+        (VIEWPOINT, "take images of the board"),
+        (LEFT, "intrinsics are missing"),
+    ):
+        wizard.show_step(step)
+        assert not child(wizard, QPushButton, "solve").isEnabled()
+        assert reason in child(wizard, QLabel, "verdictFound").text()
+    wizard.accept()
+
+
+def test_without_a_ticked_image_nothing_is_solved(qtbot: QtBot, wizard: RigWizard) -> None:
+    assert "added" in solve(qtbot, wizard, STEREO)
+    shots = child(wizard, QTreeWidget, "shots")
+    for row in range(shots.topLevelItemCount()):
+        shots.topLevelItem(row).setCheckState(0, Qt.CheckState.Unchecked)
+    assert not child(wizard, QPushButton, "solve").isEnabled()
+    assert "tick an image" in child(wizard, QLabel, "verdictFound").text()
+
+
+def test_each_step_has_one_main_button_which_its_key_presses(
+    qtbot: QtBot, wizard: RigWizard
+) -> None:
+    pressed: list[int] = []
+    for step in range(6):
+        wizard.show_step(step)
+        wait(qtbot, wizard)
+        (main,) = (one for one in wizard.findChildren(MainButton) if one.isVisible())
+        buttons = [one for one in wizard.findChildren(QPushButton) if one.isVisible()]
+        assert [one for one in buttons if one.isDefault()] == [main]
+        letters = [found[1] for one in buttons if (found := re.search("&(.)", one.text()))]
+        for tabs in wizard.findChildren(QTabWidget):
+            if tabs.isVisible():
+                texts = [tabs.tabText(place) for place in range(tabs.count())]
+                letters += [found[1] for text in texts if (found := re.search("&(.)", text))]
+        letters = [letter.lower() for letter in letters]
+        assert len(letters) == len(set(letters)) >= 4
+        (key,) = (one for one in wizard.findChildren(QLabel, "mainKey") if one.isVisible())
+        assert key.text() == "Ctrl+Return"
+        main.clicked.disconnect()
+        main.clicked.connect(lambda *_, step=step: pressed.append(step))
+        main.setEnabled(True)
+        QTest.keyClick(wizard, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert pressed == list(range(6))
