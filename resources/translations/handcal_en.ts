@@ -4108,6 +4108,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} of {} sessions</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4125,6 +4129,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Name before: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Re&amp;store</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4148,6 +4156,22 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Open</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Name…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show &amp;folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cop&amp;y path</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>No session matches. Search for something else, or choose All sessions.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4160,11 +4184,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source> (and {} more)</source>
+        <source>{} sound, every file read.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} sound, every file read.</source>
+        <source> (and {} more)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4184,6 +4208,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Restoring {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Correcting {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4192,11 +4220,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>and {} more</source>
+        <source>Cancelled: {} left out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Continue the selected session</source>
+        <source>and {} more</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4204,31 +4232,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Name…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Correct the wearer&apos;s name or code in the selected sessions (F2)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show folder</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Copy path</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Check</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Repair</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Restore</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4248,7 +4256,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Check</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Copy what is sound to a new session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Re&amp;pair</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

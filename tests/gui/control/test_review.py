@@ -79,8 +79,8 @@ def test_a_corrected_name_is_shown_and_exported(
     program.open_session(path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     library = program.windows.show_library(path.parent)
-    qtbot.waitUntil(lambda: bool(library._sessions.entries), timeout=PATIENCE_MS)
-    library._correct_names(library._sessions.entries, "Ada")
+    qtbot.waitUntil(lambda: bool(library.chosen), timeout=PATIENCE_MS)
+    library._correct_names(library.chosen, "Ada")
 
     def exported() -> str:
         assert program.windows.record is not None
