@@ -1377,6 +1377,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Copied: the result</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>without a name</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1490,6 +1494,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Once more, to be sure. {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1610,10 +1618,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>&amp;Find in sessions…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2479,6 +2483,10 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Copied: all numbers of the results</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Convergence of each registration</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3230,6 +3238,10 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>Copy the pairing key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copied: the pairing key</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4149,6 +4161,18 @@ one turns out.</source>
     </message>
     <message>
         <source>Name or code of the wearer of {}:</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>path</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>paths</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copied: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5663,6 +5687,22 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Hidden while the wearer compares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Saved as {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} did not print; see whether it is connected, or print to a PDF file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sent to {}</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QShowEvent
+from PySide6.QtGui import QAction, QDesktopServices, QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -26,6 +26,7 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (
     button,
@@ -280,8 +281,9 @@ class LibraryWindow(QDialog):
         QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.chosen[0].path.absolute())))
 
     def _copy_paths(self) -> None:
-        paths = (str(entry.path.absolute()) for entry in self.chosen)
-        QGuiApplication.clipboard().setText("\n".join(paths))
+        paths = [str(entry.path.absolute()) for entry in self.chosen]
+        count = pluralize(len(paths), tr("path"), tr("paths"))
+        copy_text(self._table, "\n".join(paths), tr("Copied: {}").format(count))
 
     def _undo_last(self) -> None:
         if self._former_names:
