@@ -43,7 +43,7 @@ def print_pages(printer: QPrinter, print_to: PrintTo) -> str:
         try:
             write_atomic(Path(path), _pdf(printer, print_to))
         except FileError as error:
-            raise FileError(f"{error}; {tr('choose another file')}") from error
+            raise FileError(tr("{}; choose another file").format(error)) from error
         return tr("Saved as {}").format(path)
     print_to(printer)
     name = printer.printerName()

@@ -5694,6 +5694,10 @@ width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}; choose another file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Saved as {}</source>
         <translation type="unfinished"></translation>
     </message>
