@@ -304,11 +304,19 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Back</source>
+        <source>&amp;Close</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Export</source>
+        <source>&amp;Export</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Cancel</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Back</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -368,6 +376,18 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Choose what to write: nothing is ticked.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose the folder to export to.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose what to write and where, then export.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>For one program each:</source>
         <translation type="unfinished"></translation>
     </message>
@@ -405,6 +425,10 @@
     </message>
     <message>
         <source>Done.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Open folder</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2966,11 +2990,23 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>There is no result to export yet.</source>
+        <source>there is no result yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>There is no alignment to inspect yet.</source>
+        <source>open a session first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is no alignment yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing was exported: {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>There is nothing to inspect: {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
