@@ -96,8 +96,21 @@ class SeparateWindows(QObject):
         if folder:
             self.open_requested.emit(Path(folder))
 
+    def why_no_export(self) -> str:
+        """Return why the session shown cannot be exported; empty if it can, or if none is shown."""
+        record = self.record
+        return "" if record is None or record.is_solvable else tr("there is no result yet")
+
+    def why_no_inspection(self) -> str:
+        """Return why there is nothing to inspect; empty if there is."""
+        if self.record is None:
+            return tr("open a session first")
+        return "" if self.record.alignments else tr("there is no alignment yet")
+
     def export(self, folder: Path | None = None) -> ExportDialog | None:
-        """Open the export dialog for the session shown; return None if it has no result.
+        """Open the export dialog for the session shown, or the library to choose one.
+
+        Returns None without a result to export.
 
         Parameters
         ----------
@@ -105,8 +118,11 @@ class SeparateWindows(QObject):
             Proposed folder; by default that of the last export, or one beside the session folder.
         """
         record = self.record
-        if record is None or not record.is_solvable:
-            self._window.banner.show_message(tr("There is no result to export yet."))
+        if record is None:
+            self.show_library()
+            return None
+        if why := self.why_no_export():
+            self._window.banner.show_message(tr("Nothing was exported: {}.").format(why))
             return None
 
         def export(target: Path, settings: ExportSettings, progress: Progress) -> Exported:
@@ -145,7 +161,8 @@ class SeparateWindows(QObject):
         """Show the alignments of the session shown in a 3D window."""
         record = self.record
         if record is None or not record.alignments:
-            self._window.banner.show_message(tr("There is no alignment to inspect yet."))
+            why = self.why_no_inspection()
+            self._window.banner.show_message(tr("There is nothing to inspect: {}.").format(why))
             return
         self._window.banner.show_notice(tr("The 3D window opens in a few seconds."))
         self._inspection.start(record)

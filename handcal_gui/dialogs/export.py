@@ -16,7 +16,7 @@ from handcal_gui.dialogs.export_progress import ExportProgress
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button
+from handcal_gui.widgets.fields import button, main_button
 from handcal_gui.widgets.layouts import hbox, vbox
 
 Export = Callable[[Path, ExportSettings, Progress], Exported]
@@ -71,10 +71,9 @@ class ExportDialog(QDialog):
         self._pages = QStackedWidget()
         self._pages.addWidget(self._choices)
         self._pages.addWidget(self._progress)
-        self._back = button("back", tr("Back"))
-        self._close = button("close", tr("Close"))
-        self._export = button("export", tr("Export"))
-        self._export.setDefault(True)
+        self._back = button("back", tr("&Back"))
+        self._close = button("close", tr("&Close"))
+        self._export = main_button("export", tr("&Export"))
         self._lay_out()
         self._choices.changed.connect(self._refresh)
         self._export.clicked.connect(self.start)
@@ -153,7 +152,8 @@ class ExportDialog(QDialog):
         self._export.setEnabled(self._choices.is_complete)
         self._back.setVisible(not is_choosing)
         self._back.setEnabled(self._job is None)
-        self._close.setText(tr("Close") if self._job is None else tr("Cancel"))
+        (self._export if is_choosing else self._close).setDefault(True)
+        self._close.setText(tr("&Close") if self._job is None else tr("&Cancel"))
         self._close.setEnabled(True)
 
     def _lay_out(self) -> None:

@@ -13,7 +13,7 @@ from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.io.files import user_path
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import number, with_name
+from handcal_gui.widgets.fields import number, paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
@@ -65,6 +65,7 @@ class ExportChoices(QWidget):
         self._far = number("far", 1.5, 10000.0, 10.0, " m", tr("Anything farther is not drawn."))
         self._near.setValue(settings.near_m)
         self._far.setValue(settings.far_m)
+        self._task = paragraph("exportTask")
         self._folder = PathField(tr("Export folder"), "folder")
         self._folder.set_path(str(folder))
         self._lay_out()
@@ -77,7 +78,7 @@ class ExportChoices(QWidget):
     @property
     def is_complete(self) -> bool:
         """True if at least one format and a folder are chosen."""
-        return bool(self._formats()) and bool(self._folder.path)
+        return not self._missing()
 
     @property
     def settings(self) -> ExportSettings:
@@ -99,12 +100,19 @@ class ExportChoices(QWidget):
         """The export's folder."""
         return self.folder / self._name
 
+    def _missing(self) -> str:
+        """Return what is still to be chosen; empty if nothing is."""
+        if not self._formats():
+            return tr("Choose what to write: nothing is ticked.")
+        return "" if self._folder.path else tr("Choose the folder to export to.")
+
     def _formats(self) -> tuple[Format, ...]:
         return tuple(kind for kind, box in self._boxes.items() if box.isChecked())
 
     def _refresh(self) -> None:
         for field in (self._near, self._far):
             field.setEnabled(any(self._boxes[kind].isChecked() for kind in _WITH_PLANES))
+        self._task.setText(self._missing() or tr("Choose what to write and where, then export."))
         self.changed.emit()
 
     def _lay_out(self) -> None:
@@ -125,4 +133,4 @@ class ExportChoices(QWidget):
         form.addRow(tr("Far plane (OpenGL, Unity)"), self._far)
         form.addRow(tr("Export to"), self._folder)
         form.addRow("", QLabel(tr("The folder {} is created there.").format(self._name)))
-        vbox(formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)
+        vbox(self._task, formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)

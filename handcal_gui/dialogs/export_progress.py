@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
@@ -51,6 +52,7 @@ class ExportProgress(QWidget):
         self._end.hide()
         self._files.clear()
         self._files.hide()
+        self._bar.show()
         self.show_progress(tr("Starting"), 0.0)
 
     def show_progress(self, doing: str, share: float) -> None:
@@ -72,20 +74,17 @@ class ExportProgress(QWidget):
             self._doing.setText(tr("{} not exported, see below.").format(lost))
         else:
             self._doing.setText(tr("Done."))
-            self._bar.setValue(_WHOLE)
         url = QUrl.fromLocalFile(str(folder))
-        self._end.show_finding(
+        self._show_end(
             Finding("", Health.LIMITED if made.missing else Health.GOOD, count),
-            tr("Open folder") if made.files else "",
+            tr("&Open folder") if made.files else "",
             lambda: QDesktopServices.openUrl(url),
         )
-        self._end.show()
 
     def show_failure(self, why: str) -> None:
         """Show the reason why nothing was exported."""
         self._doing.setText(tr("Nothing was exported."))
-        self._end.show_finding(Finding("", Health.BROKEN, why, _UNCHANGED))
-        self._end.show()
+        self._show_end(Finding("", Health.BROKEN, why, _UNCHANGED))
 
     def show_cancelling(self) -> None:
         """Show that the export is being cancelled."""
@@ -94,5 +93,12 @@ class ExportProgress(QWidget):
     def show_cancelled(self) -> None:
         """Show that the export was cancelled."""
         self._doing.setText(tr("Nothing was exported."))
-        self._end.show_finding(Finding("", Health.LIMITED, tr("cancelled"), _UNCHANGED))
+        self._show_end(Finding("", Health.LIMITED, tr("cancelled"), _UNCHANGED))
+
+    def _show_end(
+        self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
+    ) -> None:
+        """Show an end in place of the bar, which would stay where it stopped."""
+        self._bar.hide()
+        self._end.show_finding(finding, fix, mend)
         self._end.show()

@@ -5,8 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QTextDocument
-from PySide6.QtPrintSupport import QPrinter
+from PySide6.QtGui import QPagedPaintDevice, QTextDocument
 from PySide6.QtWidgets import (
     QDialog,
     QHeaderView,
@@ -68,7 +67,7 @@ class KeysDialog(QDialog):
         )
         self.resize(self.screen().availableSize().boundedTo(_FIRST_SIZE))
 
-    def print_to(self, printer: QPrinter) -> None:
+    def print_to(self, printer: QPagedPaintDevice) -> None:
         """Print all keys."""
         document = QTextDocument()
         document.setHtml(keys_html(self._groups))

@@ -18,6 +18,7 @@ from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_card import ResultCard
+from handcal_gui.widgets.session_rows import RESUME_HELP
 from handcal_gui.widgets.times import local_time
 
 _LOW = 34
@@ -58,9 +59,7 @@ class ReviewPage(QWidget):
         self.residuals = ResidualsTab()
         self._export = main_button("reviewExport", tr("&Export…"))
         self._resume = button("reviewResume", tr("&Resume"))
-        self._resume.setToolTip(
-            tr("Open camera and headset to add alignments, fine-tuning or trials")
-        )
+        self._resume.setToolTip(RESUME_HELP)
         self._again = button("reviewAgain", tr("Calibrate a&gain"))
         self._again.setToolTip(
             tr(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.fields import button, fill_row, with_name
 
 
@@ -26,7 +26,8 @@ class KeyField(QWidget):
         fill_row(self, self._key, self._reveal, copy, grows=self._key)
         self.setFocusProxy(self._key)
         self._reveal.toggled.connect(self._show)
-        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self._key.text()))
+        copied = tr("Copied: the pairing key")
+        copy.clicked.connect(lambda: copy_text(copy, self._key.text(), copied))
         self._show(False)
 
     def set_key(self, key: str) -> None:

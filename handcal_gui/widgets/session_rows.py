@@ -24,6 +24,8 @@ _PHI = tr(
     "φ1, φ2 and φ3 of the eye from this alignment alone: its distance to the right of, below\n"
     "and in front of the rig's viewpoint, in millimetres; the left eye above the right one"
 )
+RESUME_HELP = tr("Open camera and headset to add alignments, fine-tuning or trials")
+"""Of any session that can be read, finished or not."""
 ALIGNMENT_COLUMNS = (
     RecordColumn(tr("No."), tr("Number of the alignment")),
     RecordColumn(tr("Eyes"), tr("Eyes open during the alignment"), is_number=False),

@@ -304,11 +304,19 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Back</source>
+        <source>&amp;Close</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Export</source>
+        <source>&amp;Export</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Cancel</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Back</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -368,6 +376,18 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Choose what to write: nothing is ticked.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose the folder to export to.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose what to write and where, then export.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>For one program each:</source>
         <translation type="unfinished"></translation>
     </message>
@@ -405,6 +425,10 @@
     </message>
     <message>
         <source>Done.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Open folder</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1389,6 +1413,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Copied: the result</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>without a name</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1494,6 +1522,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Once more, to be sure. {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1641,6 +1673,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+<<<<<<< HEAD
         <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1657,6 +1690,8 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+=======
+>>>>>>> w/lib6
         <source>both eyes</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2531,6 +2566,10 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Copied: all numbers of the results</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Convergence of each registration</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3022,11 +3061,23 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>There is no result to export yet.</source>
+        <source>there is no result yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>There is no alignment to inspect yet.</source>
+        <source>open a session first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is no alignment yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing was exported: {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>There is nothing to inspect: {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3294,6 +3345,10 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>Copy the pairing key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copied: the pairing key</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4176,6 +4231,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} of {} sessions</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4196,6 +4255,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Re&amp;store</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} (Ctrl+Z)</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4212,7 +4275,35 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>path</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>paths</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Copied: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Review the selected session (Return)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Open</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Name…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show &amp;folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cop&amp;y path</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4228,11 +4319,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source> (and {} more)</source>
+        <source>{} sound, every file read.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} sound, every file read.</source>
+        <source> (and {} more)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4252,6 +4343,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Restoring {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Correcting {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4260,11 +4355,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>and {} more</source>
+        <source>Cancelled: {} left out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Continue the selected session</source>
+        <source>and {} more</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4272,31 +4367,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Name…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Correct the wearer&apos;s name or code in the selected sessions (F2)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show folder</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Copy path</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Check</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Repair</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Restore</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4316,7 +4391,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Check</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Copy what is sound to a new session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Re&amp;pair</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5806,6 +5889,7 @@ width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+<<<<<<< HEAD
         <source>Press the large button</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5823,6 +5907,25 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>to solve, tick an image in which the board was found</source>
+=======
+        <source>Print</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}; choose another file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Saved as {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} did not print; see whether it is connected, or print to a PDF file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sent to {}</source>
+>>>>>>> w/lib6
         <translation type="unfinished"></translation>
     </message>
 </context>

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QGuiApplication, QTextDocument
-from PySide6.QtPrintSupport import QPrinter
+from PySide6.QtGui import QPagedPaintDevice, QTextDocument
 from PySide6.QtWidgets import QWidget
 
 from handcal.register.results import Results
@@ -16,6 +15,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.printing import ask_printer
@@ -83,16 +83,16 @@ class ResultBar(QWidget):
 
     def copy(self) -> None:
         """Copy the result as text."""
-        QGuiApplication.clipboard().setText(self.text())
+        copy_text(self.buttons, self.text(), tr("Copied: the result"))
 
-    def print_to(self, printer: QPrinter) -> None:
+    def print_to(self, printer: QPagedPaintDevice) -> None:
         """Print the result as text."""
         document = QTextDocument()
         document.setPlainText(self.text())
         document.print_(printer)
 
     def _ask_printer(self) -> None:
-        ask_printer(self, self.print_to)
+        ask_printer(self.buttons, self.print_to)
 
 
 def _head(record: SessionRecord) -> Mapping[str, str]:

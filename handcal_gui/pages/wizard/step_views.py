@@ -26,7 +26,7 @@ from handcal_gui.pages.wizard.view import (
     WizardView,
 )
 from handcal_gui.translation import tr
-from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.numbers import pluralize, signed
 from handcal_gui.widgets.sentence import sentence
 
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
@@ -190,14 +190,14 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
             ButtonSpec(Action.SKIP, tr("&Skip")),
         ),
         snapshot.procedure.refusal,
-        fact=tr("{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %").format(
+        fact=tr("{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %").format(
             EYE_WORDS[eye].capitalize(),
             total_arcmin,
             abs(moved.right_arcmin),
             across,
             abs(moved.down_arcmin),
             along,
-            100 * moved.size,
+            signed(100 * moved.size, 1),
         ),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QGuiApplication, QResizeEvent
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
@@ -19,6 +19,7 @@ from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
@@ -154,7 +155,7 @@ class ResultsPanel(QWidget):
             self,
             tr("Copy as text"),
             "Ctrl+C",
-            lambda: QGuiApplication.clipboard().setText(self.as_text()),
+            lambda: copy_text(self, self.as_text(), tr("Copied: all numbers of the results")),
         )
         self._copy.setObjectName("copy")
         self._copy.setEnabled(False)  # until there are results

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, cast
 
 from PySide6.QtCore import (
     QAbstractTableModel,
     QModelIndex,
+    QModelRoleData,
     QPersistentModelIndex,
-    QSortFilterProxyModel,
     Qt,
 )
 
@@ -162,72 +162,103 @@ COLUMNS = (
     ),
     _Column(tr("State"), tr("Check lists what is damaged; Repair copies the rest"), _state, _state),
 )
+SPARED = (3, 2, 7)
+"""Columns that are left out of a narrow window, in this order: headset, rig, trials."""
+
+
+@dataclass(frozen=True, slots=True)
+class SessionRow:
+    """A session with all that is shown of it."""
+
+    entry: LibraryEntry
+    texts: tuple[str, ...]
+    keys: tuple[Any, ...]
+    """By which each column is sorted."""
+    searched: str
+    """Text in which words are searched."""
+
+
+def make_row(entry: LibraryEntry) -> SessionRow:
+    """Return the row of a session; called in a thread, as hundreds take longer than a frame."""
+    names = entry.wearer, local_time(entry.started), entry.rig, entry.headset, entry.path.name
+    return SessionRow(
+        entry,
+        tuple(column.text(entry) for column in COLUMNS),
+        tuple(column.key(entry) for column in COLUMNS),
+        " ".join(names).casefold(),
+    )
 
 
 class SessionsModel(QAbstractTableModel):
-    """The sessions as rows.
+    """The sessions of a kind that contain every word searched, sorted by a column.
+
+    Qt asks for as little as possible: while a job runs, each of its calls has to wait until the
+    job lets Python go. A proxy model would call for every cell of every session.
 
     Attributes
     ----------
-    entries : tuple of LibraryEntry
-    keys : list of tuple
-        By which each column is sorted.
-    searched : list of str
-        The text of each session in which words are searched.
+    rows : tuple of SessionRow
+        All sessions.
+    shown : list of SessionRow
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.entries: tuple[LibraryEntry, ...] = ()
-        self.searched: list[str] = []
-        self._texts: list[tuple[str, ...]] = []
-        self.keys: list[tuple[Any, ...]] = []
+        self.rows: tuple[SessionRow, ...] = ()
+        self.shown: list[SessionRow] = []
+        self._longest: tuple[str, ...] = ()
+        self._words: tuple[str, ...] = ()
+        self._kind: Filter = "all"
+        self._column, self._order = 1, Qt.SortOrder.DescendingOrder
         self._font = number_font()
 
-    def show_entries(self, entries: Sequence[LibraryEntry]) -> None:
-        """Replace the rows."""
-        self.beginResetModel()
-        self.entries = tuple(entries)
-        # Made once: Qt asks for a cell many times while it sorts and draws.
-        self._texts = [tuple(column.text(one) for column in COLUMNS) for one in entries]
-        self.keys = [tuple(column.key(one) for column in COLUMNS) for one in entries]
-        self.searched = [
-            " ".join(
-                (one.wearer, local_time(one.started), one.rig, one.headset, one.path.name)
-            ).casefold()
-            for one in entries
-        ]
-        self.endResetModel()
+    def show_rows(self, rows: Sequence[SessionRow]) -> None:
+        """Replace the sessions."""
+        self.rows = tuple(rows)
+        self._longest = tuple(
+            max(texts, key=len) for texts in zip(*(row.texts for row in rows), strict=True)
+        )
+        self._show()
+
+    def search(self, text: str, kind: Filter) -> None:
+        """Show other sessions of these."""
+        self._words, self._kind = tuple(text.casefold().split()), kind
+        self._show()
+
+    def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
+        """Sort by a column."""
+        self._column, self._order = column, order
+        self._show()
 
     def longest_text(self, column: int) -> str:
         """Return the longest text in a column; empty without sessions."""
-        return max((texts[column] for texts in self._texts), key=len, default="")
+        return self._longest[column] if self._longest else ""
 
     def rowCount(self, parent: _Index = _NO_INDEX) -> int:
-        """Return the number of sessions."""
-        return 0 if parent.isValid() else len(self.entries)
+        """Return the number of sessions shown."""
+        return 0 if parent.isValid() else len(self.shown)
 
     def columnCount(self, parent: _Index = _NO_INDEX) -> int:
         """Return the number of columns."""
         return 0 if parent.isValid() else len(COLUMNS)
 
+    def multiData(self, index: _Index, wanted: Iterable[QModelRoleData]) -> None:  # type: ignore[override]
+        """Give all that is drawn of a cell at once."""
+        for one in wanted:  # a span, of which PySide does not declare that it is iterable
+            one.setData(self.data(index, one.role()))
+
     def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         """Return a cell's text, picture, tooltip, font or alignment."""
-        entry, column = self.entries[index.row()], COLUMNS[index.column()]
+        row, column = self.shown[index.row()], COLUMNS[index.column()]
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return self._texts[index.row()][index.column()]
+                return row.texts[index.column()]
             case Qt.ItemDataRole.DecorationRole if index.column() == 0:
-                return error_bars(entry.eyes)
+                return error_bars(row.entry.eyes)
             case Qt.ItemDataRole.AccessibleDescriptionRole if index.column() == 0:
-                return picture_text(entry.eyes)
+                return picture_text(row.entry.eyes)
             case Qt.ItemDataRole.ToolTipRole:
-                copy = tr("Repaired in {}").format(entry.repaired_as) if entry.repaired_as else ""
-                path = entry.problem or str(entry.path)
-                errors = (error_text if index.column() else picture_text)(entry.eyes)
-                lines = self._texts[index.row()][index.column()], copy, path, errors
-                # The cell's text may be elided.
-                return plain_tooltip("\n".join(filter(None, lines)))
+                return _tooltip(row, index.column())
             case Qt.ItemDataRole.FontRole if column.is_number:
                 return self._font
             case Qt.ItemDataRole.TextAlignmentRole:
@@ -251,33 +282,30 @@ class SessionsModel(QAbstractTableModel):
         }
         return texts.get(Qt.ItemDataRole(role))
 
+    def _show(self) -> None:
+        self.beginResetModel()
+        found = [
+            row
+            for row in self.rows
+            if _is_of(row.entry, self._kind) and all(word in row.searched for word in self._words)
+        ]
+        is_reversed = self._order == Qt.SortOrder.DescendingOrder
+        self.shown = sorted(found, key=lambda row: row.keys[self._column], reverse=is_reversed)
+        self.endResetModel()
 
-class SessionsFilter(QSortFilterProxyModel):
-    """Shows the sessions of a kind that contain every word searched."""
 
-    def __init__(self, sessions: SessionsModel) -> None:
-        super().__init__()
-        self._sessions = sessions
-        self._words: tuple[str, ...] = ()
-        self._filter: Filter = "all"
-        self.setSourceModel(sessions)
-
-    def search(self, text: str, kind: Filter) -> None:
-        """Show other sessions."""
-        self.beginFilterChange()
-        self._words, self._filter = tuple(text.casefold().split()), kind
-        self.endFilterChange(QSortFilterProxyModel.Direction.Rows)
-
-    def filterAcceptsRow(self, row: int, _parent: _Index) -> bool:
-        """Return whether a session is shown."""
-        text = self._sessions.searched[row]
-        is_shown = _is_of(self._sessions.entries[row], self._filter)
-        return is_shown and all(word in text for word in self._words)
-
-    def lessThan(self, left: _Index, right: _Index) -> bool:
-        """Compare two sessions by the keys of a column."""
-        keys, column = self._sessions.keys, left.column()
-        return bool(keys[left.row()][column] < keys[right.row()][column])
+def _tooltip(row: SessionRow, column: int) -> str:
+    """Return what a cell shows, which may be cut, and what no column has room for."""
+    entry = row.entry
+    copy = tr("Repaired in {}").format(entry.repaired_as) if entry.repaired_as else ""
+    spared = (
+        f"{COLUMNS[i].title}: {row.texts[i]}"
+        for i in SPARED
+        if i != column and row.texts[i] != NOTHING
+    )
+    errors = (error_text if column else picture_text)(entry.eyes)
+    lines = row.texts[column], copy, entry.problem or str(entry.path), *spared, errors
+    return plain_tooltip("\n".join(filter(None, lines)))
 
 
 def _is_of(entry: LibraryEntry, kind: Filter) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, Qt
@@ -15,28 +15,29 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.windows.library.sessions_model import COLUMNS, SessionsFilter, SessionsModel
+from handcal_gui.windows.library.sessions_model import COLUMNS, SPARED, SessionsModel
 
 _MOST_SHOWN_PX = 300
-_LONG_NAMES_PX = {tr("Rig"): 60, tr("Headset"): 60, tr("Wearer"): 120}
-"""Widths that remain of columns with long texts, in the order in which they are cut."""
+_WEARER = 0
+_LEAST_CHARACTERS = 12
+"""That are shown of a name that is cut."""
 
 
 class SessionsTable(QTableView):
-    """Shows the sessions of a model that pass its filter.
+    """Shows the sessions of a model; as long as there are any, one is selected.
 
     Parameters
     ----------
     sessions : SessionsModel
-    shown : SessionsFilter
-        Of these sessions.
     """
 
-    def __init__(self, sessions: SessionsModel, shown: SessionsFilter) -> None:
+    def __init__(self, sessions: SessionsModel) -> None:
         super().__init__()
-        self._sessions, self._shown = sessions, shown
+        self._sessions = sessions
+        self._kept: set[Path] = set()
+        self._first_row = 0
         with_name(self, "sessionTable", tr("Sessions"))
-        self.setModel(shown)
+        self.setModel(sessions)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
@@ -54,46 +55,79 @@ class SessionsTable(QTableView):
         across = self.horizontalHeader()
         flat_header(across)
         across.setHighlightSections(False)
+        # Of its own and empty, or the header asks for all cells whenever it is drawn.
+        across.setSelectionModel(QItemSelectionModel(sessions, self))
         across.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         across.setStretchLastSection(True)
         self._reason = paragraph("noSessions")
         self._reason.setAlignment(Qt.AlignmentFlag.AlignCenter)
         vbox((self._reason, 1), on=self.viewport(), margins=2 * SPACING_PX)
+        sessions.modelAboutToBeReset.connect(self._keep_chosen)
+        sessions.modelReset.connect(lambda: self.choose(self._kept))
 
     @property
     def chosen(self) -> list[LibraryEntry]:
         """The sessions that are selected, in the order shown."""
-        rows = sorted(self.selectionModel().selectedRows(), key=lambda index: index.row())
-        return [self._sessions.entries[self._shown.mapToSource(one).row()] for one in rows]
+        # By ranges: Qt's list of rows asks the model for every cell of every session.
+        selection = self.selectionModel().selection()
+        ranges = (selection.at(i) for i in range(selection.size()))
+        rows = sorted({row for one in ranges for row in range(one.top(), one.bottom() + 1)})
+        return [self._sessions.shown[row].entry for row in rows]
 
     def choose(self, paths: Collection[Path]) -> None:
-        """Select sessions too, by their folders."""
+        """Select sessions by their folders; if none is shown, the one in the place of the first."""
+        shown = self._sessions.shown
+        rows = [row for row, one in enumerate(shown) if one.entry.path in paths]
+        if not rows and shown:
+            rows = [min(self._first_row, len(shown) - 1)]
         wanted = QItemSelection()
-        for row, entry in enumerate(self._sessions.entries):
-            place = self._shown.mapFromSource(self._sessions.index(row, 0))
-            if entry.path in paths and place.isValid():
-                wanted.select(place, place)
+        for first, last in _runs(rows):
+            wanted.select(self._sessions.index(first, 0), self._sessions.index(last, 0))
         flags = QItemSelectionModel.SelectionFlag
-        self.selectionModel().select(wanted, flags.Select | flags.Rows)
+        self.selectionModel().select(wanted, flags.ClearAndSelect | flags.Rows)
+        if rows:
+            current = self._sessions.index(rows[0], 0)
+            self.selectionModel().setCurrentIndex(current, flags.NoUpdate)
 
-    def show_reason(self, reason: str) -> None:
-        """Show the reason why the table is empty; an empty one if it is not."""
+    def show_reason(self) -> None:
+        """Show why there is no session, and what to do; nothing if there is one."""
+        reason = ""
+        if not self._sessions.rows:
+            reason = tr(
+                "No session is in this folder yet. Calibrate a wearer, or choose another session "
+                "folder on the start page."
+            )
+        elif not self._sessions.shown:
+            reason = tr("No session matches. Search for something else, or choose All sessions.")
         self._reason.setText(reason)
         self._reason.setVisible(bool(reason))
 
     def fit_columns(self) -> None:
-        """Show every column's contents; long names are cut as far as the room demands."""
+        """Show columns whole, as many as fit; of the wearers, names that are long are cut."""
+        for number in SPARED:
+            self.showColumn(number)  # a hidden title has no width
         wanted_px = {
-            column.title: min(self._width_px(number), _MOST_SHOWN_PX)
-            for number, column in enumerate(COLUMNS)
+            number: min(self._width_px(number), _MOST_SHOWN_PX) for number in range(len(COLUMNS))
         }
         excess_px = sum(wanted_px.values()) - self.viewport().width()
-        for title, least_px in _LONG_NAMES_PX.items():
-            cut_px = max(min(excess_px, wanted_px[title] - least_px), 0)
-            wanted_px[title] -= cut_px
-            excess_px -= cut_px
-        for number, width_px in enumerate(wanted_px.values()):
+        for number in SPARED:
+            if excess_px > 0:
+                self.hideColumn(number)
+                excess_px -= wanted_px[number]
+        wanted_px[_WEARER] -= max(min(excess_px, wanted_px[_WEARER] - self._least_px()), 0)
+        for number, width_px in wanted_px.items():
             self.setColumnWidth(number, width_px)
+
+    def _keep_chosen(self) -> None:
+        chosen = self.chosen
+        self._kept = {entry.path for entry in chosen}
+        if chosen:
+            rows = (row for row, one in enumerate(self._sessions.shown) if one.entry is chosen[0])
+            self._first_row = next(rows)
+
+    def _least_px(self) -> int:
+        """Return the least width of a name."""
+        return self.fontMetrics().averageCharWidth() * _LEAST_CHARACTERS + 2 * SPACING_PX
 
     def _width_px(self, column: int) -> int:
         """Return the width of a column by its longest text: Qt would measure every cell."""
@@ -107,3 +141,12 @@ class SessionsTable(QTableView):
         """Give the columns the room there is."""
         super().resizeEvent(event)
         self.fit_columns()
+
+
+def _runs(rows: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Yield the first and last of each run of consecutive numbers."""
+    first = 0
+    for i, row in enumerate(rows):
+        if i + 1 == len(rows) or rows[i + 1] > row + 1:
+            yield rows[first], row
+            first = i + 1

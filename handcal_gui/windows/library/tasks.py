@@ -1,38 +1,67 @@
-"""Tasks of the library: sessions checked, repaired and deleted, with progress and a message."""
+"""Tasks of the library: sessions read, checked, repaired and deleted, outside its thread."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.errors import CancelledError, FileError
 from handcal.progress import Progress
-from handcal.session.library import correct_wearer, delete_session, restore_session
+from handcal.session.library import (
+    LibraryEntry,
+    correct_wearer,
+    delete_session,
+    deleted_sessions,
+    read_library,
+    restore_session,
+)
+from handcal.session.record import replay
 from handcal.session.repair import check_session, repair_session
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.times import local_time
+from handcal_gui.windows.library.sessions_model import SessionRow, make_row
 
 _MOST_NAMED = 3
 _MOST_LINES = 8
 
 
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """The contents of a folder of sessions."""
+
+    rows: tuple[SessionRow, ...] = ()
+    deleted: tuple[Path, ...] = ()
+    last: str = ""
+    """Name of the session that was deleted last."""
+
+
+def read_contents(folder: Path, known: Collection[LibraryEntry]) -> Contents:
+    """Read a folder of sessions; those `known` are kept if they have not changed."""
+    rows = tuple(map(make_row, read_library(folder, known)))
+    deleted = deleted_sessions(folder)
+    return Contents(rows, deleted, _name_of(deleted[-1]) if deleted else "")
+
+
 def check_sessions(paths: Sequence[Path], progress: Progress) -> str:
     """Read every file of some sessions; return which are damaged, as a message."""
-    lines = []
-    for done, path in enumerate(paths):
-        progress.at(done / len(paths), tr("Checking {}").format(path.name))
-        found = check_session(path)
-        if found.state == "sound":
-            continue
-        damaged = found.damaged[:_MOST_NAMED]
-        # Where nothing can be read, the reason names the folder itself.
-        named = "; ".join(one.what if found.state == "none" else str(one) for one in damaged)
-        more = len(found.damaged) - _MOST_NAMED
-        others = tr(" (and {} more)").format(more) if more > 0 else ""
-        lines.append(f"{path.name}: {named}{others}")
-    sound = len(paths) - len(lines)
+    sound, lines = _each(paths, _require_sound, tr("Checking {}"), progress)
     count = pluralize(sound, tr("session"), tr("sessions"))
     return _with_lines(tr("{} sound, every file read.").format(count), lines)
+
+
+def _require_sound(path: Path) -> None:
+    """Raise FileError, with what is damaged, unless a session is sound."""
+    found = check_session(path)
+    if found.state == "sound":
+        return
+    damaged = found.damaged[:_MOST_NAMED]
+    # Where nothing can be read, the reason names the folder itself.
+    named = "; ".join(one.what if found.state == "none" else str(one) for one in damaged)
+    more = len(found.damaged) - _MOST_NAMED
+    others = tr(" (and {} more)").format(more) if more > 0 else ""
+    raise FileError(f"{named}{others}")
 
 
 def repair_beside(path: Path, progress: Progress) -> str:
@@ -50,37 +79,50 @@ def repair_beside(path: Path, progress: Progress) -> str:
 
 def delete_sessions(paths: Sequence[Path], progress: Progress) -> str:
     """Delete some sessions, each of which can be restored; return a message."""
-    failed = _each(paths, delete_session, tr("Deleting {}"), progress)
-    count = pluralize(len(paths) - len(failed), tr("session"), tr("sessions"))
-    return _with_lines(tr("{} deleted.").format(count), failed)
+    deleted, lines = _each(paths, delete_session, tr("Deleting {}"), progress)
+    count = pluralize(deleted, tr("session"), tr("sessions"))
+    return _with_lines(tr("{} deleted.").format(count), lines)
+
+
+def restore_sessions(paths: Sequence[Path], progress: Progress) -> str:
+    """Restore deleted sessions; return a message."""
+    restored, lines = _each(paths, restore_session, tr("Restoring {}"), progress)
+    count = pluralize(restored, tr("session"), tr("sessions"))
+    return _with_lines(tr("{} restored.").format(count), lines)
 
 
 def correct_names(names: Mapping[Path, str], progress: Progress) -> str:
     """Correct the names of the wearers of some sessions; return a message."""
-    failed = _each(
+    corrected, lines = _each(
         list(names), lambda path: correct_wearer(path, names[path]), tr("Correcting {}"), progress
     )
-    count = pluralize(len(names) - len(failed), tr("session"), tr("sessions"))
-    return _with_lines(tr("Name corrected in {}.").format(count), failed)
+    count = pluralize(corrected, tr("session"), tr("sessions"))
+    return _with_lines(tr("Name corrected in {}.").format(count), lines)
 
 
 def _each(
     paths: Sequence[Path], do: Callable[[Path], object], doing: str, progress: Progress
-) -> list[str]:
-    """Do something to each session; return those for which it failed, with the reasons."""
-    failed = []
-    for done, path in enumerate(paths):
-        progress.at(done / len(paths), doing.format(path.name))
+) -> tuple[int, list[str]]:
+    """Do something to each session, until cancelled.
+
+    Returns
+    -------
+    done : int
+        For how many it succeeded.
+    lines : list of str
+        Those for which it failed, with the reasons; first how many a cancellation left out.
+    """
+    lines: list[str] = []
+    for tried, path in enumerate(paths):
         try:
+            progress.at(tried / len(paths), doing.format(path.name))
             do(path)
+        except CancelledError:
+            left = pluralize(len(paths) - tried, tr("session"), tr("sessions"))
+            return tried - len(lines), [tr("Cancelled: {} left out.").format(left), *lines]
         except (FileError, ValueError) as error:  # a name may be invalid
-            failed.append(f"{path.name}: {error}")
-    return failed
-
-
-def restore_deleted(path: Path, _progress: Progress) -> str:
-    """Restore a deleted session; return a message."""
-    return tr("{} restored.").format(restore_session(path).name)
+            lines.append(f"{path.name}: {error}")
+    return len(paths) - len(lines), lines
 
 
 def _with_lines(said: str, lines: Sequence[str]) -> str:
@@ -97,3 +139,12 @@ def _free(path: Path) -> Path:
     while found.exists():
         found, number = path.with_name(f"{path.name}-{number}"), number + 1
     return found
+
+
+def _name_of(path: Path) -> str:
+    """Return the wearer and the beginning of a session; of an unreadable one the folder."""
+    try:
+        replayed = replay(path)
+    except FileError:
+        return path.name
+    return f"{replayed.state.wearer or path.name}, {local_time(replayed.journal.events[0].time)}"

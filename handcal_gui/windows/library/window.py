@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QAction, QDesktopServices, QGuiApplication, QShowEvent
+from PySide6.QtGui import QAction, QDesktopServices, QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -15,33 +15,52 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPushButton,
     QSplitter,
+    QStackedWidget,
     QWidget,
 )
 
-from handcal.session.library import LibraryEntry, deleted_sessions, read_library
+from handcal.session.library import LibraryEntry
 from handcal.session.state import MAX_WEARER_CHARACTERS
-from handcal_gui.engine.jobs import Job, Work
+from handcal_gui.engine.jobs import Work
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import button, choice, paragraph, plain_tooltip, with_name
+from handcal_gui.widgets.fields import (
+    button,
+    choice,
+    main_button,
+    paragraph,
+    plain_tooltip,
+    with_name,
+)
+from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import NOTHING
-from handcal_gui.windows.library.sessions_model import FILTERS, SessionsFilter, SessionsModel
+from handcal_gui.widgets.session_rows import RESUME_HELP
+from handcal_gui.windows.library.sessions_model import (
+    FILTERS,
+    SessionsModel,
+)
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
+    Contents,
     check_sessions,
     correct_names,
     delete_sessions,
+    read_contents,
     repair_beside,
-    restore_deleted,
+    restore_sessions,
 )
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 
 _TREND_PX = 20 * SPACING_PX
+_TASK = tr(
+    "Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them."
+)
 
 
 class LibraryWindow(QDialog):
@@ -72,35 +91,39 @@ class LibraryWindow(QDialog):
         self.setObjectName("library")
         self.setWindowTitle(tr("Sessions"))
         self._folder = folder
-        self._deleted: tuple[Path, ...] = ()
+        self._contents = Contents()
+        self._deleted_last: tuple[Path, ...] = ()
         self._former_names: dict[Path, str] = {}
         self._is_read = False
-        self._job: Job | None = None
         self._sessions = SessionsModel()
-        self._filter = SessionsFilter(self._sessions)
         self._search = with_name(QLineEdit(), "search", tr("Search"))
         self._search.setPlaceholderText(tr("Search wearer, date, rig, headset"))
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
-        self._table = SessionsTable(self._sessions, self._filter)
+        self._table = SessionsTable(self._sessions)
         self._count = paragraph("count")
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(_TREND_PX)
         self._trend_title = paragraph("trendTitle")
         self._message = paragraph("message")
         self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._message.hide()  # until there is one
+        self._jobs = JobBar()
+        self._said = QStackedWidget()  # of one height, so that nothing moves with a job
+        self._said.addWidget(self._message)
+        self._said.addWidget(self._jobs)
+        self._jobs.failed.connect(self._end)
+        self._jobs.busy_changed.connect(self._show_busy)
         self._make_actions()
         self._lay_out()
-        self._find = LatestJob(lambda known: self._read(known), self)
-        self._find.answered.connect(lambda _, found: self._show(*found))
+        self._find = LatestJob(partial(read_contents, folder), self)
+        self._find.answered.connect(lambda _, found: self._show(found))
         self._find.failed.connect(self._say)
         self._search.textChanged.connect(self._search_again)
         self._kind.currentIndexChanged.connect(self._search_again)
         self._table.selectionModel().selectionChanged.connect(self._refresh)
         self._table.doubleClicked.connect(self._open.trigger)
         self.finished.connect(self.stop)
-        self._refresh()
+        self._show_busy(False)
 
     @property
     def chosen(self) -> list[LibraryEntry]:
@@ -109,14 +132,12 @@ class LibraryWindow(QDialog):
 
     def reload(self) -> None:
         """Read the folder again."""
-        self._find.ask(self._sessions.entries)
+        self._find.ask([row.entry for row in self._sessions.rows])
 
     def stop(self) -> None:
         """Cancel what is running; safe to call twice."""
         self._find.stop()
-        if self._job is not None:
-            self._job.abandon()
-            self._job = None
+        self._jobs.stop()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Read the folder."""
@@ -124,26 +145,27 @@ class LibraryWindow(QDialog):
         self._begin_search()
         self.reload()
 
-    def _read(
-        self, known: Sequence[LibraryEntry]
-    ) -> tuple[tuple[LibraryEntry, ...], tuple[Path, ...]]:
-        return read_library(self._folder, known), deleted_sessions(self._folder)
-
-    def _show(self, entries: tuple[LibraryEntry, ...], deleted: tuple[Path, ...]) -> None:
-        shown = {entry.path for entry in self._sessions.entries}
-        made = {entry.path for entry in entries} - shown if self._is_read else set()
-        chosen = made or {entry.path for entry in self.chosen}  # a copy or what was restored
-        self._deleted, self._is_read = deleted, True
-        wearers = {entry.path: entry.wearer for entry in entries}
+    def _show(self, contents: Contents) -> None:
+        before, self._contents = self._contents, contents
+        deleted = [path for path in contents.deleted if path not in before.deleted]
+        kept = [path for path in self._deleted_last if path in contents.deleted]
+        self._deleted_last = tuple(
+            (self._is_read and deleted) or kept or contents.deleted[-1:]  # together, or the newest
+        )
+        shown = {row.entry.path for row in before.rows}
+        made = {row.entry.path for row in contents.rows} - shown if self._is_read else set()
+        self._is_read = True
+        wearers = {row.entry.path: row.entry.wearer for row in contents.rows}
         self._former_names = {
             path: name
             for path, name in self._former_names.items()
             if wearers.get(path, name) != name  # else it was not corrected, or is undone
         }
-        if entries != self._sessions.entries:
-            self._sessions.show_entries(entries)
-            self._table.choose(chosen)
+        if contents.rows != before.rows:
+            self._sessions.show_rows(contents.rows)
             self._table.fit_columns()
+        if made:  # a copy, or what was restored
+            self._table.choose(made)
         self._refresh()
 
     def _begin_search(self) -> None:
@@ -151,18 +173,15 @@ class LibraryWindow(QDialog):
         self._search.selectAll()
 
     def _search_again(self) -> None:
-        chosen = {entry.path for entry in self.chosen}
-        self._table.clearSelection()  # else it changes, and all is refreshed, with every row
-        self._filter.search(self._search.text(), self._kind.currentData())
-        self._table.choose(chosen)
+        self._sessions.search(self._search.text(), self._kind.currentData())
         self._refresh()
 
     def _refresh(self) -> None:
         chosen = self.chosen
         readable = [entry for entry in chosen if not entry.problem]
-        is_free = self._job is None
+        is_free = not self._jobs.is_busy
         self._open.setEnabled(len(chosen) == len(readable) == 1)
-        self._resume.setEnabled(len(readable) == 1 and not readable[0].is_finished)
+        self._resume.setEnabled(len(chosen) == len(readable) == 1)
         self._export.setEnabled(any(entry.alignments or entry.eyes for entry in readable))
         self._correct.setEnabled(is_free and bool(readable))
         self._show_folder.setEnabled(len(chosen) == 1)
@@ -171,7 +190,7 @@ class LibraryWindow(QDialog):
         self._repair.setEnabled(is_free and len(chosen) == 1)
         self._delete.setEnabled(is_free and bool(chosen))
         self._refresh_undo()
-        shown, total = self._filter.rowCount(), self._sessions.rowCount()
+        shown, total = len(self._sessions.shown), len(self._sessions.rows)
         count = (
             pluralize(total, tr("session"), tr("sessions"))
             if shown == total
@@ -179,7 +198,8 @@ class LibraryWindow(QDialog):
         )
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
         shown_count = tr("{} in {}{}").format(count, self._folder, selected)
-        self._table.show_reason(_reason_for_none(shown, total) if self._is_read else "")
+        if self._is_read:
+            self._table.show_reason()
         reading = tr("Reading {}…").format(self._folder)
         self._count.setText(shown_count if self._is_read else reading)
         self._show_trend(chosen[0].wearer if chosen else "")
@@ -188,18 +208,20 @@ class LibraryWindow(QDialog):
         """Offer to undo the correction made in this window, else the last deletion."""
         if self._former_names:
             names = ", ".join(sorted({name or NOTHING for name in self._former_names.values()}))
-            verb, text = tr("Undo"), tr("Name before: {}").format(names)
+            verb, text = tr("&Undo"), tr("Name before: {}").format(names)
         else:
-            last = self._deleted[-1].name if self._deleted else ""
-            verb, text = tr("Restore"), tr("Last deleted: {}").format(last) if last else ""
+            count = len(self._deleted_last)
+            sessions = pluralize(count, tr("session"), tr("sessions"))
+            last = self._contents.last if count == 1 else sessions
+            verb, text = tr("Re&store"), tr("Last deleted: {}").format(last) if count else ""
         self._undo.setText(verb)
         self._undo.setToolTip(plain_tooltip(tr("{} (Ctrl+Z)").format(text)))
         self._undo.setVisible(bool(text))
-        self._undo.setEnabled(bool(text) and self._job is None)
+        self._undo.setEnabled(bool(text) and not self._jobs.is_busy)
         self._change_text.setText(text)
 
     def _show_trend(self, wearer: str) -> None:
-        found = calibrations_of(wearer, self._sessions.entries)
+        found = calibrations_of(wearer, [row.entry for row in self._sessions.rows])
         self._trend.setVisible(len(found) > 1)
         text = tr("Select a wearer with several calibrations to see how the errors changed.")
         if len(found) > 1:
@@ -231,7 +253,7 @@ class LibraryWindow(QDialog):
     def _ask_name(self) -> None:
         """Let the user correct the name of the chosen sessions' wearer."""
         chosen = [entry for entry in self.chosen if not entry.problem]
-        known = {entry.wearer for entry in self._sessions.entries} - {""}
+        known = {row.entry.wearer for row in self._sessions.rows} - {""}
         former = [name for entry in chosen for name in entry.former_wearers]
         names = dict.fromkeys([chosen[0].wearer, *former, *sorted(known, key=str.casefold)])
         dialog = QInputDialog(self)
@@ -259,72 +281,63 @@ class LibraryWindow(QDialog):
         QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.chosen[0].path.absolute())))
 
     def _copy_paths(self) -> None:
-        paths = (str(entry.path.absolute()) for entry in self.chosen)
-        QGuiApplication.clipboard().setText("\n".join(paths))
+        paths = [str(entry.path.absolute()) for entry in self.chosen]
+        count = pluralize(len(paths), tr("path"), tr("paths"))
+        copy_text(self._table, "\n".join(paths), tr("Copied: {}").format(count))
 
     def _undo_last(self) -> None:
         if self._former_names:
             self._start(partial(correct_names, self._former_names))
         else:
-            self._start(partial(restore_deleted, self._deleted[-1]))
+            self._start(partial(restore_sessions, self._deleted_last))
 
     def _start(self, work: Work) -> None:
-        if self._job is not None:
-            return
-        self._table.setFocus()  # or the search gets it from a button that is disabled
-        self._job = Job(work)
-        self._job.progressed.connect(lambda doing, _: self._say(f"{doing}…"))
-        self._job.succeeded.connect(self._end)
-        self._job.failed.connect(self._end)
-        self._job.cancelled.connect(self._end)
-        self._job.start()
-        self._refresh()
+        if not self._jobs.is_busy:
+            self._table.setFocus()  # or the search gets it from a button that is disabled
+            self._jobs.run(tr("Starting"), work, self._end)
 
-    def _end(self, said: object = "") -> None:
-        assert self._job is not None
-        self._job.wait()
-        self._job = None
+    def _end(self, said: object) -> None:
         self._say(str(said))
         self.changed.emit()
         self.reload()
+
+    def _show_busy(self, is_busy: bool) -> None:
+        self._said.setCurrentWidget(self._jobs if is_busy else self._message)
         self._refresh()
 
     def _say(self, message: str) -> None:
         self._message.setText(message)
-        self._message.setVisible(bool(message))
 
     def _make_actions(self) -> None:
         """Make the actions of the context menu, most of which have a button and some a key."""
         self._open = self._act(
-            tr("Open"), "Return", self._open_chosen, tr("Review the selected session (Return)")
+            tr("&Open"), "Return", self._open_chosen, tr("Review the selected session (Return)")
         )
-        self._resume = self._act(
-            tr("Resume"), "", self._resume_chosen, tr("Continue the selected session")
-        )
+        self._resume = self._act(tr("&Resume"), "", self._resume_chosen, RESUME_HELP)
         self._export = self._act(
-            tr("Export…"), "", self._export_chosen, tr("Export the selected sessions")
+            tr("&Export…"), "", self._export_chosen, tr("Export the selected sessions")
         )
         self._separate()
         self._correct = self._act(
-            tr("Name…"),
+            tr("&Name…"),
             "F2",
             self._ask_name,
             tr("Correct the wearer's name or code in the selected sessions (F2)"),
         )
-        self._show_folder = self._act(tr("Show folder"), "", self._show_folder_of_chosen)
-        self._copy = self._act(tr("Copy path"), "Ctrl+C", self._copy_paths)
+        self._show_folder = self._act(tr("Show &folder"), "", self._show_folder_of_chosen)
+        self._copy = self._act(tr("Cop&y path"), "Ctrl+C", self._copy_paths)
         self._separate()
         self._check = self._act(
-            tr("Check"), "", self._check_chosen, tr("Read every file of the selected sessions")
+            tr("&Check"), "", self._check_chosen, tr("Read every file of the selected sessions")
         )
         self._repair = self._act(
-            tr("Repair"), "", self._repair_chosen, tr("Copy what is sound to a new session")
+            tr("Re&pair"), "", self._repair_chosen, tr("Copy what is sound to a new session")
         )
         self._delete = self._act(
-            tr("Delete"), "Del", self._delete_chosen, tr("Delete the selected sessions (Del)")
+            tr("&Delete"), "Del", self._delete_chosen, tr("Delete the selected sessions (Del)")
         )
         self._table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-        self._undo = button("restoreSession", tr("Restore"))
+        self._undo = button("restoreSession", tr("Re&store"))
         self._undo.setAutoDefault(False)
         self._undo.clicked.connect(self._undo_last)
         add_action(self, tr("Search"), "Ctrl+F", self._begin_search)
@@ -350,7 +363,7 @@ class LibraryWindow(QDialog):
         halves.setChildrenCollapsible(False)
         top = hbox((self._search, 1), self._kind, spacing=SPACING_PX)
         buttons = (
-            _button_of(name, action)
+            _pressed_for(action, button(name, action.text()))
             for name, action in {
                 "correctName": self._correct,
                 "deleteSessions": self._delete,
@@ -358,15 +371,17 @@ class LibraryWindow(QDialog):
                 "checkSessions": self._check,
                 "exportSessions": self._export,
                 "resumeSession": self._resume,
-                "openSession": self._open,
             }.items()
         )
-        actions = hbox((self._change_text, 1), self._undo, *buttons, spacing=SPACING_PX)
+        # Enter in the search opens the first session that it finds.
+        opening = _pressed_for(self._open, main_button("openSession", self._open.text()))
+        actions = hbox((self._change_text, 1), self._undo, *buttons, opening, spacing=SPACING_PX)
         vbox(
+            paragraph("libraryTask", _TASK),
             top,
             (halves, 1),
             self._count,
-            self._message,
+            self._said,
             actions,
             on=self,
             margins=2 * SPACING_PX,
@@ -375,22 +390,9 @@ class LibraryWindow(QDialog):
         self.resize(130 * SPACING_PX, 84 * SPACING_PX)
 
 
-def _reason_for_none(shown: int, total: int) -> str:
-    """Return the reason why no session is shown, and what to do; empty if one is."""
-    if shown:
-        return ""
-    if total:
-        return tr("No session matches. Search for something else, or choose All sessions.")
-    return tr(
-        "No session is in this folder yet. Calibrate a wearer, or choose another session folder "
-        "on the start page."
-    )
-
-
-def _button_of(name: str, action: QAction) -> QPushButton:
-    """Return a button that triggers an action, and is enabled while the action is."""
-    made = button(name, action.text())
-    made.setAutoDefault(False)
+def _pressed_for(action: QAction, made: QPushButton) -> QPushButton:
+    """Make a button trigger an action, and be enabled while the action is."""
+    made.setAutoDefault(made.isDefault())
     made.setToolTip(action.toolTip())
     made.setEnabled(action.isEnabled())
     made.clicked.connect(action.trigger)

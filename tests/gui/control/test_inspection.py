@@ -80,4 +80,11 @@ def test_a_window_that_cannot_open_says_why(
 
 def test_without_an_alignment_nothing_opens(program: Program) -> None:
     program.windows.inspect()
-    assert "no alignment to inspect" in program.window.banner.text
+    assert "nothing to inspect: open a session first" in program.window.banner.text
+    menu = program.window.menus["File"]
+    menu.aboutToShow.emit()
+    [entry] = [one for one in menu.actions() if "Inspect" in one.text()]
+    assert entry.text() == "&Inspect in 3D (open a session first)"
+    assert not entry.isEnabled()
+    menu.aboutToHide.emit()
+    assert (entry.text(), entry.isEnabled()) == ("&Inspect in 3D", True)

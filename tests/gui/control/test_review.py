@@ -29,6 +29,7 @@ from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.views import VERIFIED
 
 PATIENCE_MS = 20_000
@@ -79,8 +80,8 @@ def test_a_corrected_name_is_shown_and_exported(
     program.open_session(path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     library = program.windows.show_library(path.parent)
-    qtbot.waitUntil(lambda: bool(library._sessions.entries), timeout=PATIENCE_MS)
-    library._correct_names(library._sessions.entries, "Ada")
+    qtbot.waitUntil(lambda: bool(library.chosen), timeout=PATIENCE_MS)
+    library._correct_names(library.chosen, "Ada")
 
     def exported() -> str:
         assert program.windows.record is not None
@@ -317,7 +318,9 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     program: Program, qtbot: QtBot, tmp_path: Path
 ) -> None:
     assert program.windows.export() is None
-    assert "no result to export" in program.window.banner.text
+    [library] = program.window.findChildren(LibraryWindow)  # to choose sessions in
+    assert library.isVisible()
+    library.reject()
     with Session.create(tmp_path, example_rig(), {}) as session:
         session.save_facts(verified={"left": replace(VERIFIED, hand_E_m=(0.0, 0.0, 0.5))})
     program.open_session(session.path)

@@ -68,7 +68,7 @@ def dialog(
     dialog.show()
     yield dialog
     exporter.may_end.set()
-    qtbot.waitUntil(lambda: press(dialog, "close").text() == "Close")
+    qtbot.waitUntil(lambda: press(dialog, "close").text() == "&Close")
 
 
 def press(dialog: ExportDialog, name: str) -> QPushButton:
@@ -132,12 +132,15 @@ def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog)
     for name in ("report", "csv"):
         box(dialog, name).click()
     assert not press(dialog, "export").isEnabled()
+    assert "nothing is ticked" in text(dialog, "exportTask")
     box(dialog, "zip").click()
     assert press(dialog, "export").isEnabled()
+    assert text(dialog, "exportTask") == "Choose what to write and where, then export."
     folder = dialog.findChild(PathField)
     assert isinstance(folder, PathField)
     folder.set_path("")
     assert not press(dialog, "export").isEnabled()
+    assert text(dialog, "exportTask") == "Choose the folder to export to."
 
 
 def test_a_failure_is_reported_and_can_be_tried_again(
@@ -162,6 +165,9 @@ def test_sessions_that_were_not_exported_are_named_above_the_files(
     exporter.may_end.set()
     press(dialog, "export").click()
     qtbot.waitUntil(lambda: text(dialog, "doing") == "1 session not exported, see below.")
+    bar = dialog.findChild(QProgressBar, "progress")
+    assert isinstance(bar, QProgressBar)
+    assert bar.isHidden()  # it would stay at the last share
     assert files(dialog)[:2] == ["bea: it has no alignments", "a.csv"]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtPrintSupport import QPrinter
-from PySide6.QtWidgets import QApplication, QToolButton
+from PySide6.QtWidgets import QApplication, QToolButton, QToolTip
 from pytestqt.qtbot import QtBot
 
 from handcal.station.snapshot import Snapshot
@@ -34,6 +34,7 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     assert copied.startswith("Wearer: without a name\n")
     assert "Target: 6.5′" in copied
     assert copied.count("After, measured: not measured") == 2
+    assert QToolTip.text() == "Copied: the result"
     printer = QPrinter()
     printer.setOutputFileName(str(tmp_path / "result.pdf"))
     bar.print_to(printer)

@@ -112,14 +112,14 @@ def test_solve_says_which_offline_calibration_is_kept(
 
 def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> None:
     triple = (0.0, 0.0, 0.0)
-    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, 0.006), triple, triple, True, False)
+    moved = VerifyingView("left", NudgeSum(-3.0, 4.0, -0.006), triple, triple, True, False)
     seen = snapshot(
         State.VERIFY, procedure={"verifying": moved, "refusal": "Hold your hand still."}
     )
     view = Wizard().view(seen)
     assert view.step is Step.VERIFY
     assert view.sentence.startswith("Close the right eye.")
-    assert view.fact == "Left eye moved by 5.0′: 3.0′ left, 4.0′ down, size +0.6 %"
+    assert view.fact == "Left eye moved by 5.0′: 3.0′ left, 4.0′ down, size −0.6 %"
     assert view.note == "Hold your hand still."
     assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
     assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]

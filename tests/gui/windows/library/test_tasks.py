@@ -20,3 +20,12 @@ def test_messages_name_a_few_of_many_sessions(tmp_path: Path) -> None:
     assert last == "and 12 more"
     gone = [tmp_path / f"gone-{number}" for number in range(20)]
     assert len(delete_sessions(gone, Progress()).splitlines()) == 10
+
+
+def test_a_cancelled_task_says_what_it_did(tmp_path: Path) -> None:
+    asked = iter((False, False, True))
+    gone = [tmp_path / f"gone-{number}" for number in range(5)]
+    said = delete_sessions(gone, Progress(is_cancelled=lambda: next(asked)))
+    first, cancelled, *failed = said.splitlines()
+    assert (first, cancelled) == ("0 sessions deleted.", "Cancelled: 3 sessions left out.")
+    assert len(failed) == 2

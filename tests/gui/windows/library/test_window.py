@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,12 @@ from PySide6.QtWidgets import QComboBox, QInputDialog, QLabel, QLineEdit, QPushB
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
-from handcal.session.library import delete_session, read_library
+from handcal.session.library import LibraryEntry, delete_session, read_library
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import Alignment
-from handcal_gui.windows.library.sessions_model import FILTERS
+from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel, make_row
+from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.helpers import child, text
@@ -133,7 +135,7 @@ def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
 def test_buttons_fit_the_choice(window: LibraryWindow) -> None:
     enabled = {
         (): set(),
-        ("Bea",): {"openSession", "exportSessions", "checkSessions"},
+        ("Bea",): {"openSession", "resumeSession", "exportSessions", "checkSessions"},
         ("Cid",): {"openSession", "resumeSession", "exportSessions", "checkSessions"},
         ("Ada", "Bea"): {"exportSessions", "checkSessions"},
     }
@@ -218,6 +220,95 @@ def test_a_repaired_copy_counts_once(folder: Path) -> None:
     repair_session(folder / "ada-1", folder / "ada-1-repaired")
     found = calibrations_of("Ada", read_library(folder))
     assert [entry.path.name for entry in found] == ["ada-1-repaired", "ada-2"]
+
+
+def test_enter_in_the_search_opens_the_first_that_is_found(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    assert [entry.wearer for entry in window.chosen] == ["Cid"]  # the newest
+    activate(qtbot, window)
+    search = child(window, QLineEdit, "search")
+    QTest.keyClicks(search, "bea")
+    assert [entry.wearer for entry in window.chosen] == ["Bea"]
+    with qtbot.waitSignal(window.open_requested) as opened:
+        QTest.keyClick(search, Qt.Key.Key_Return)
+    assert opened.args == [folder / "bea"]
+
+
+def test_a_sorted_or_filtered_table_keeps_what_is_selected(window: LibraryWindow) -> None:
+    choose(window, "Ada", "Cid")
+    table(window).sortByColumn(0, Qt.SortOrder.AscendingOrder)
+    assert wearers(window) == ["Ada", "Ada", "Bea", "Cid"]
+    assert [entry.wearer for entry in window.chosen] == ["Ada", "Ada", "Cid"]
+    child(window, QLineEdit, "search").setText("a")  # not in Cid, but in the rig's name
+    assert [entry.wearer for entry in window.chosen] == ["Ada", "Ada", "Cid"]
+
+
+def test_every_button_has_a_letter_of_its_own(window: LibraryWindow) -> None:
+    texts = [one.text() for one in window.findChildren(QPushButton) if one.objectName() != "cancel"]
+    letters = [text[text.index("&") + 1].casefold() for text in texts]
+    assert len(set(letters)) == len(letters)
+
+
+def test_a_narrow_window_leaves_out_columns_and_cuts_none(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    repair_session(folder / "cid", folder / "cid-repaired")
+    window.reload()
+    qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
+    assert "Damaged, has a copy" in [row[8] for row in rows(window)]
+    across = table(window).horizontalHeader()
+    for width_px in (800, 960, 1600):
+        window.resize(width_px, 510)
+        assert across.length() <= table(window).viewport().width()
+        for column in range(across.count()):
+            if not across.isSectionHidden(column):
+                assert across.sectionSize(column) >= table(window).sizeHintForColumn(column)
+    assert not across.hiddenSectionCount()
+    tip = table(window).model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
+    assert "Rig: Example" in tip
+
+
+def test_what_was_deleted_together_is_restored_together_by_name(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Ada", "Bea")
+    press(window, "deleteSessions")
+    wait_for(qtbot, window, "3 sessions deleted.")
+    qtbot.waitUntil(lambda: wearers(window) == ["Cid"], timeout=PATIENCE_MS)
+    tip = child(window, QPushButton, "restoreSession").toolTip
+    assert tip() == "Last deleted: 3 sessions (Ctrl+Z)"
+    press(window, "restoreSession")
+    wait_for(qtbot, window, "3 sessions restored.")
+    qtbot.waitUntil(lambda: len(rows(window)) == 4, timeout=PATIENCE_MS)
+    choose(window, "Bea")
+    press(window, "deleteSessions")
+    qtbot.waitUntil(lambda: tip().startswith("Last deleted: Bea, "), timeout=PATIENCE_MS)
+
+
+def test_few_calls_of_python_draw_and_choose_many_sessions(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: Counter[str] = Counter()
+    for name in ("data", "index", "rowCount", "columnCount", "flags"):
+        usual = getattr(SessionsModel, name)
+
+        def count(*args: Any, name: str = name, usual: Any = usual) -> Any:
+            calls[name] += 1
+            return usual(*args)
+
+        monkeypatch.setattr(SessionsModel, name, count)
+    model = SessionsModel()
+    shown = SessionsTable(model)
+    qtbot.addWidget(shown)
+    entries = [LibraryEntry(tmp_path / f"{i}", (0, 0), wearer=f"P{i}") for i in range(500)]
+    model.show_rows([make_row(entry) for entry in entries])
+    calls.clear()
+    shown.selectAll()
+    assert len(shown.chosen) == 500
+    model.sort(0)
+    model.search("P1", "all")
+    assert calls.total() < 500
 
 
 def test_long_names_are_cut_and_nothing_else(window: LibraryWindow) -> None:
@@ -333,7 +424,9 @@ def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, fol
 
 def test_the_context_menu_has_every_action(window: LibraryWindow, folder: Path) -> None:
     assert table(window).contextMenuPolicy() == Qt.ContextMenuPolicy.ActionsContextMenu
-    actions = {one.text(): one for one in table(window).actions() if not one.isSeparator()}
+    actions = {
+        one.text().replace("&", ""): one for one in table(window).actions() if not one.isSeparator()
+    }
     assert set(actions) == {
         "Open", "Resume", "Export…", "Name…", "Show folder", "Copy path", "Check", "Repair",
         "Delete",
