@@ -3349,7 +3349,7 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Depth: {}</source>
+        <source>Depth error: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
