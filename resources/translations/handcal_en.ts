@@ -2444,8 +2444,16 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>RMS distance between matched points of hand and cursor at each iteration
-of each alignment (1, 2, …). “consistent” measures it along the surface&apos;s normals,
+of each alignment. “consistent” measures it along the surface&apos;s normals,
 which is less than the RMS in the table.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignment {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2866,7 +2874,17 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Median</source>
+        <source>The error of each trial, the mean over the target&apos;s four corners. At each
+distance: the mean of the n trials, and one standard deviation (SD) of the
+trials above and below it. A single trial has no SD.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean ± SD</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:g} (n = {})</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
