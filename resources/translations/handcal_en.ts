@@ -1950,6 +1950,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>All points are hidden. Switch cursor or hand on below.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>As the wearer sees it (1)</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1970,7 +1974,23 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Points of the frozen hand</source>
+        <source>Show the frozen hand; the number of its points (C)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the hand; the number of its points (L)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>While aligning, join points of the live hand with the nearest points of the cursor once the hand is laid over it; updated twice a second (P)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>points</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show or hide: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1978,15 +1998,7 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Points of the live hand</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Pairs</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>While aligning, join points of the live hand with the nearest points of the cursor once the hand is laid over it; updated twice a second</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -48,7 +48,7 @@ class WearerViewPanel(QWidget):
         self.setObjectName("wearer-view-panel")
         self._eyes = {eye: _EyeColumn(_TITLES[eye]) for eye in EYES}
         self._entries = {
-            what: LegendEntry(name, LINES[what][0], tooltip, LINES[what][1])
+            what: LegendEntry(what, QLabel(name), LINES[what][0], tooltip, LINES[what][1])
             for what, (name, tooltip) in _LEGEND.items()
         }
         whole, before = QCheckBox(tr("Whole display")), QCheckBox(tr("Before calibration"))
