@@ -29,6 +29,9 @@ PREFERENCES_VERSION = 4
 there were at most three."""
 MOST_RECENT = 8
 """Number of sessions that are remembered, and listed on the start page."""
+HIDDEN_LAYERS = ("pairs", "solved-cursor")
+"""Layers that the hand cloud leaves out at first: the cursor of a finished alignment would cover
+residuals."""
 _OLD_ERROR_MAX_ARCMIN = 15.0
 """Default of version 1, which nobody chose."""
 _OLD_VERIFICATIONS = 3
@@ -55,6 +58,8 @@ class Preferences:
     export_folder: str = ""
     """Folder of the last export; empty before the first."""
     fine_tune_step_m: float = 5e-4
+    hidden_layers: tuple[str, ...] = HIDDEN_LAYERS
+    """Layers of the hand cloud that are switched off."""
     evaluation: EvaluationEntries = field(default_factory=EvaluationEntries)
     bridges: BridgeSettings = field(default_factory=BridgeSettings)
     """Bridges to other programs that every calibration runs."""

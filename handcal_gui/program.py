@@ -160,6 +160,7 @@ class Program(QObject):
             live_layout=layouts.get("live", ""),
             review_layout=layouts.get("review", ""),
             fine_tune_step_m=self.window.panels.fine_tune.step_m,
+            hidden_layers=self.window.panels.cloud.hidden_layers,
         )
         self.windows.close()
         self.live.stop()
@@ -232,6 +233,7 @@ class Program(QObject):
         """
         preferences = self.preferences
         self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
+        self.window.panels.cloud.hide_layers(preferences.hidden_layers)
         geometry = QByteArray.fromBase64(preferences.geometry.encode())
         if not self.window.restoreGeometry(geometry):  # none, or that of a far larger screen
             screen = QGuiApplication.primaryScreen().availableSize()

@@ -63,7 +63,7 @@ class DepthBenefit:
     def __str__(self) -> str:
         """Return the errors without the calibration and with it, and the probability."""
         errors = f"{1e3 * self.without_m:.1f} → {1e3 * self.after_m:.1f} mm"
-        return f"{errors} (better: {percent(self.probability_better)})"
+        return f"{errors}, {percent(self.probability_better)} sure to be better"
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ class ImageView(QWidget):
     Parameters
     ----------
     name : str
-        For screen readers and, in lower case with dashes, as object name.
+        For screen readers.
     colorize : callable or None
         Converts another kind of image to RGB, at its displayed size.
     parent : QWidget or None
@@ -36,7 +36,6 @@ class ImageView(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.setObjectName(name.lower().replace(" ", "-"))
         self.setAccessibleName(name)
         self.setMinimumSize(120, 68)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)

@@ -1,16 +1,20 @@
-"""Legend entries: a colour sample, a name and a number."""
+"""Legend entries: a colour sample, a name or switch, and a number."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QLineF, Qt
+from PySide6.QtCore import QLineF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QCheckBox, QLabel, QSizePolicy, QWidget
 
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.number_label import NumberLabel
+from handcal_gui.widgets.residual_scale import fill_with_ramp
 
-_SAMPLE_PX = (22, 14)
+RESIDUALS = "residuals"
+"""The role of points that are coloured by their residuals."""
+_LINE_PX, _POINTS_PX = (22, 14), (14, 14)
+"""Sizes of samples."""
 
 
 def role_color(role: str, widget: QWidget) -> QColor:
@@ -20,14 +24,16 @@ def role_color(role: str, widget: QWidget) -> QColor:
 
 
 class LegendEntry(QWidget):
-    """A colour sample with a name and optionally a number of fixed width.
+    """A colour sample with a name, which may be a switch, and optionally a number of fixed width.
 
     Parameters
     ----------
-    name : str
-        Name of the entry.
+    key : str
+        Object names are made of it, the same in every language.
+    name : QLabel or QCheckBox
+        Shows the name; a check box shows and hides what it names.
     role : str
-        See `role_color`.
+        See `role_color`; or `RESIDUALS`.
     tooltip : str
     line : (float, Qt.PenStyle) or None
         Width in pixels and style of its line; None for points.
@@ -37,17 +43,18 @@ class LegendEntry(QWidget):
 
     def __init__(
         self,
-        name: str,
+        key: str,
+        name: QLabel | QCheckBox,
         role: str,
         tooltip: str,
         line: tuple[float, Qt.PenStyle] | None = None,
         widest: str = "",
     ) -> None:
         super().__init__()
-        self.setObjectName(f"legend-{name.lower().replace(' ', '-')}")
+        self.setObjectName(f"legend-{key}")
         self.setToolTip(tooltip)
         self._sample = _Sample(role, line)
-        self._name = QLabel(name)
+        self._name = name
         self._name.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._number = NumberLabel(f"{self.objectName()}-number", widest, tooltip)
         self._number.setVisible(bool(widest))
@@ -58,8 +65,8 @@ class LegendEntry(QWidget):
         """Name and number."""
         return f"{self._name.text()} {self._number.text()}"
 
-    def show_name(self, name: str, role: str | None) -> None:
-        """Change the name and the colour; None hides the sample."""
+    def show_name(self, name: str, role: str) -> None:
+        """Change the name and the colour."""
         self._name.setText(name)
         self._sample.show_role(role)
 
@@ -73,24 +80,25 @@ class _Sample(QWidget):
 
     def __init__(self, role: str, line: tuple[float, Qt.PenStyle] | None) -> None:
         super().__init__()
-        self._role: str | None = role
+        self._role = role
         self._line = line
-        self.setFixedSize(*_SAMPLE_PX)
+        self.setFixedSize(*(_POINTS_PX if line is None else _LINE_PX))
 
-    def show_role(self, role: str | None) -> None:
+    def show_role(self, role: str) -> None:
         if role != self._role:
             self._role = role
             self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
-        if self._role is None:
-            return
         painter = QPainter(self)
+        if self._role == RESIDUALS:
+            fill_with_ramp(painter, QRectF(self.rect()))
+            return
         color = role_color(self._role, self)
-        width, height = _SAMPLE_PX
         if self._line is None:
-            painter.fillRect((width - height) // 2, 0, height, height, color)
+            painter.fillRect(self.rect(), color)
             return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(QPen(color, *self._line, Qt.PenCapStyle.FlatCap))
-        painter.drawLine(QLineF(0, height / 2, width, height / 2))
+        middle = self.height() / 2
+        painter.drawLine(QLineF(0, middle, self.width(), middle))

@@ -76,7 +76,8 @@ class NumberTable(QTableWidget):
         self.clearSpans()
         self.setColumnCount(len(columns))
         self.setRowCount(len(rows))
-        self.setHorizontalHeaderLabels(list(columns))
+        # A unit, which may follow a comma, has a line of its own: columns are narrower then.
+        self.setHorizontalHeaderLabels([column.replace(", ", "\n") for column in columns])
         for number, row in enumerate(rows):
             self.setVerticalHeaderItem(number, QTableWidgetItem(row.label))
             for column, text in enumerate(row.cells):

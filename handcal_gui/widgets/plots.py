@@ -103,11 +103,17 @@ class Plot(QWidget):
         return line
 
     def add_text(self, text: str, x: float, y: float) -> None:
-        """Add a text to the right of a point."""
-        written = pg.TextItem(text, self.palette().windowText().color(), anchor=(-0.5, 0.5))
+        """Add a text to the right of a point, apart from its symbol."""
+        written = pg.TextItem(text, self.palette().windowText().color())
+        written.setAnchor((-2.0 * _SYMBOL_PX / max(written.boundingRect().width(), 1.0), 0.5))
         written.setPos(x, y)
         self.item.addItem(written)
         self._texts.append(written)
+
+    @property
+    def widest_text_px(self) -> float:
+        """Width of the widest text; 0 without any."""
+        return max((one.boundingRect().width() for one in self._texts), default=0.0)
 
     def clear(self) -> None:
         """Remove all lines and texts."""

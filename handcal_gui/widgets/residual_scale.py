@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.register.verdict import VerdictSettings
 from handcal.types import Float64, UInt8
-from handcal_gui.theme import SPACING_PX, colors, is_dark
+from handcal_gui.theme import SPACING_PX, is_dark
 from handcal_gui.translation import tr
 from handcal_gui.widgets.splat import rgb
 
@@ -17,6 +17,8 @@ LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
 """End of the colour scale: the RMS that the verdict rejects. Fixed, so that views compare."""
 _VIRIDIS = ("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b")
 """Matplotlib's map without its ends, which have too little contrast with the canvas."""
+OUTLIER = "#ff00ff"
+"""Points without a partner. Of no theme, as colour-blind people must tell it from the whole map."""
 _BAR_PX = 12
 
 
@@ -27,12 +29,21 @@ def residual_ramp() -> UInt8:
 
 
 def residual_colors(residuals_m: Float64) -> UInt8:
-    """Return (N, 3) RGB of distances; NaN, for points without a partner, is red."""
+    """Return (N, 3) RGB of distances; NaN, for points without a partner, is `OUTLIER`."""
     ramp = residual_ramp()
     place = np.clip(1e3 * residuals_m / LARGEST_MM, 0.0, 1.0) * (len(ramp) - 1)
     shades = np.stack([np.interp(place, np.arange(len(ramp)), c) for c in ramp.T], axis=1)
-    shades[np.isnan(residuals_m)] = rgb(colors().red)
+    shades[np.isnan(residuals_m)] = rgb(OUTLIER)
     return shades.astype(np.uint8)
+
+
+def fill_with_ramp(painter: QPainter, where: QRectF) -> None:
+    """Fill a rectangle with the colours of residuals, from 0 at its left."""
+    gradient = QLinearGradient(where.topLeft(), where.topRight())
+    ramp = residual_ramp().tolist()
+    for i, color in enumerate(ramp):
+        gradient.setColorAt(i / (len(ramp) - 1), QColor(*color))
+    painter.fillRect(where, gradient)
 
 
 class ResidualScale(QWidget):
@@ -55,17 +66,13 @@ class ResidualScale(QWidget):
         """Draw the bar between its limits, and then the colour of outliers."""
         painter = QPainter(self)
         width_of = painter.fontMetrics().horizontalAdvance
-        low, high, outlier = tr("Residual 0"), f"{LARGEST_MM:.0f} mm", tr("Outlier")
+        low, high, outlier = tr("Residual 0"), f"≥ {LARGEST_MM:.0f} mm", tr("Outlier")
         gap, top = SPACING_PX / 2, (self.height() - _BAR_PX) / 2
         swatch = QRectF(self.width() - width_of(outlier) - gap - _BAR_PX, top, _BAR_PX, _BAR_PX)
         left = width_of(low) + gap
         bar = QRectF(left, top, swatch.x() - width_of(high) - 5 * gap - left, _BAR_PX)
-        gradient = QLinearGradient(bar.topLeft(), bar.topRight())
-        ramp = residual_ramp().tolist()
-        for i, color in enumerate(ramp):
-            gradient.setColorAt(i / (len(ramp) - 1), QColor(*color))
-        painter.fillRect(bar, gradient)
-        painter.fillRect(swatch, QColor(colors().red))
+        fill_with_ramp(painter, bar)
+        painter.fillRect(swatch, QColor(OUTLIER))
         painter.setPen(self.palette().windowText().color())
         for x, text in ((0.0, low), (bar.right() + gap, high), (swatch.right() + gap, outlier)):
             where = QRectF(x, 0, self.width(), self.height())

@@ -71,7 +71,7 @@ def eye_results(results: Results) -> list[EyeResult]:
         another = tr("One more alignment: {:.1f}′ expected").format(
             results.expected_after_another_arcmin[eye]
         )
-        depth = tr("Depth: {}").format(benefit.depth)
+        depth = tr("Depth error: {}").format(benefit.depth)
         found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, another, depth))
     return found
 

@@ -316,10 +316,6 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Back</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Verdict, eye shifts, figures and settings, to read and archive</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1529,6 +1525,18 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The headset uses the offline calibration for {}: φ is 0 there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:.0f} to {:.0f} cm from the camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>at forearm&apos;s length, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The alignments have changed. Solve again.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1673,25 +1681,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-<<<<<<< HEAD
-        <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {:+.1f} %</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The headset uses the offline calibration for {}: φ is 0 there.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{:.0f} to {:.0f} cm from the camera</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>at forearm&apos;s length, {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-=======
->>>>>>> w/lib6
         <source>both eyes</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2033,6 +2022,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>All points are hidden. Switch cursor or hand on below.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>As the wearer sees it (1)</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2053,7 +2046,23 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Points of the frozen hand</source>
+        <source>Show the frozen hand; the number of its points (C)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the hand; the number of its points (L)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>While aligning, join points of the live hand with the nearest points of the cursor once the hand is laid over it; updated twice a second (P)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>points</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show or hide: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2061,15 +2070,7 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Points of the live hand</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Pairs</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>While aligning, join points of the live hand with the nearest points of the cursor once the hand is laid over it; updated twice a second</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2531,8 +2532,16 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>RMS distance between matched points of hand and cursor at each iteration
-of each alignment (1, 2, …). “consistent” measures it along the surface&apos;s normals,
+of each alignment. “consistent” measures it along the surface&apos;s normals,
 which is less than the RMS in the table.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignment {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2969,7 +2978,17 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Median</source>
+        <source>The error of each trial, the mean over the target&apos;s four corners. At each
+distance: the mean of the n trials, and one standard deviation (SD) of the
+trials above and below it. A single trial has no SD.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean ± SD</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:g} (n = {})</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3472,7 +3491,7 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Depth: {}</source>
+        <source>Depth error: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4319,11 +4338,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} sound, every file read.</source>
+        <source> (and {} more)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source> (and {} more)</source>
+        <source>{} sound, every file read.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4368,10 +4387,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Correct the wearer&apos;s name or code in the selected sessions (F2)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Check</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5267,14 +5282,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Take images…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Search &amp;again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Images</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5304,6 +5311,14 @@ one turns out.</source>
     </message>
     <message>
         <source>{} of {} used</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Take images…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search &amp;again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5889,25 +5904,10 @@ width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-<<<<<<< HEAD
         <source>Press the large button</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Set-&amp;up</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>&amp;Inputs</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Numbe&amp;rs</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>to solve, tick an image in which the board was found</source>
-=======
         <source>Print</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5925,7 +5925,22 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Sent to {}</source>
->>>>>>> w/lib6
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Set-&amp;up</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Inputs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Numbe&amp;rs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, tick an image in which the board was found</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

@@ -32,6 +32,7 @@ CHANGED = Preferences(
     export=ExportSettings(formats=("report", "zip"), near_m=0.2),
     export_folder="/c",
     fine_tune_step_m=1e-3,
+    hidden_layers=("cursor",),
     theme="dark",
     geometry="AAAA",
     live_layout="BBBB",

@@ -18,6 +18,7 @@ from pytestqt.qtbot import QtBot
 from handcal.types import Float64
 from handcal_gui.theme import colors, follow_theme, icon, is_dark, use_theme
 from handcal_gui.widgets.fields import tool_button
+from handcal_gui.widgets.residual_scale import OUTLIER, residual_ramp
 
 
 @pytest.fixture
@@ -208,3 +209,17 @@ def test_colour_blind_people_tell_the_colours_of_states_apart(
                 lab(np.array(seen) @ linear_rgb(QColor(getattr(colors(), name)))) for name in pair
             )
             assert np.linalg.norm(one - other) >= LEAST_DIFFERENCE, (who, pair)
+
+
+@pytest.mark.usefixtures("themes")
+@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
+def test_colour_blind_people_tell_outliers_from_residuals(
+    theme: Literal["light", "dark", "contrast"],
+) -> None:
+    use_theme(theme)
+    for who, seen in SEEN_BY.items():
+        outlier = lab(np.array(seen) @ linear_rgb(QColor(OUTLIER)))
+        for color in residual_ramp().tolist():
+            other = lab(np.array(seen) @ linear_rgb(QColor(*color)))
+            assert np.linalg.norm(outlier - other) >= LEAST_DIFFERENCE, (who, color)
+    assert contrast(QColor(OUTLIER), QColor(colors().canvas)) >= 3.0

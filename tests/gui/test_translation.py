@@ -163,3 +163,8 @@ def test_a_compiled_translation_is_used(
     assert tr("Show hand") == "Hand zeigen"
     assert tr("Make cursor") == "Make cursor"
     qapp.removeTranslator(translator)
+
+
+def test_no_object_name_is_made_of_a_shown_text() -> None:
+    made = re.compile(r"setObjectName\(.*\.lower\(\)")
+    assert [path.name for path in SOURCES if made.search(path.read_text("utf-8"))] == []

@@ -146,7 +146,7 @@ def test_the_errors_in_depth_are_those_of_a_gaussian_by_hand() -> None:
     assert found.probability_better == 1.0
     unknown = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.array([0.004, 0.0, 0.0]), PRIOR_M2).depth
     assert unknown.probability_better == 0.0
-    assert str(found) == "9.0 → 0.4 mm (better: 99\u00a0%)"
+    assert str(found) == "9.0 → 0.4 mm, 99\u00a0% sure to be better"
 
 
 def test_nobody_is_entirely_sure() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +14,15 @@ from handcal.register.pairs import matched_pairs
 from handcal.station.hands import PlacedHand
 from handcal.station.snapshot import Snapshot
 from handcal.types import Alignment, Float64, UInt8
+from handcal_gui.keys import add_action
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.orbit import Direction
+from handcal_gui.preferences import HIDDEN_LAYERS
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.legend import RESIDUALS, LegendEntry
 from handcal_gui.widgets.missing import missing_text
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
@@ -28,12 +32,18 @@ _EMPTY = tr("The hand cloud will appear here. Hold a hand in front of the depth 
 _FROM_CAMERA = tr("mm from the depth camera")
 _FROM_CURSOR = tr("mm from the centre of the cursor")
 _TURNED = tr("The live hand is rotated too far")
+_HIDDEN = tr("All points are hidden. Switch cursor or hand on below.")
 _DIRECTIONS = {
-    tr("Front"): (Direction.FRONT, tr("As the wearer sees it (1)")),
-    tr("Side"): (Direction.SIDE, tr("From the wearer's right (2)")),
-    tr("Top"): (Direction.TOP, tr("From above (3)")),
-    tr("Reset"): (Direction.ASLANT, tr("Oblique view of the whole scene (R, or double-click)")),
+    "front": (Direction.FRONT, tr("Front"), tr("As the wearer sees it (1)")),
+    "side": (Direction.SIDE, tr("Side"), tr("From the wearer's right (2)")),
+    "top": (Direction.TOP, tr("Top"), tr("From above (3)")),
+    "reset": (
+        Direction.ASLANT,
+        tr("Reset"),
+        tr("Oblique view of the whole scene (R, or double-click)"),
+    ),
 }
+_WIDEST = "9,999"
 _MOST_POINTS = 6000
 """Maximum number of points drawn of each cloud, to keep up with the frame rate."""
 _PAIRS_PERIOD_S = 0.5
@@ -58,6 +68,8 @@ class _Axes:
 class _Cloud:
     """A cloud, coloured by its role or by its residuals."""
 
+    layer: str
+    """By which it can be hidden: "cursor", "hand", or "solved-cursor" of a finished alignment."""
     name: str
     role: str
     points_mm: Float64
@@ -83,35 +95,56 @@ class CloudPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("cloud-panel")
         self._clouds: list[_Cloud] = []
+        self._hidden = set(HIDDEN_LAYERS)
+        self._cursor_layer = "cursor"
         self._text = ""
         self._next_pairs_s = 0.0
         self._view = CloudView()
-        widest = "99,999"
+        self._shows_cursor = self._switch(tr("Cursor"), "C", lambda: self._cursor_layer)
+        self._shows_hand = self._switch(tr("Live hand"), "L", lambda: "hand")
+        self._pairs = self._switch(tr("Pairs"), "P", lambda: "pairs")
         self._cursor = LegendEntry(
-            tr("Cursor"), "cursor", tr("Points of the frozen hand"), widest=widest
+            "cursor",
+            self._shows_cursor,
+            "cursor",
+            tr("Show the frozen hand; the number of its points (C)"),
+            widest=_WIDEST,
         )
         self._hand = LegendEntry(
-            tr("Live hand"), "live", tr("Points of the live hand"), widest=widest
+            "hand",
+            self._shows_hand,
+            "live",
+            tr("Show the hand; the number of its points (L)"),
+            widest=_WIDEST,
         )
         self._scale = ResidualScale()
-        self._pairs = QCheckBox(tr("Pairs"))
         self._pairs.setObjectName("cloud-pairs")
         self._pairs.setToolTip(
             tr(
                 "While aligning, join points of the live hand with the nearest points of "
                 "the cursor "
-                "once the hand is laid over it; updated twice a second"
+                "once the hand is laid over it; updated twice a second (P)"
             )
         )
-        self._pairs.toggled.connect(self._forget_pairs)
         self.setFocusProxy(self._view)
         self._lay_out()
         self.clear()
         follow_theme(self, self._draw)
 
+    @property
+    def hidden_layers(self) -> tuple[str, ...]:
+        """Layers that are switched off, and "pairs"."""
+        return tuple(sorted(self._hidden))
+
+    def hide_layers(self, layers: Iterable[str]) -> None:
+        """Hide these layers, and show all others."""
+        self._hidden = set(layers)
+        self._show_switches()
+        self._draw()
+
     def clear(self, message: str = _EMPTY) -> None:
         """Clear the panel and show a message."""
-        self._show(None, None, message)
+        self._show("cursor", None, None, message)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the cursor, if there is one, and the live hand."""
@@ -129,8 +162,11 @@ class CloudPanel(QWidget):
         is_red = seen is not None and seen.is_over_limit
         role = "red" if is_red else "live"
         self._show(
-            None if cursor is None else _Cloud(tr("Cursor"), "cursor", axes.mm(cursor.points_W_m)),
-            None if hand is None else _Cloud(tr("Live hand"), role, axes.mm(hand.points_W_m)),
+            "cursor",
+            None if cursor is None else axes.mm(cursor.points_W_m),
+            None
+            if hand is None
+            else _Cloud("hand", tr("Live hand"), role, axes.mm(hand.points_W_m)),
             problem or (_TURNED if is_red else axes.name),
         )
         if cursor and hand and seen and seen.rotation_rad is not None and self._pairs.isChecked():
@@ -139,33 +175,41 @@ class CloudPanel(QWidget):
             self._forget_pairs()
 
     def show_alignment(self, alignment: Alignment, residuals_m: Float64 | None = None) -> None:
-        """Show a finished alignment, its hand coloured by (M,) residuals; NaN for outliers."""
+        """Show a finished alignment, its hand coloured by (M,) residuals; NaN for outliers.
+
+        Its cursor would cover the colours, and is hidden at first.
+        """
         T_E_W = alignment.T_E_W[alignment.eyes[0]]
         middle_m = np.median(transform(T_E_W, alignment.cursor_m), axis=0)
         axes = _Axes(T_E_W, middle_m, _FROM_CURSOR)
         self._forget_pairs()
         self._pairs.setEnabled(False)
+        role = "live" if residuals_m is None else RESIDUALS
         self._show(
-            _Cloud(tr("Cursor"), "cursor", axes.mm(alignment.cursor_m)),
-            _Cloud(tr("Hand"), "live", axes.mm(alignment.hand_m), residuals_m),
+            "solved-cursor",
+            axes.mm(alignment.cursor_m),
+            _Cloud("hand", tr("Hand"), role, axes.mm(alignment.hand_m), residuals_m),
             axes.name,
         )
 
     def _lay_out(self) -> None:
         controls, legend = QHBoxLayout(), QHBoxLayout()
         controls.setSpacing(SPACING_PX // 2)
-        for text, (direction, tooltip) in _DIRECTIONS.items():
+        for name, (direction, text, tooltip) in _DIRECTIONS.items():
             button = QToolButton()
-            button.setObjectName(f"cloud-{text.lower()}")
+            button.setObjectName(f"cloud-{name}")
             button.setText(text)
             button.setToolTip(tooltip)
             button.clicked.connect(lambda _, direction=direction: self._view.look(direction))
             controls.addWidget(button)
         controls.addStretch()
         controls.addWidget(self._pairs)
-        legend.setSpacing(2 * SPACING_PX)
+        legend.setSpacing(SPACING_PX)
         legend.addWidget(self._cursor)
         legend.addWidget(self._hand, 1)
+        unit = ElidedLabel()
+        unit.setText(tr("points"))
+        legend.addWidget(unit)
         vbox(
             controls,
             (self._view, 1),
@@ -176,23 +220,51 @@ class CloudPanel(QWidget):
             spacing=SPACING_PX,
         )
 
-    def _show(self, cursor: _Cloud | None, hand: _Cloud | None, text: str) -> None:
+    def _switch(self, text: str, key: str, layer: Callable[[], str]) -> QCheckBox:
+        """Return a check box, also with a key, that shows and hides a layer."""
+        switch = QCheckBox(text)
+
+        def change(is_on: bool) -> None:
+            (self._hidden.discard if is_on else self._hidden.add)(layer())
+            self._forget_pairs()
+            self._draw()
+
+        switch.clicked.connect(change)
+        add_action(self, tr("Show or hide: {}").format(text), key, switch.click)
+        return switch
+
+    def _show_switches(self) -> None:
+        self._shows_cursor.setChecked(self._cursor_layer not in self._hidden)
+        self._shows_hand.setChecked("hand" not in self._hidden)
+        self._pairs.setChecked("pairs" not in self._hidden)
+
+    def _show(
+        self, cursor_layer: str, cursor_mm: Float64 | None, hand: _Cloud | None, text: str
+    ) -> None:
+        self._cursor_layer = cursor_layer
+        cursor = None
+        if cursor_mm is not None:
+            cursor = _Cloud(cursor_layer, tr("Cursor"), "cursor", cursor_mm)
         if hand is None:
             self._hand.show_name(tr("Live hand"), "live")
         for entry, cloud in ((self._cursor, cursor), (self._hand, hand)):
             if cloud is not None:
-                entry.show_name(cloud.name, cloud.role if cloud.residuals_m is None else None)
+                entry.show_name(cloud.name, cloud.role)
             entry.show_number(f"{len(cloud.points_mm):,}" if cloud else UNKNOWN)
+        self._show_switches()
         self._scale.setVisible(hand is not None and hand.residuals_m is not None)
         self._clouds = [cloud for cloud in (cursor, hand) if cloud is not None]
         self._text = text
         self._draw()
 
     def _draw(self) -> None:
-        drawn = [cloud.drawn() for cloud in self._clouds]
+        shown = [cloud for cloud in self._clouds if cloud.layer not in self._hidden]
+        drawn = [cloud.drawn() for cloud in shown]
         points_mm = np.concatenate([_NONE, *(points for points, _ in drawn)])
         shades = np.concatenate([np.empty((0, 3), np.uint8), *(shades for _, shades in drawn)])
-        self._view.show_points(points_mm, shades, self._text)
+        # Without a hand, the text says why there is none.
+        is_hidden = not shown and any(cloud.layer == "hand" for cloud in self._clouds)
+        self._view.show_points(points_mm, shades, _HIDDEN if is_hidden else self._text)
 
     def _join(self, cursor: PlacedHand, hand: PlacedHand, rotation_W: Float64, axes: _Axes) -> None:
         now_s = time.monotonic()

@@ -6,14 +6,17 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from handcal.register.results import Results
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _SYMBOLS = {"left": "o", "right": "s"}
 _MAX_SYMBOLS = 60
+_MOST_FOR_NAMES = 0.6
+"""Of the width."""
 _TEXT_HEIGHT = 0.08
-"""Of a number, as a share of the plot's height."""
+"""Of a name, as a share of the plot's height."""
 
 
 class ConvergencePlot(Plot):
@@ -26,16 +29,18 @@ class ConvergencePlot(Plot):
         self.setToolTip(
             tr(
                 "RMS distance between matched points of hand and cursor at each iteration\n"
-                "of each alignment (1, 2, …). “consistent” measures it along the surface's "
+                "of each alignment. “consistent” measures it along the surface's "
                 "normals,\nwhich is less than the RMS in the table."
             )
         )
         self.show_legend()
+        self._longest = 1
+        self.item.vb.sigResized.connect(self._leave_room)
 
     def show_results(self, results: Results) -> None:
-        """Replace the lines; each ends in its alignment's number."""
+        """Replace the lines; each ends in its alignment's name."""
         self.clear()
-        ends: list[tuple[int, float, int]] = []
+        ends: list[tuple[float, int]] = []
         for number, shifts in results.alignments.items():
             for eye, shift in shifts.items():
                 rms_mm = 1e3 * np.sqrt(shift.history_m2)
@@ -46,23 +51,37 @@ class ConvergencePlot(Plot):
                     symbol=_SYMBOLS[eye] if len(rms_mm) <= _MAX_SYMBOLS else None,
                 )
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
-                ends.append((len(rms_mm), float(rms_mm[-1]), number))
+                ends.append((float(rms_mm[-1]), number))
         histories = [s.history_m2 for eyes in results.alignments.values() for s in eyes.values()]
-        longest = max(map(len, histories), default=1)
+        self._longest = longest = max(map(len, histories), default=1)
         largest_mm = 1e3 * max((float(np.sqrt(max(one))) for one in histories), default=1e-3)
-        self._number(sorted(ends), _TEXT_HEIGHT * largest_mm)
-        self.item.setXRange(1, 1.1 * longest)  # with space for the numbers
+        self._name(sorted(ends), _TEXT_HEIGHT * largest_mm)
+        self._leave_room()
         self.item.setYRange(0.0, 1.1 * largest_mm)
         spacing = max(1, longest // 5)
         self.item.getAxis("bottom").setTickSpacing(spacing, spacing)
 
-    def _number(self, ends: list[tuple[int, float, int]], height_mm: float) -> None:
-        """Write the alignments' numbers at the ends of lines, one text for those that adjoin."""
+    def _leave_room(self) -> None:
+        """Show the iterations, with space for the longest name at their end."""
+        room_px = self.item.vb.width()
+        text_px = self.widest_text_px + 3 * SPACING_PX
+        share = min(text_px / max(room_px, 1.0), _MOST_FOR_NAMES)
+        self.item.setXRange(1, 1 + (self._longest - 1 or 1) / (1.0 - share), padding=0.03)
+
+    def _name(self, ends: list[tuple[float, int]], height_mm: float) -> None:
+        """Name the alignments beside the ends of their lines, in one text for those that adjoin."""
         while ends:
-            last, rms_mm, _ = ends[0]
-            beside = [one for one in ends if one[0] == last and one[1] - rms_mm <= height_mm]
-            numbers = sorted({number for _, _, number in beside})
-            self.add_text(
-                ", ".join(map(str, numbers)), last, float(np.mean([y for _, y, _ in beside]))
-            )
+            beside = [one for one in ends if one[0] - ends[0][0] <= height_mm]
+            text = _names(sorted({number for _, number in beside}))
+            # Right of all lines, because one that goes on would cross the name.
+            self.add_text(text, self._longest, float(np.mean([y_mm for y_mm, _ in beside])))
             ends = ends[len(beside) :]
+
+
+def _names(numbers: list[int]) -> str:
+    """Return *Alignment 1*, *Alignments 1, 2*, or *Alignments 1–5*."""
+    if len(numbers) == 1:
+        return tr("Alignment {}").format(numbers[0])
+    is_row = len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1
+    text = f"{numbers[0]}–{numbers[-1]}" if is_row else ", ".join(map(str, numbers))
+    return tr("Alignments {}").format(text)

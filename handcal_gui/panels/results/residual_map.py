@@ -7,16 +7,16 @@ import pyqtgraph as pg
 from PySide6.QtWidgets import QWidget
 
 from handcal.types import Float64
-from handcal_gui.theme import colors, follow_theme
+from handcal_gui.theme import follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
-from handcal_gui.widgets.residual_scale import LARGEST_MM, residual_ramp
+from handcal_gui.widgets.residual_scale import LARGEST_MM, OUTLIER, residual_ramp
 
 _SHADES = 32
 
 
 class ResidualMap(Plot):
-    """Shows residuals in colour; points without a partner are grey crosses.
+    """Shows residuals in colour; points without a partner are crosses.
 
     Attributes
     ----------
@@ -70,4 +70,4 @@ class ResidualMap(Plot):
         inliers.setData(
             pos=1e3 * places_m[~is_outlier], brush=[shades[min(i, _SHADES - 1)] for i in shade]
         )
-        outliers.setData(pos=1e3 * places_m[is_outlier], pen=colors().muted)
+        outliers.setData(pos=1e3 * places_m[is_outlier], pen=OUTLIER)

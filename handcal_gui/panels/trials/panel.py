@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
 from handcal.display import TARGET_DEPTHS_M
 from handcal.session.comparison import read_comparisons
 from handcal.session.session import SessionRecord
-from handcal.session.trial import summarise_trials
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Eye
@@ -140,12 +139,11 @@ class TrialsPanel(QWidget):
         before, self._record = self._record, record
         self._compared = len(read_comparisons(record.events))
         if before is None or trials_id(before) != trials_id(record):
-            statistics = summarise_trials(record.trials.values())
             self._hint.setVisible(not record.trials)  # the trials need its room
             self._table.show_rows(trial_rows(record))
             self._summary.setText(statistics_text(record.trials))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
-            self._plot.show_trials(record.trials.values(), statistics)
+            self._plot.show_trials(record.trials)
         self._show_deletions()
 
     def set_read_only(self, is_read_only: bool) -> None:

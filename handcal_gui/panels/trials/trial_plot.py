@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from handcal.display import TARGET_DEPTHS_M
-from handcal.session.trial import Trial, TrialStatistics
+from handcal.session.trial import Trial, trial_spread
 from handcal.types import EYES, Eye, Float64
 from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
@@ -16,12 +16,12 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _SIGNS: dict[Eye, tuple[str, float]] = {"left": ("o", -0.012), "right": ("t1", 0.012)}
 """Symbol, and an offset in metres so that the eyes do not hide each other."""
-_MEDIAN_HALF_WIDTH_M = 0.025
+_MEAN_HALF_WIDTH_M = 0.025
 _MARGIN_M = 0.05
 
 
 class TrialPlot(Plot):
-    """Shows each corner of each trial, and the median at each distance."""
+    """Shows each trial, as in the table, and mean ± SD and number of the trials at a distance."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
@@ -31,28 +31,45 @@ class TrialPlot(Plot):
             tr("Error (′)"),
             parent,
         )
-        self.item.getAxis("bottom").setTicks([[(m, f"{m:g}") for m in TARGET_DEPTHS_M]])
+        self.setToolTip(
+            tr(
+                "The error of each trial, the mean over the target's four corners. At each\n"
+                "distance: the mean of the n trials, and one standard deviation (SD) of the\n"
+                "trials above and below it. A single trial has no SD."
+            )
+        )
         self.item.setXRange(min(TARGET_DEPTHS_M) - _MARGIN_M, max(TARGET_DEPTHS_M) + _MARGIN_M)
         self.show_legend()
-        self._median = self.add_line("muted", name=tr("Median"))
+        self._mean = self.add_line("muted", name=tr("Mean ± SD"))
         self._errors = {
             eye: self.add_line(eye, name=EYE_NAMES[eye], symbol=_SIGNS[eye][0]) for eye in EYES
         }
+        self.show_trials({})
 
-    def show_trials(self, trials: Collection[Trial], statistics: TrialStatistics) -> None:
-        """Show trials with their statistics."""
+    def show_trials(self, trials: Mapping[int, Trial]) -> None:
+        """Show a session's trials, by number."""
         for eye, line in self._errors.items():
-            seen = [trial for trial in trials if trial.eye == eye]
-            at_m = [np.full(4, trial.target_depth_m + _SIGNS[eye][1]) for trial in seen]
-            line.setData(
-                *_unjoined(np.ravel(at_m), np.ravel([trial.error_arcmin for trial in seen]), 1)
-            )
-        depths_m = np.array(list(statistics.by_depth_m))
-        ends_m = np.add.outer(depths_m, (-_MEDIAN_HALF_WIDTH_M, _MEDIAN_HALF_WIDTH_M)).ravel()
-        medians = [errors.arcmin.median for errors in statistics.by_depth_m.values()]
-        largest = max((float(trial.error_arcmin.max()) for trial in trials), default=1.0)
-        self.item.setYRange(0.0, 1.1 * max(largest, 1.0), padding=0.0)
-        self._median.setData(*_unjoined(ends_m, np.repeat(medians, 2), 2))
+            seen = [trial for trial in trials.values() if trial.eye == eye]
+            at_m = [trial.target_depth_m + _SIGNS[eye][1] for trial in seen]
+            errors = [float(trial.error_arcmin.mean()) for trial in seen]
+            line.setData(*_unjoined(np.array(at_m), np.array(errors), 1))
+        depths_m = sorted({*TARGET_DEPTHS_M, *(one.target_depth_m for one in trials.values())})
+        ticks, marks, highest = [], [np.empty((0, 2))], 1.0
+        for depth_m in depths_m:
+            here = [number for number, one in trials.items() if one.target_depth_m == depth_m]
+            name = tr("{:g} (n = {})").format(depth_m, len(here)) if trials else f"{depth_m:g}"
+            ticks.append((depth_m, name))
+            if here:
+                spread = trial_spread(trials, here)
+                mean, sd = spread.mean_arcmin, spread.trial_sd_arcmin or 0.0
+                highest = max(highest, mean + sd, spread.max_arcmin)
+                across = (-_MEAN_HALF_WIDTH_M, _MEAN_HALF_WIDTH_M, 0.0, 0.0)
+                up = (mean, mean, mean - sd, mean + sd)
+                marks.append(np.column_stack([np.add(depth_m, across), up]))
+        self.item.getAxis("bottom").setTicks([ticks])
+        self.item.setYRange(0.0, 1.1 * highest, padding=0.0)
+        at_m, up_arcmin = np.vstack(marks).T
+        self._mean.setData(*_unjoined(at_m, up_arcmin, 2))
 
 
 def _unjoined(x: Float64, y: Float64, length: int) -> tuple[Float64, Float64]:

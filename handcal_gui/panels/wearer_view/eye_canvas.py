@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import cv2
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QTransform
@@ -23,8 +24,14 @@ LINES = {
 """Colour of each kind of outline, and width in pixels and style of its line; wider lines are ten
 times slower in Qt, and halos make these visible."""
 _HALO_PX = 4.5
-_MOST_POINTS = 120
-"""Most points of each outline, as Qt takes a microsecond or more for each."""
+_FEW_POINTS = 120
+"""Outlines of so few points, such as a target, are drawn as they are."""
+_SMOOTHED_POINTS = 5
+"""A hand's outline has a point for each of the camera's pixels on it; so many neighbours are
+averaged, which takes away the steps from pixel to pixel and leaves the webs between fingers."""
+_STRAYS_PX = 1.0
+"""Largest deviation, as displayed, of the drawn line from that; Qt takes a microsecond or more
+for each point. Half a pixel of the camera is allowed where that is more."""
 _MARGIN = 0.12
 _WIDEST_CROP = 1.8
 """A crop is kept while it contains the hand and is at most this many times as wide or high."""
@@ -36,13 +43,12 @@ class EyeCanvas(QWidget):
     Parameters
     ----------
     name : str
-        For screen readers and, in lower case with dashes, as object name.
+        For screen readers.
     parent : QWidget or None
     """
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setObjectName(name.lower().replace(" ", "-"))
         self.setAccessibleName(name)
         self.setMinimumSize(120, 80)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -135,7 +141,12 @@ class EyeCanvas(QWidget):
             outlines += [("drawn", view.drawn.outline_px), ("drawn", view.drawn_target_px)]
         to_widget = self._to_widget()
         painter.setClipRect(to_widget.mapRect(_display(view)))
-        lines = [(what, to_widget.map(_closed(px))) for what, px in outlines if len(px)]
+        strays_px = _STRAYS_PX / (to_widget.m11() * self.devicePixelRatio())
+        lines = [
+            (what, to_widget.map(_closed(simplified(px, strays_px))))
+            for what, px in outlines
+            if len(px)
+        ]
         painter.setPen(_pen(colors().canvas, _HALO_PX))
         for _, line in lines:
             painter.drawPolyline(line)
@@ -211,10 +222,32 @@ def _is_close(crop: QRectF, hand: QRectF) -> bool:
     return min(wider, higher) < _WIDEST_CROP
 
 
+def simplified(outline_px: Float64, strays_px: float) -> Float64:
+    """Return a closed outline without the camera's pixel steps, of as few points as it needs.
+
+    Parameters
+    ----------
+    outline_px : (N, 2) float64
+    strays_px : float
+        Least deviation that is allowed, in the same pixels.
+
+    Returns
+    -------
+    (M, 2) float64
+    """
+    if len(outline_px) <= _FEW_POINTS:
+        return outline_px
+    half = _SMOOTHED_POINTS // 2
+    ring = np.vstack([outline_px[-half:], outline_px, outline_px[:half]]).astype(np.float32)
+    smooth = cv2.blur(ring[:, None], (1, _SMOOTHED_POINTS))[half:-half]
+    step_px = float(np.median(np.linalg.norm(np.diff(outline_px, axis=0), axis=1)))
+    line = cv2.approxPolyDP(smooth, max(strays_px, 0.5 * step_px), closed=True)
+    return line.reshape(-1, 2).astype(np.float64)
+
+
 def _closed(outline_px: Float64) -> QPolygonF:
-    """Return an outline as a closed line with fewer points."""
-    thinned = outline_px[:: max(1, len(outline_px) // _MOST_POINTS)].tolist()
-    return QPolygonF([QPointF(x, y) for x, y in [*thinned, thinned[0]]])
+    points = outline_px.tolist()
+    return QPolygonF([QPointF(x, y) for x, y in [*points, points[0]]])
 
 
 def _pen(color: QColor | str, width_px: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:

@@ -46,9 +46,9 @@ class WearerViewPanel(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("wearer-view-panel")
-        self._eyes = {eye: _EyeColumn(_TITLES[eye]) for eye in EYES}
+        self._eyes = {eye: _EyeColumn(eye) for eye in EYES}
         self._entries = {
-            what: LegendEntry(name, LINES[what][0], tooltip, LINES[what][1])
+            what: LegendEntry(what, QLabel(name), LINES[what][0], tooltip, LINES[what][1])
             for what, (name, tooltip) in _LEGEND.items()
         }
         whole, before = QCheckBox(tr("Whole display")), QCheckBox(tr("Before calibration"))
@@ -90,11 +90,12 @@ class WearerViewPanel(QWidget):
 class _EyeColumn(QWidget):
     """One eye's title, view and errors."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, eye: Eye) -> None:
         super().__init__()
-        self._name = title
-        self._title = QLabel(title)
-        self.canvas = EyeCanvas(title)
+        self._name = _TITLES[eye]
+        self._title = QLabel(self._name)
+        self.canvas = EyeCanvas(self._name)
+        self.canvas.setObjectName(f"{eye}-eye")
         self._now = _ErrorRow(tr("Now"), _ERROR.format(tr("the headset draws it")))
         self._before = _ErrorRow(
             tr("Before"), _ERROR.format(tr("drawn before calibration (φ = 0)"))

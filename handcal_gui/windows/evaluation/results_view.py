@@ -121,7 +121,7 @@ def _titles(tables: list[Table]) -> list[str]:
 
 
 def _table_page(table: Table) -> QWidget:
-    view = NumberTable("numbers", tr("Numbers"))
+    view = NumberTable("numbers", tr("Numbers"), hides=True)
     titles = [column.title for column in table.columns[1:]]
     view.show_rows(titles, [Row(cells[0], tuple(cells[1:])) for cells in table.rows])
     return _page(view, table.caption)

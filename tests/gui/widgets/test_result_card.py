@@ -29,7 +29,7 @@ def test_the_text_has_every_number_with_its_unit(results: Results) -> None:
     assert lines[:2] == ["Wearer: Ada", "Target: 8.0′"]
     for eye in ("left", "right"):
         assert f"After, expected: {results.benefits[eye].after_arcmin:.1f}′" in lines
-        assert f"Depth: {results.benefits[eye].depth}" in lines
+        assert f"Depth error: {results.benefits[eye].depth}" in lines
     assert lines.count("After, measured: not measured") == 2
 
 

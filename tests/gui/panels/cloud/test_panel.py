@@ -14,11 +14,12 @@ from handcal.station.states import State
 from handcal.types import Alignment
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.panel import CloudPanel
+from handcal_gui.preferences import HIDDEN_LAYERS
 from handcal_gui.theme import colors
 from handcal_gui.widgets.legend import LegendEntry
-from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
+from handcal_gui.widgets.residual_scale import OUTLIER, ResidualScale, residual_colors
 from handcal_gui.widgets.splat import rgb
-from tests.gui.helpers import show
+from tests.gui.helpers import child, show
 
 MakeSnapshot = Callable[..., Snapshot]
 
@@ -136,9 +137,57 @@ def test_finished_alignment_shows_residuals_on_a_scale(
     assert scale.isVisible()
     assert _legend(panel) == ["Cursor 600", "Hand 600"]
     assert _count(_view(panel), colors().live) == 0
+    assert _count(_view(panel), colors().cursor) == 0, "the cursor would cover the residuals"
     panel.show_alignment(alignments[0])
     assert not scale.isVisible()
     assert _count(_view(panel), colors().live) > 50
+
+
+@pytest.mark.parametrize(
+    ("layer", "key", "color"),
+    [("cursor", Qt.Key.Key_C, "cursor"), ("hand", Qt.Key.Key_L, "live")],
+)
+def test_the_legend_hides_and_shows_each_cloud(
+    panel: CloudPanel, snapshot: MakeSnapshot, layer: str, key: Qt.Key, color: str
+) -> None:
+    panel.show_snapshot(snapshot())
+    box = panel.findChild(QWidget, f"legend-{layer}")
+    assert box is not None
+    switch = child(box, QCheckBox)
+    for hide in (switch.click, lambda: QTest.keyClick(_view(panel), key)):
+        assert _count(_view(panel), getattr(colors(), color)) > 100
+        hide()
+        assert not switch.isChecked()
+        assert panel.hidden_layers == tuple(sorted((*HIDDEN_LAYERS, layer)))
+        panel.show_snapshot(snapshot(number=2))
+        assert _count(_view(panel), getattr(colors(), color)) == 0
+        switch.click()
+    assert panel.hidden_layers == HIDDEN_LAYERS
+
+
+def test_with_all_points_hidden_it_says_how_to_show_them(
+    panel: CloudPanel, snapshot: MakeSnapshot
+) -> None:
+    panel.show_snapshot(snapshot())
+    panel.hide_layers(("cursor", "hand"))
+    assert _view(panel).accessibleDescription() == (
+        "All points are hidden. Switch cursor or hand on below."
+    )
+    panel.show_snapshot(snapshot(observation={"hand": None, "problem": "no hand in view"}))
+    assert _view(panel).accessibleDescription() == "No hand in view"
+
+
+def test_the_cursor_of_a_finished_alignment_is_shown_on_demand(
+    panel: CloudPanel, alignments: tuple[Alignment, ...], results: Results, snapshot: MakeSnapshot
+) -> None:
+    panel.show_alignment(alignments[0], results.alignments[1]["left"].residuals_m)
+    QTest.keyClick(_view(panel), Qt.Key.Key_C)
+    assert _count(_view(panel), colors().cursor) > 50
+    assert panel.hidden_layers == ("pairs",)
+    panel.hide_layers(("cursor",))
+    assert _count(_view(panel), colors().cursor) > 50
+    panel.show_snapshot(snapshot())
+    assert _count(_view(panel), colors().cursor) == 0
 
 
 def test_residual_colors_tell_distances_and_outliers_apart() -> None:
@@ -147,7 +196,7 @@ def test_residual_colors_tell_distances_and_outliers_apart() -> None:
     ).tolist()
     assert none != small != large
     assert large == beyond
-    assert tuple(outlier) == rgb(colors().red)
+    assert tuple(outlier) == rgb(OUTLIER)
 
 
 @pytest.mark.parametrize(

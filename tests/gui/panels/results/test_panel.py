@@ -143,18 +143,36 @@ def test_convergence_has_a_line_for_each_alignment_and_eye(
     np.testing.assert_allclose((rms_mm / 1e3) ** 2, history_m2)
 
 
-def test_lines_that_end_together_share_one_text(solved: ResultsPanel, results: Results) -> None:
+def test_lines_that_end_together_share_one_name(solved: ResultsPanel, results: Results) -> None:
     plot = child(solved, ConvergencePlot)
-    texts = {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
-    assert texts == {"1", "2"}
+
+    def names() -> set[str]:
+        return {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
+
+    assert names() == {"Alignments 1, 2"}  # 6 % apart
     eyes = results.alignments[1]
     plot.show_results(replace(results, alignments={1: eyes, 2: eyes, 5: eyes}))
-    texts = {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
-    assert texts == {"1, 2, 5"}
+    assert names() == {"Alignments 1, 2, 5"}
+    plot.show_results(replace(results, alignments={2: eyes, 3: eyes, 4: eyes}))
+    assert names() == {"Alignments 2–4"}
     exact = replace(eyes["left"], history_m2=np.zeros(2))
     plot.show_results(replace(results, alignments={1: {"left": exact}, 3: {"left": exact}}))
-    texts = {one.toPlainText() for one in plot.item.items if isinstance(one, pg.TextItem)}
-    assert texts == {"1, 3"}
+    assert names() == {"Alignments 1, 3"}
+    apart = replace(eyes["left"], history_m2=np.array([4e-6, 1e-6]))
+    plot.show_results(replace(results, alignments={1: {"left": exact}, 2: {"left": apart}}))
+    assert names() == {"Alignment 1", "Alignment 2"}
+
+
+@pytest.mark.parametrize("width_px", [360, 900])
+def test_the_names_of_lines_fit_into_the_plot(solved: ResultsPanel, width_px: int) -> None:
+    solved.resize(width_px, 320)
+    child(solved, QTabWidget).setCurrentIndex(1)
+    QApplication.processEvents()
+    item = child(solved, ConvergencePlot).item
+    frame = item.vb.mapRectToScene(item.vb.boundingRect())
+    texts = [one for one in item.items if isinstance(one, pg.TextItem)]
+    assert texts
+    assert all(frame.contains(one.mapRectToScene(one.boundingRect())) for one in texts)
 
 
 def test_the_map_shows_each_point_of_the_chosen_hand_once(

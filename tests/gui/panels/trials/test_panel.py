@@ -256,19 +256,29 @@ def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -
     assert "0.5 m" not in statistics.as_text()
 
 
-def test_plots_every_corner_and_each_median(panel: TrialsPanel, tried: SessionRecord) -> None:
+def test_plot_table_and_text_have_one_statistic(
+    panel: TrialsPanel, tried: SessionRecord, rig: Rig
+) -> None:
+    with Session(tried.path) as session:
+        session.save_trial(make_trial(rig.eyes["right"], "right", 0.4, np.zeros(3), [3e-3, 0, 0]))
+    tried = Session.open(tried.path)
     panel.show_record(tried)
-    [plot] = panel.findChildren(TrialPlot)
+    plot = child(panel, TrialPlot)
+    means = {number: trial.error_arcmin.mean() for number, trial in tried.trials.items()}
     drawn = {line.name(): line.getData() for line in plot.item.listDataItems()}
     _, errors = drawn["Left eye"]
-    expected = np.concatenate([trial.error_arcmin for trial in tried.trials.values()])
-    np.testing.assert_allclose(errors[~np.isnan(errors)], expected)
-    at_m, medians = drawn["Median"]
-    np.testing.assert_allclose(np.nanmean(at_m.reshape(2, 3), axis=1), (0.4, 0.6))
-    np.testing.assert_allclose(
-        np.nanmean(medians.reshape(2, 3), axis=1),
-        [np.median(trial.error_arcmin) for trial in tried.trials.values()],
-    )
+    np.testing.assert_allclose(errors[~np.isnan(errors)], [means[1], means[3]])
+    at_m, marks = (values.reshape(-1, 3)[:, :2] for values in drawn["Mean ± SD"])
+    np.testing.assert_allclose(at_m.mean(axis=1), (0.4, 0.4, 0.6, 0.6))
+    near = [means[1], means[4]]
+    sd = np.std(near, ddof=1)
+    np.testing.assert_allclose(marks[0], np.mean(near))
+    np.testing.assert_allclose(marks[1], [np.mean(near) - sd, np.mean(near) + sd])
+    np.testing.assert_allclose(marks[2:], means[3])  # one trial has no spread
+    row = child(panel, NumberTable).as_text().split("0.4 m\t")[1].splitlines()[0].split("\t")
+    assert row[:3] == ["2", f"{np.mean(near):.1f}", f"{sd:.1f}"]
+    [ticks] = plot.item.getAxis("bottom")._tickLevels
+    assert [name for _, name in ticks] == ["0.4 (n = 2)", "0.5 (n = 0)", "0.6 (n = 1)"]
 
 
 def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: SessionRecord) -> None:
@@ -336,6 +346,10 @@ def test_the_legend_of_a_low_plot_is_above_it_and_whole(
     QApplication.processEvents()
     plot = child(panel, TrialPlot).item
     legend = plot.legend.mapRectToScene(plot.legend.boundingRect())
-    assert [label.text for _, label in plot.legend.items] == ["Median", "Left eye", "Right eye"]
+    assert [label.text for _, label in plot.legend.items] == [
+        "Mean ± SD",
+        "Left eye",
+        "Right eye",
+    ]
     assert plot.scene().sceneRect().contains(legend)
     assert not legend.intersects(plot.vb.mapRectToScene(plot.vb.boundingRect()))

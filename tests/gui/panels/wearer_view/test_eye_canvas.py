@@ -1,15 +1,18 @@
+import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QImage
 from pytestqt.qtbot import QtBot
 
+from handcal.hand.overlay import contour_px
 from handcal.rig.example import example_rig
 from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import Float64, UInt8
-from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas, show_alike
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas, show_alike, simplified
 from handcal_gui.theme import colors
 from handcal_gui.widgets.splat import rgb
+from tests.gui.conftest import Shots
 
 DISPLAY = example_rig().eyes["left"]
 ANGLE_RAD = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
@@ -158,3 +161,17 @@ def test_a_picture_that_fits_stays_in_the_middle_wherever_the_hand_is(canvas: Ey
         canvas.show_view(_view(RING_M + np.array([aside_m, 0.0, 0.0]), image=image))
         columns = np.flatnonzero((_pixels(canvas) == 200).all(axis=2).any(axis=0))
         assert (columns[0] + columns[-1]) / 2 == pytest.approx(450, abs=2)
+
+
+def test_the_drawn_outline_follows_the_webs_between_the_fingers(shots: Shots) -> None:
+    outline_px, _ = contour_px(shots.live.cloud, shots.frame)
+    drawn = simplified(outline_px, 0.5)
+    assert len(drawn) < len(outline_px) / 5
+    line = drawn.astype(np.float32).reshape(-1, 1, 2)
+    away_px = [abs(cv2.pointPolygonTest(line, (x, y), True)) for x, y in outline_px.tolist()]
+    assert np.mean(away_px) < 0.5
+    assert max(away_px) < 3.0  # every eighteenth point missed webs by 5.7
+
+
+def test_an_outline_of_few_points_is_drawn_as_it_is() -> None:
+    np.testing.assert_array_equal(simplified(RING_M[::25, :2], 1.0), RING_M[::25, :2])

@@ -125,7 +125,7 @@ def test_problem_takes_the_place_of_the_view(
 def test_options_change_both_eyes(panel: WearerViewPanel, snapshot: MakeSnapshot) -> None:
     panel.show_snapshot(snapshot())
     crops = [_canvas(panel, eye).crop_px for eye in EYES]
-    before = panel.findChild(LegendEntry, "legend-before")
+    before = panel.findChild(LegendEntry, "legend-offline")
     assert before is not None
     assert before.isVisible()
     for name in ("wearer-view-whole", "wearer-view-before"):

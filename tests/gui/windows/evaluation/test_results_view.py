@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLabel, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.report.document import Column, Report, Section, Table
+from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.windows.evaluation.results_view import ResultsView
 from handcal_gui.windows.evaluation.work import Outcome
 from tests.gui.helpers import child, show
@@ -37,3 +38,19 @@ def test_a_tab_says_what_its_numbers_are_of(
 def test_the_text_of_an_empty_view_is_no_greyed_control(qtbot: QtBot) -> None:
     view = show(qtbot, ResultsView(), 500, 400)
     assert child(view, QLabel, "noResults").isEnabled()
+
+
+def test_the_numbers_of_a_user_test_fit_beside_the_list_of_a_small_screen(qtbot: QtBot) -> None:
+    titles = ("wearer", "calibrations", "corners", "mean ± SD, px", "mean ± SD, arcmin")
+    titles += ("95 % interval, arcmin", "median (quartiles), arcmin", "min–max, arcmin")
+    numbers = ("10", "120", "8.12 ± 4.33", "10.79 ± 3.21", "6.33 to 14.12", "9.83 (7.12–12.45)")
+    table = Table([Column(title) for title in titles], [("wearer-1", *numbers, "2.13–23.44")])
+    view = show(qtbot, ResultsView(), 740, 300)
+    view.show_outcome(Outcome(Path(), Report("", "", "", [Section("", [table])]), []))
+    shown = child(view, NumberTable)
+    assert not shown.horizontalScrollBar().isVisible()
+    assert not shown.isColumnHidden(titles.index("median (quartiles), arcmin") - 1)
+    cell = shown.item(0, 0)
+    assert cell is not None
+    assert "min–max, arcmin: 2.13–23.44" in cell.toolTip()
+    assert "95 % interval, arcmin" in shown.as_text()

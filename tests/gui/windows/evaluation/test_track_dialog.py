@@ -72,7 +72,7 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     table = dialog.findChild(QTableWidget, "pose-of-the-cube")
     assert isinstance(table, QTableWidget)
     qtbot.waitUntil(lambda: table.rowCount() == 3, timeout=60_000)
-    view = dialog.findChild(ImageView, "depth-camera,-colour")
+    view = dialog.findChild(ImageView)
     assert isinstance(view, ImageView)
     assert view.has_image
     assert view.message == ""
