@@ -155,7 +155,11 @@ def is_listening(pid: int) -> bool:
     return bool(int(caught, 16) & 1 << signal.SIGTERM - 1)
 
 
-def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot) -> None:
+SIGNALS = [one for one in signal.Signals if one.name in {"SIGINT", "SIGTERM", "SIGHUP"}]
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot, number: int) -> None:
     loop, closed = QEventLoop(), []
 
     class Window(QWidget):
@@ -166,14 +170,17 @@ def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot) -> None
     window = Window()
     qtbot.addWidget(window)
     window.show()
-    numbers = signal.SIGINT, signal.SIGTERM
-    before = [signal.getsignal(number) for number in numbers]
+    before = [signal.getsignal(one) for one in SIGNALS]
     try:
+        for one in SIGNALS:
+            signal.signal(one, signal.default_int_handler if one == number else signal.SIG_IGN)
         close_on_signals(window)
         QTimer.singleShot(10_000, loop.quit)  # runs no Python code, which would handle the signal
-        threading.Timer(0.05, signal.raise_signal, (signal.SIGTERM,)).start()
+        threading.Timer(0.05, signal.raise_signal, (number,)).start()
         loop.exec()
         assert closed == [True]
+        others = [signal.getsignal(one) for one in SIGNALS if one != number]
+        assert others == [signal.SIG_IGN] * len(others)  # as nohup and a shell's background have it
     finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
+        for one, handler in zip(SIGNALS, before, strict=True):
+            signal.signal(one, handler)
