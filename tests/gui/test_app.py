@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -136,10 +137,27 @@ def test_a_picture_that_cannot_be_saved_ends_it(tmp_path: Path) -> None:
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="what a process listens to is told by Linux")
 def test_it_ends_well_when_told_to(tmp_path: Path) -> None:
-    preferences = tmp_path / "preferences.json"
-    process = run("--preferences", preferences, tmp_path / "no session")
+    start_and_end(tmp_path)
+
+
+@pytest.mark.process
+@pytest.mark.skipif(shutil.which("localedef") is None, reason="a Turkish locale is made for it")
+def test_it_starts_where_the_capital_of_i_has_a_dot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = tmp_path / "tr_TR.UTF-8"
+    subprocess.run(["localedef", "-i", "tr_TR", "-f", "UTF-8", made], check=True)
+    monkeypatch.setenv("LOCPATH", str(tmp_path))
+    monkeypatch.setenv("LC_ALL", made.name)
+    start_and_end(tmp_path)
+
+
+def start_and_end(folder: Path) -> None:
+    """Start the program, tell it to end, and expect that it ends well."""
+    preferences = folder / "preferences.json"
+    process = run("--preferences", preferences, folder / "no session")
     deadline_s = time.monotonic() + START_S
-    while not is_listening(process.pid):
+    while process.poll() is None and not is_listening(process.pid):
         assert time.monotonic() < deadline_s
         time.sleep(0.1)
     process.send_signal(signal.SIGTERM)
