@@ -8,7 +8,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.io.lock import FileLock
-from handcal.session.journal import JOURNAL, read_journal
+from handcal.session.journal import find_journals, read_journal
 from handcal.session.session import Session
 from handcal.session.state import ASIDE, SessionEvent
 
@@ -36,7 +36,7 @@ class UnfinishedSession:
 
 def unfinished_sessions(parent: Path) -> list[UnfinishedSession]:
     """Return the unfinished sessions among the folders in `parent`, the newest first."""
-    outlines = {journal.parent: _outline(journal) for journal in parent.glob(f"*/{JOURNAL}")}
+    outlines = {journal.parent: _outline(journal) for journal in find_journals(parent)}
     copied = {began for began, names in outlines.values() if SessionEvent.REPAIRED in names}
     found = [_inspect(path, *outline, copied) for path, outline in outlines.items()]
     return sorted(

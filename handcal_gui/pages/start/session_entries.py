@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, islice
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.io.files import modified_s
+from handcal.session.journal import find_journals
 from handcal.session.library import EyeOutcome, eye_outcomes
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_sessions
@@ -54,9 +56,9 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
     """
     unfinished = unfinished_sessions(folder)
     listed = {path.absolute() for path in (*recent, *(session.path for session in unfinished))}
-    journals = sorted(folder.glob("*/journal.jsonl"), key=modified_s, reverse=True)
+    journals = sorted(find_journals(folder), key=modified_s, reverse=True)
     others = (path.parent for path in journals if path.parent.absolute() not in listed)
-    offered = (_recent(path) for path in chain(recent, others) if path.exists())
+    offered = (_recent(path) for path in chain(recent, others) if os.path.exists(path))
     return KnownSessions(
         unfinished=tuple(
             _unfinished(session)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -137,7 +138,7 @@ class TrialsDialog(PreparationDialog):
         self._record = record
         self._desk: _Desk | None = None
         self._step: _Step | None = None
-        self._has_session = (Path(entries.sessions).expanduser() / JOURNAL).is_file()
+        self._has_session = os.path.isfile(Path(entries.sessions).expanduser() / JOURNAL)
         self.form = EntriesForm(
             {
                 "headset": (
