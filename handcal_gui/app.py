@@ -6,6 +6,7 @@ Heavy imports follow while that window is shown; the main window then replaces i
 from __future__ import annotations
 
 import argparse
+import locale
 import os
 import re
 import sys
@@ -35,6 +36,7 @@ def main() -> NoReturn:
     keep_font_list_in_configuration()
     keep_window_quick()
     app = QApplication(sys.argv[:1])
+    use_english_capitals()
     app.setApplicationName("handcal")
     app.setDesktopFileName("handcal")
     app.setStyle("Fusion")
@@ -54,6 +56,17 @@ def keep_window_quick() -> None:
     sys.setswitchinterval(0.0005)
 
 
+def use_english_capitals() -> None:
+    """Make I the capital of i in C libraries, in place of the Turkish İ; call after Qt has started.
+
+    PySide6 finds a property such as ``interval`` by the capital of its first letter.
+    """
+    for name in ("C.UTF-8", "C"):  # not every system has the first
+        with suppress(locale.Error):
+            locale.setlocale(locale.LC_CTYPE, name)
+            return
+
+
 def translate_texts(app: QApplication) -> None:
     """Translate texts to the user's language, if there is a translation (docs/translating.md)."""
     with suppress(FileError):
@@ -64,10 +77,10 @@ def translate_texts(app: QApplication) -> None:
             use_translator(lambda text: QCoreApplication.translate("", text))
 
 
-def translation_for(locale: QLocale, folder: Path) -> QTranslator | None:
-    """Return the compiled translation of a folder for a locale; None if there is none."""
+def translation_for(language: QLocale, folder: Path) -> QTranslator | None:
+    """Return the compiled translation of a folder for a language; None if there is none."""
     translator = QTranslator()
-    return translator if translator.load(locale, "handcal", "_", str(folder)) else None
+    return translator if translator.load(language, "handcal", "_", str(folder)) else None
 
 
 def first_window(size: QSize | None) -> QLabel:

@@ -36,7 +36,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.station import Station
 from handcal.types import CameraIdentity, Frame
-from handcal_gui.app import keep_window_quick
+from handcal_gui.app import keep_window_quick, use_english_capitals
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
@@ -203,6 +203,7 @@ def measure(frames: int, rate_hz: int) -> list[BenchFigure]:
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
     keep_window_quick()
+    use_english_capitals()
     app.setStyle("Fusion")
     replay = _ReplayFrames(rate_hz)
     with tempfile.TemporaryDirectory() as name:

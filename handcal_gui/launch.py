@@ -83,9 +83,11 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
 
 def close_on_signals(window: QWidget) -> None:
     """Have the signals that end a process close a window."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # From the event loop, which may not run yet.
-        signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) != signal.SIG_IGN:  # as nohup has it
+            # From the event loop, which may not run yet.
+            signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
     awake = QTimer(window, interval=200)
     awake.timeout.connect(lambda: None)  # Python handles signals only while it runs
     awake.start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from contextlib import suppress
 from copy import deepcopy
@@ -103,7 +104,7 @@ class PreferencesFile:
         Those of older versions are upgraded. A file that cannot be read is renamed to end in
         ``.bad``; one of a newer version is copied to end in ``.newer``, and read as far as known.
         """
-        if not self.path.exists():
+        if not os.path.exists(self.path):
             return Preferences(), ""
         try:
             data = read_json(self.path)

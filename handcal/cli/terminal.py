@@ -144,6 +144,8 @@ def errors_in_one_line() -> Iterator[None]:
         _discard_output()
         sys.exit(1)
     except OSError as error:
+        if error.filename is not None:  # not of the output
+            fail(f"cannot use {error.filename}: {error.strerror or error}", 1)
         _discard_output()
         fail(f"cannot write the output: {error.strerror or error}", 1)
 

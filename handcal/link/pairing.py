@@ -286,7 +286,7 @@ class Pairings:
 
 
 def _read(path: Path) -> tuple[Pairing, ...]:
-    if not path.exists():
+    if not os.path.exists(path):
         return ()
     content = read_limited(path, _MAX_FILE_BYTES).strip()
     try:

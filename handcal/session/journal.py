@@ -268,6 +268,15 @@ def _parse_sound(line: bytes) -> dict[str, Any]:
     return fields
 
 
+def find_journals(folder: Path) -> list[Path]:
+    """Return the journals of the sessions in a folder, as far as it can be read."""
+    try:
+        journals = [path / JOURNAL for path in sorted(folder.iterdir())]
+    except OSError:
+        return []
+    return [journal for journal in journals if os.path.exists(journal)]
+
+
 def _parse_line(line: bytes) -> tuple[int, Event]:
     """Return the version and the event of a line; ValueError if it is damaged."""
     fields = _parse_sound(line)

@@ -16,7 +16,7 @@ from handcal.io.files import make_folder, read_json, read_limited, sync_folder
 from handcal.io.lock import FileLock
 from handcal.progress import Progress
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
-from handcal.session.journal import JOURNAL, JOURNAL_VERSION
+from handcal.session.journal import JOURNAL, JOURNAL_VERSION, find_journals
 from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
     Replayed,
@@ -97,7 +97,7 @@ def read_library(
         If it was cancelled.
     """
     before = {(entry.path, entry.stamp): entry for entry in known}
-    journals = sorted(folder.glob(f"*/{JOURNAL}"))
+    journals = find_journals(folder)
     entries = []
     for done, journal in enumerate(journals):
         progress.at(done / len(journals), "Reading sessions")
@@ -167,7 +167,7 @@ def restore_session(path: Path) -> Path:
 
 def deleted_sessions(folder: Path) -> tuple[Path, ...]:
     """Return the deleted sessions of a folder, the most recently deleted one last."""
-    found = [journal.parent for journal in (folder / DELETED).glob(f"*/{JOURNAL}")]
+    found = [journal.parent for journal in find_journals(folder / DELETED)]
     return tuple(sorted(found, key=lambda path: (_changed_ns(path), path.name)))
 
 

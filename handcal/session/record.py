@@ -120,7 +120,11 @@ def replay(path: Path) -> Replayed:
     FileError
         If the folder is not a session, or its journal is unreadable as a whole.
     """
-    if not (path / JOURNAL).is_file():
+    try:
+        is_session = (path / JOURNAL).is_file()
+    except OSError as error:
+        raise FileError(f"cannot read {path}: {error.strerror or error}") from error
+    if not is_session:
         raise FileError(f"{path} is not a session; choose the folder that contains {JOURNAL}")
     journal = read_journal(path / JOURNAL)
     damaged = list(journal.damaged)

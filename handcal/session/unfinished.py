@@ -7,7 +7,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.io.lock import FileLock
-from handcal.session.journal import JOURNAL, read_journal
+from handcal.session.journal import find_journals, read_journal
 from handcal.session.session import Session
 from handcal.session.state import ASIDE, SessionEvent
 
@@ -38,7 +38,7 @@ def unfinished_and_repaired(parent: Path) -> tuple[list[UnfinishedSession], set[
 
     Also return the folders of all sessions, finished or not, of which it holds a repaired copy.
     """
-    outlines = {journal.parent: _outline(journal) for journal in parent.glob(f"*/{JOURNAL}")}
+    outlines = {journal.parent: _outline(journal) for journal in find_journals(parent)}
     copied = {began for began, names in outlines.values() if SessionEvent.REPAIRED in names}
     repaired = {
         path

@@ -23,6 +23,7 @@ from handcal.register.prior import (
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
 from handcal.session.facts import read_facts
+from handcal.session.journal import find_journals
 from handcal.session.record import replay
 from handcal.types import EYES, EyeDistance, Float64
 
@@ -67,7 +68,7 @@ def run_learn_prior(
     CancelledError
         If it was cancelled.
     """
-    journals = sorted(folder.glob("*/journal.jsonl"), key=modified_s, reverse=True)[:MAX_SESSIONS]
+    journals = sorted(find_journals(folder), key=modified_s, reverse=True)[:MAX_SESSIONS]
     found: list[tuple[str, str, list[Observed]]] = []
     left_out: Counter[str] = Counter()
     for number, journal in enumerate(journals):

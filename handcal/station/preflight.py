@@ -100,7 +100,8 @@ def _look(part: Part, look: Callable[[], Finding], advice: str) -> Finding:
         OSError,
         ValueError,
     ) as error:  # ValueError: a path that contains a null byte
-        finding = Finding("", Health.BROKEN, str(error), advice)
+        why = (isinstance(error, OSError) and error.strerror) or str(error)
+        finding = Finding("", Health.BROKEN, why, advice)
     return replace(finding, what=PARTS[part])
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from html import escape
 from typing import TypeVar, cast
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QAction
+from PySide6.QtCore import QEvent, QLocale, QObject, Qt
+from PySide6.QtGui import QAction, QValidator
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QComboBox,
@@ -43,20 +43,49 @@ def plain_tooltip(text: str) -> str:
     return f"<p style='white-space: pre'>{escape(text)}</p>" if "<" in text else text
 
 
+class NumberField(QDoubleSpinBox):
+    """A field for a number, with a point as in every other number shown; a comma becomes one.
+
+    In the system's locale a comma, or a point, is a separator of thousands: 0,5 was read as 5.
+    """
+
+    def __init__(self, decimals: int) -> None:
+        super().__init__(decimals=decimals)
+        self.setLocale(QLocale.c())
+
+    def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
+        """Read a comma as a point."""
+        return super().validate(text.replace(",", "."), position)
+
+
+class WholeNumberField(QSpinBox):
+    """A field for a whole number, which takes no separators: it showed 1,5 and was 15."""
+
+    def __init__(self, low: int, high: int) -> None:
+        super().__init__(minimum=low, maximum=high)
+        self.setLocale(QLocale.c())
+
+    def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
+        """Refuse a point or a comma."""
+        if {".", ","} & set(text.removesuffix(self.suffix())):
+            return QValidator.State.Invalid, text, position
+        return super().validate(text, position)
+
+
 def number(
     name: str, low: float, high: float, step: float, unit: str, help_text: str
-) -> QDoubleSpinBox:
+) -> NumberField:
     """Return a field for a number, right-aligned and with its unit."""
-    field = with_name(QDoubleSpinBox(decimals=1 if step >= 0.1 else 2), name, help_text=help_text)
+    field = with_name(NumberField(1 if step >= 0.1 else 2), name, help_text=help_text)
     field.setRange(low, high)
     field.setSingleStep(step)
     field.setSuffix(unit)
     return _settle(field)
 
 
-def whole_number(name: str, low: int, high: int, help_text: str) -> QSpinBox:
+def whole_number(name: str, low: int, high: int, help_text: str) -> WholeNumberField:
     """Return a field for a whole number, right-aligned."""
-    return _settle(with_name(QSpinBox(minimum=low, maximum=high), name, help_text=help_text))
+    return _settle(with_name(WholeNumberField(low, high), name, help_text=help_text))
 
 
 def choice(name: str, label: str, options: Mapping[Option, str], help_text: str = "") -> QComboBox:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -136,10 +137,27 @@ def test_a_picture_that_cannot_be_saved_ends_it(tmp_path: Path) -> None:
 @pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="what a process listens to is told by Linux")
 def test_it_ends_well_when_told_to(tmp_path: Path) -> None:
-    preferences = tmp_path / "preferences.json"
-    process = run("--preferences", preferences, tmp_path / "no session")
+    start_and_end(tmp_path)
+
+
+@pytest.mark.process
+@pytest.mark.skipif(shutil.which("localedef") is None, reason="a Turkish locale is made for it")
+def test_it_starts_where_the_capital_of_i_has_a_dot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = tmp_path / "tr_TR.UTF-8"
+    subprocess.run(["localedef", "-i", "tr_TR", "-f", "UTF-8", made], check=True)
+    monkeypatch.setenv("LOCPATH", str(tmp_path))
+    monkeypatch.setenv("LC_ALL", made.name)
+    start_and_end(tmp_path)
+
+
+def start_and_end(folder: Path) -> None:
+    """Start the program, tell it to end, and expect that it ends well."""
+    preferences = folder / "preferences.json"
+    process = run("--preferences", preferences, folder / "no session")
     deadline_s = time.monotonic() + START_S
-    while not is_listening(process.pid):
+    while process.poll() is None and not is_listening(process.pid):
         assert time.monotonic() < deadline_s
         time.sleep(0.1)
     process.send_signal(signal.SIGTERM)
@@ -155,7 +173,11 @@ def is_listening(pid: int) -> bool:
     return bool(int(caught, 16) & 1 << signal.SIGTERM - 1)
 
 
-def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot) -> None:
+SIGNALS = [one for one in signal.Signals if one.name in {"SIGINT", "SIGTERM", "SIGHUP"}]
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot, number: int) -> None:
     loop, closed = QEventLoop(), []
 
     class Window(QWidget):
@@ -166,14 +188,17 @@ def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot) -> None
     window = Window()
     qtbot.addWidget(window)
     window.show()
-    numbers = signal.SIGINT, signal.SIGTERM
-    before = [signal.getsignal(number) for number in numbers]
+    before = [signal.getsignal(one) for one in SIGNALS]
     try:
+        for one in SIGNALS:
+            signal.signal(one, signal.default_int_handler if one == number else signal.SIG_IGN)
         close_on_signals(window)
         QTimer.singleShot(10_000, loop.quit)  # runs no Python code, which would handle the signal
-        threading.Timer(0.05, signal.raise_signal, (signal.SIGTERM,)).start()
+        threading.Timer(0.05, signal.raise_signal, (number,)).start()
         loop.exec()
         assert closed == [True]
+        others = [signal.getsignal(one) for one in SIGNALS if one != number]
+        assert others == [signal.SIG_IGN] * len(others)  # as nohup and a shell's background have it
     finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
+        for one, handler in zip(SIGNALS, before, strict=True):
+            signal.signal(one, handler)

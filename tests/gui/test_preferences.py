@@ -18,7 +18,12 @@ from handcal.register.placement import PlacementSettings
 from handcal.station.settings import StationSettings
 from handcal.station.states import CalibrationSettings
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
-from handcal_gui.preferences import PREFERENCES_VERSION, Preferences, PreferencesFile
+from handcal_gui.preferences import (
+    PREFERENCES_VERSION,
+    CurrentPreferences,
+    Preferences,
+    PreferencesFile,
+)
 
 CHANGED = Preferences(
     station=StationSettings(
@@ -51,6 +56,12 @@ def test_the_first_start_has_defaults_in_the_users_own_folders(file: Preferences
     assert problem == ""
     documents = QStandardPaths.StandardLocation.DocumentsLocation
     assert preferences.station.sessions.startswith(QStandardPaths.writableLocation(documents))
+
+
+def test_a_folder_that_cannot_be_reached_is_reported(tmp_path: Path) -> None:
+    current = CurrentPreferences(PreferencesFile(tmp_path / ("n" * 300) / "preferences.json"), True)
+    assert current.now == Preferences()
+    assert "File name too long" in current.complaint
 
 
 def test_preferences_come_back(file: PreferencesFile) -> None:

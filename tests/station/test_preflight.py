@@ -273,6 +273,8 @@ def test_the_session_folder_must_take_a_session(
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "new").touch()
     assert find("sessions", new).found == f"{tmp_path / 'new'} is a file"
+    long = replace(settings, sessions=str(tmp_path / ("n" * 300)))
+    assert find("sessions", long).found == "File name too long"
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert "cannot write to" in find("sessions", settings).found
     monkeypatch.undo()

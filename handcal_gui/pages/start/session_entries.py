@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, islice
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from handcal.errors import FileError
 from handcal.io.files import modified_s
+from handcal.session.journal import find_journals
 from handcal.session.library import EyeOutcome, eye_outcomes
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_and_repaired
@@ -55,11 +57,11 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
     """
     unfinished, repaired = unfinished_and_repaired(folder)
     listed = {path.absolute() for path in (*recent, *(session.path for session in unfinished))}
-    journals = sorted(folder.glob("*/journal.jsonl"), key=modified_s, reverse=True)
+    journals = sorted(find_journals(folder), key=modified_s, reverse=True)
     others = (path.parent for path in journals if path.parent.absolute() not in listed)
     hidden = {path.absolute() for path in repaired}
     found = (path for path in chain(recent, others) if path.absolute() not in hidden)
-    offered = (_recent(path) for path in found if path.exists())
+    offered = (_recent(path) for path in found if os.path.exists(path))
     return KnownSessions(
         unfinished=tuple(
             _unfinished(session)

@@ -7,7 +7,6 @@ from typing import cast
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
-    QDoubleSpinBox,
     QGridLayout,
     QLabel,
     QRadioButton,
@@ -19,6 +18,7 @@ from handcal.display import DrawnMove
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import NumberField
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.numbers import signed
 
@@ -110,13 +110,12 @@ class EyeShiftEditor(QWidget):
             return True
         return super().eventFilter(watched, event)
 
-    def _make_field(self, title: str, axis: int, limit_mm: float) -> QDoubleSpinBox:
-        field = QDoubleSpinBox()
+    def _make_field(self, title: str, axis: int, limit_mm: float) -> NumberField:
+        field = NumberField(2)
         field.setObjectName(f"phi{axis + 1}")
         field.setAccessibleName(tr("{} φ{} in millimetres").format(title, axis + 1))
         field.setToolTip(_tooltip(axis))
         field.setRange(-limit_mm, limit_mm)
-        field.setDecimals(2)
         field.setSuffix(" mm")
         field.setFont(number_font())
         field.setAlignment(Qt.AlignmentFlag.AlignRight)

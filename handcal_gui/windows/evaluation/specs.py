@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 
 from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
@@ -114,12 +115,12 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
 
 def _missing_captures(entries: CubeEntries) -> str:
     for file in filter(None, (entries.cube, entries.camera, entries.rig)):
-        if not user_path(file).is_file():
+        if not os.path.isfile(user_path(file)):
             return tr("there is no file {}: choose another, or leave the field empty").format(file)
     if not entries.captures:
         return ""
     folder = user_path(entries.captures)
-    if not folder.exists():
+    if not os.path.exists(folder):
         return tr("there is no folder {} yet: press Capture… to create it").format(folder)
     find_captures(folder)  # raises an error if they are not usable
     return ""
@@ -137,7 +138,7 @@ def _missing_folder(folder: str, request: str) -> str:
     """Return a request to choose a folder; empty if there is the one entered."""
     if not folder:
         return request
-    if not user_path(folder).is_dir():
+    if not os.path.isdir(user_path(folder)):
         return tr("there is no folder {}: {}").format(folder, request)
     return ""
 

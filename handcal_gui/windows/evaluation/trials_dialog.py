@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -137,7 +138,7 @@ class TrialsDialog(PreparationDialog):
         self._record = record
         self._desk: _Desk | None = None
         self._step: _Step | None = None
-        self._has_session = (user_path(entries.sessions) / JOURNAL).is_file()
+        self._has_session = os.path.isfile(user_path(entries.sessions) / JOURNAL)
         self.form = EntriesForm(
             {
                 "headset": (

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QLocale, QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox
 from pytestqt.qtbot import QtBot
 
@@ -59,5 +62,31 @@ def test_a_number_has_its_unit_on_the_right(qtbot: QtBot) -> None:
         qtbot.addWidget(field)
         field.setValue(1.234)
         assert field.alignment() & Qt.AlignmentFlag.AlignRight
-    assert fine.text() == f"{fine.locale().toString(1.23, 'f', 2)} m"
-    assert coarse.text() == f"{coarse.locale().toString(1.2, 'f', 1)} °"
+    assert (fine.text(), coarse.text()) == ("1.23 m", "1.2 °")
+
+
+@pytest.fixture(params=["C", "de_DE", "de_CH", "ar_EG"])
+def locale(request: pytest.FixtureRequest) -> Iterator[QLocale]:
+    before = QLocale()
+    QLocale.setDefault(QLocale(request.param))
+    yield QLocale()
+    QLocale.setDefault(before)
+
+
+@pytest.mark.usefixtures("locale")
+@pytest.mark.parametrize("typed", ["12.5", "12,5"])
+def test_a_number_is_the_same_in_every_language(qtbot: QtBot, typed: str) -> None:
+    field, whole = number("x", -100.0, 2000.0, 0.01, " mm", ""), whole_number("y", 0, 2000, "")
+    for one in (field, whole):
+        qtbot.addWidget(one)
+        one.show()
+        one.selectAll()
+        QTest.keyClicks(one.lineEdit(), typed)
+    assert (field.value(), field.text()) == (12.5, "12.5 mm")
+    QApplication.clipboard().setText(typed)
+    field.setValue(1500.0)
+    assert field.text() == "1500.00 mm"
+    field.selectAll()
+    field.lineEdit().paste()
+    assert field.value() == 12.5
+    assert (whole.value(), whole.text()) == (125, "125")  # the separator is not taken

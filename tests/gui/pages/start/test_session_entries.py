@@ -107,6 +107,15 @@ def test_recent_sessions_that_are_gone_or_hold_nothing_are_left_out(
     assert "journal.jsonl" in recent[1].text
 
 
+def test_a_place_that_cannot_be_reached_hides_no_other_session(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    path = make(tmp_path, "Ada", [alignment], is_done=True)
+    unreachable = tmp_path / ("n" * 300)  # as a network drive that is gone, or another's folder
+    (entry,) = find_sessions(unreachable, [unreachable / "session", path]).recent
+    assert entry.path == path
+
+
 def test_a_recent_session_shows_its_results_unless_they_are_damaged(
     tmp_path: Path, alignment: Alignment
 ) -> None:

@@ -78,6 +78,8 @@ def test_without_sessions_there_is_no_user_test(tmp_path: Path) -> None:
     readiness = evaluation.readiness(UserEntries("", str(tmp_path)))
     assert not readiness.can_run
     assert "folder of sessions" in readiness.finding.found
+    unreachable = UserEntries(str(tmp_path / ("n" * 300)), str(tmp_path))
+    assert "there is no folder" in evaluation.readiness(unreachable).finding.found
 
 
 def test_frames_are_chosen_before_the_segmentation_is_tested(tmp_path: Path) -> None:
