@@ -2583,6 +2583,10 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The camera gives no image; the message at the top says why.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The hand is rotated like the cursor.</source>
         <translation type="unfinished"></translation>
     </message>

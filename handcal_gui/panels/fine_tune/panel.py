@@ -389,5 +389,5 @@ def _row(*items: QWidget | QAction | None, spacing: int = SPACING_PX) -> QHBoxLa
 def _obstacle(snapshot: Snapshot) -> str:
     """Return the reason why φ cannot be set by hand now; empty if it can."""
     if not snapshot.link.connected:
-        return snapshot.link_problem or tr("The headset is not connected; see Link.")
+        return tr("The headset is not connected; see Link.")
     return _OBSTACLES.get(snapshot.procedure.state, "")
