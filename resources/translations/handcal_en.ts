@@ -3470,6 +3470,18 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One more alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solved from</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3495,10 +3507,6 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
     </message>
     <message>
         <source>Distance between the two solved eye positions</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>With one more</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
