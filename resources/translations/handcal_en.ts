@@ -84,6 +84,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The trial is not recorded yet: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>save the notes</source>
         <translation type="unfinished"></translation>
     </message>
