@@ -180,6 +180,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Exposure of colour for the whole image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Measures the exposure of colour on the whole image, not on the hand once found.</source>
         <translation type="unfinished"></translation>
     </message>
