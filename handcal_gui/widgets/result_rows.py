@@ -175,10 +175,7 @@ def eye_distance_text(results: Results) -> str:
 def single_alignment_rows(results: Results, rig: Rig) -> list[Row]:
     """Return φ from each alignment alone, one row per eye."""
     return [
-        Row(
-            _ALONE[eye].format(number),
-            tuple(q.text(shift, rig.eyes[eye]) for q in PHI),
-        )
+        Row(_ALONE[eye].format(number), tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
         for number, shifts in results.alignments.items()
         for eye, shift in shifts.items()
     ]

@@ -83,12 +83,9 @@ class WearerViewPanel(QWidget):
         super().resizeEvent(event)
         column = self._eyes["left"]
         texts_px = column.minimumSizeHint().height() - column.canvas.minimumHeight()
-        width_px, height_px = (
-            self.width(),
-            self.height() - _OPTIONS_EMS * self.fontMetrics().height(),
-        )
-        beside_px = min(width_px / 2, _SHAPE * (height_px - texts_px))
-        below_px = min(width_px, _SHAPE * (height_px / 2 - texts_px))
+        height_px = self.height() - _OPTIONS_EMS * self.fontMetrics().height()
+        beside_px = min(self.width() / 2, _SHAPE * (height_px - texts_px))
+        below_px = min(self.width(), _SHAPE * (height_px / 2 - texts_px))
         directions = QBoxLayout.Direction
         self._both.setDirection(
             directions.TopToBottom if below_px > beside_px else directions.LeftToRight
