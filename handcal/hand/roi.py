@@ -171,7 +171,7 @@ class RoiFinder:
         for box, score in zip(boxes, found.scores, strict=True):
             hand = cloud.track(box, float(score))
             problem = (
-                cloud.problem(box, self._settings.side_max_m)
+                cloud.problem(box, self._settings)
                 if hand is None
                 else self._problem(hand, box, cloud)
             )
@@ -194,7 +194,7 @@ class RoiFinder:
                 "large; show the bare hand"
             )
         if track.pixels * _STEP_PX**2 < settings.filled_min * side_px**2:
-            return cloud.problem(color_box, settings.side_max_m)
+            return cloud.problem(color_box, settings)
         return ""
 
     def _order(self, track: _Track) -> float:
@@ -231,7 +231,7 @@ class _CoarseCloud:
         offset = self._px[inside].mean(0) - _center(box)
         return _Track(score, box, depth_m, offset, int(np.count_nonzero(inside)))
 
-    def problem(self, color_box: Float64, size_max_m: float) -> str:
+    def problem(self, color_box: Float64, settings: RoiSettings) -> str:
         """Return why a box of the colour image holds no object of its size within the gate."""
         rows, columns = pixels_of(self._view.depth > 0)
         inside = _inside(self._color_px(rows, columns), color_box)
@@ -245,10 +245,16 @@ class _CoarseCloud:
         near_m, far_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
         nearest_m = np.quantile(depth_m, 0.1)
         hand_m = float(np.median(depth_m[depth_m < nearest_m + _DEPTH_SPREAD_M]))
+        side_m = float(np.sqrt(area_px)) * hand_m / self._color_camera.fx
+        if side_m < settings.side_min_m:
+            return (
+                f"a hand at the measured {hand_m:.2f} m would be only {100 * side_m:.0f} cm large: "
+                "depth is in a wrong unit; correct the depth scale of camera or recording"
+            )
         if hand_m < near_m:
             back_cm = 100 * (near_m - hand_m)
             return f"the hand is too near, at {hand_m:.2f} m; move it back by {back_cm:.0f} cm"
-        if np.sqrt(area_px) * hand_m > size_max_m * self._color_camera.fx:
+        if side_m > settings.side_max_m:
             return (
                 f"the depth camera measures only the background, at {hand_m:.2f} m, where the hand "
                 "is; the hand may be too near: move it back"

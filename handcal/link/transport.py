@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import select
 import socket
 from typing import Any, Protocol, TypeAlias
@@ -51,7 +52,7 @@ class UdpTransport:
         try:
             self._socket = socket.socket(family, socket.SOCK_DGRAM)
         except OSError as error:  # no IPv6 in this system
-            raise LinkError(f"cannot listen on {bind[0]}:{bind[1]}: {error.strerror}") from error
+            raise LinkError(_not_bound(bind, error)) from error
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer_bytes)
             if self._is_ipv6:
@@ -59,7 +60,7 @@ class UdpTransport:
             self._socket.bind(bind)
         except OSError as error:
             self._socket.close()
-            raise LinkError(f"cannot listen on {bind[0]}:{bind[1]}: {error.strerror}") from error
+            raise LinkError(_not_bound(bind, error)) from error
         self._socket.setblocking(False)
         self.address: Address = self._socket.getsockname()[:2]
 
@@ -92,6 +93,18 @@ class UdpTransport:
     def close(self) -> None:
         """Release the socket."""
         self._socket.close()
+
+
+def _not_bound(address: Address, error: OSError) -> str:
+    """Return why an address cannot be bound, and what to do."""
+    host, port = address
+    if error.errno == errno.EADDRINUSE:
+        why = "another program, perhaps another handcal, uses this port; end it, or choose another"
+    elif error.errno == errno.EADDRNOTAVAIL:
+        why = "this computer has no such address; enter one of its own, or 0.0.0.0 for all"
+    else:
+        why = f"{error.strerror}; choose another address or port"
+    return f"cannot listen on {host}:{port}: {why}"
 
 
 def local_address(server: Address) -> Address:

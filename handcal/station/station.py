@@ -353,5 +353,6 @@ class Station(Closable):
             self._not_stored = ""
         except FileError as error:
             self._not_stored = (
-                f"{error}. The data are kept in memory and written as soon as possible."
+                f"{error}. Make room on the disk, or connect it again: until then the data are "
+                "kept in memory."
             )

@@ -205,7 +205,7 @@ class CalibrationController(QObject):
         for name, dock in self._window.docks.items():
             dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
         panels.session.notes_changed.connect(self._save_notes)
-        connect_panels(panels, self._submit, self._on_command_failed)
+        connect_panels(panels, self._submit, self._on_doubted)
 
     def _submit(self, name: str, command: Command) -> int:
         return self._engine.submit(name, command) if self._engine is not None else 0
@@ -314,6 +314,10 @@ class CalibrationController(QObject):
         self._failed_command = name
         done = ACTION_NAMES.get(name, name)
         self._window.banner.show_message(tr("Could not {}: {}").format(done, why))
+
+    def _on_doubted(self, name: str, why: str) -> None:
+        self._failed_command = name
+        self._window.banner.show_message(tr("The trial is not recorded yet: {}").format(why))
 
     def _save_notes(self, text: str) -> None:
         """Save notes in the engine's thread, or here if the engine has failed."""

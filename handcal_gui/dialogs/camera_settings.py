@@ -83,9 +83,10 @@ class CameraSettingsDialog(QDialog):
             _AS_IT_IS,
             150,
         )
-        self._whole = _filter(
+        self._whole = with_name(
+            QCheckBox(tr("For the whole image")),
             "wholeImage",
-            tr("For the whole image"),
+            tr("Exposure of colour for the whole image"),
             tr("Measures the exposure of colour on the whole image, not on the hand once found."),
         )
         self._spatial = _filter(

@@ -118,6 +118,7 @@ QUANTITIES = (
     ),
 )
 _ANOTHER = tr("Expected error after one more alignment like these")
+_ALONE: Mapping[Eye, str] = {"left": tr("{} left"), "right": tr("{} right")}
 _EYE_DISTANCE = tr("Eye distance")
 _EYE_DISTANCE_MEANING = tr("Distance between the two solved eye positions")
 
@@ -130,7 +131,9 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
     ]
     arcmin = results.expected_after_another_arcmin
     another = tuple(_arcmin(arcmin[eye]) if eye in arcmin else NOTHING for eye in EYES)
-    rows.insert(QUANTITIES.index(EXPECTED_ERROR) + 1, Row(tr("With one more"), another, _ANOTHER))
+    rows.insert(
+        QUANTITIES.index(EXPECTED_ERROR) + 1, Row(tr("One more alignment"), another, _ANOTHER)
+    )
     rows.append(Row(_EYE_DISTANCE, (eye_distance_text(results),), _EYE_DISTANCE_MEANING))
     if measured := results.measured_eye_distance:
         meaning = tr("Used in the results; {}").format(measured.source)
@@ -172,7 +175,7 @@ def eye_distance_text(results: Results) -> str:
 def single_alignment_rows(results: Results, rig: Rig) -> list[Row]:
     """Return φ from each alignment alone, one row per eye."""
     return [
-        Row(f"{number} {eye}", tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
+        Row(_ALONE[eye].format(number), tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
         for number, shifts in results.alignments.items()
         for eye, shift in shifts.items()
     ]

@@ -84,6 +84,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The trial is not recorded yet: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>save the notes</source>
         <translation type="unfinished"></translation>
     </message>
@@ -173,6 +177,10 @@
     </message>
     <message>
         <source>For the whole image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Exposure of colour for the whole image</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2663,6 +2671,10 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The camera gives no image; the message at the top says why.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The hand is rotated like the cursor.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3578,6 +3590,18 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} left</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>One more alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solved from</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3603,10 +3627,6 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
     </message>
     <message>
         <source>Distance between the two solved eye positions</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>With one more</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

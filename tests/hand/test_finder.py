@@ -100,6 +100,10 @@ def test_where_the_detector_sees_a_hand_the_reason_names_what_is_there(frame: Fr
     for there, reason in (
         (moved(frame, -0.25), r"too near, at 0\.2\d m; move it back by (8|9|10|11) cm"),
         (moved(frame, 0.25), r"too far, at 0\.7\d m; bring it nearer by [4-7] cm"),
+        (
+            replace(frame, depth_scale_m=0.1 * frame.depth_scale_m),
+            "only [12] cm large: depth is in",
+        ),
         (replace(frame, depth=hole), "measures nothing where the hand is"),
         (replace(frame, depth=np.full_like(hole, 15000)), "only the background, at 1.50 m"),
     ):

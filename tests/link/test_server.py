@@ -352,5 +352,10 @@ def test_an_error_in_the_thread_reaches_the_caller(
 
 
 def test_a_taken_port_is_a_clear_error(server: HeadsetServer, pairing_key: bytes) -> None:
-    with pytest.raises(LinkError, match="cannot listen on"):
+    with pytest.raises(LinkError, match="uses this port; end it, or choose another"):
         HeadsetServer(pairing_key, bind=server.address)
+
+
+def test_an_address_of_another_computer_is_a_clear_error(pairing_key: bytes) -> None:
+    with pytest.raises(LinkError, match="no such address; enter one of its own"):
+        HeadsetServer(pairing_key, bind=("192.0.2.1", 0))

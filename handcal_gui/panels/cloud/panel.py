@@ -225,7 +225,7 @@ class CloudPanel(QWidget):
         switch = QCheckBox(text)
 
         def change(is_on: bool) -> None:
-            (self._hidden.discard if is_on else self._hidden.add)(layer())
+            self._hidden = self._hidden - {layer()} if is_on else self._hidden | {layer()}
             self._forget_pairs()
             self._draw()
 

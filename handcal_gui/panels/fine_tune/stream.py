@@ -111,5 +111,5 @@ def _timer(parent: QObject, interval_ms: int) -> QTimer:
 def find_obstacle(snapshot: Snapshot) -> str:
     """Return the reason why φ cannot be set by hand now; empty if it can."""
     if not snapshot.link.connected:
-        return snapshot.link_problem or tr("The headset is not connected; see Link.")
+        return tr("The headset is not connected; see Link.")
     return _OBSTACLES.get(snapshot.procedure.state, "")

@@ -34,6 +34,7 @@ _SHAPE_M = 0.0015
 _NO_CURSOR = tr("The hand's rotation from the cursor will be shown here.")
 _TAKEN = tr("The alignment is confirmed.")
 _NO_HAND = tr("Hold the hand in view of the camera.")
+_NO_IMAGE = tr("The camera gives no image; the message at the top says why.")
 _STRAIGHT = tr("The hand is rotated like the cursor.")
 
 
@@ -75,7 +76,7 @@ class RotationPanel(QWidget):
         if procedure.cursor is None or procedure.state is not State.ALIGN:
             self._show_nothing("", _NO_CURSOR if procedure.cursor is None else _TAKEN)
         elif snapshot.camera.problem:
-            self._show_nothing(tr("? No image"), _NO_HAND)
+            self._show_nothing(tr("? No image"), _NO_IMAGE)
         elif observation is not None:
             self._show_observation(observation)
             self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)

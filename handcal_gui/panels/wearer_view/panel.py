@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QCheckBox, QHBoxLayout, QLabel, QWidget
 
 from handcal.station.snapshot import Snapshot
 from handcal.station.wearer_view import EyeView, Overlay
@@ -32,6 +33,10 @@ _LEGEND = {
     "offline": (tr("Before"), tr("The hand's outline as drawn before calibration, with φ = 0")),
 }
 
+_SHAPE = 4.0 / 3.0
+"""Width of an eye's picture relative to its height, as mostly cropped to a hand."""
+_OPTIONS_EMS = 5.0
+"""Height of options and legend together."""
 _NUMBER_SCALE = 0.85
 """Font scale at which both eyes' numbers fit side by side into a narrow dock."""
 
@@ -73,18 +78,32 @@ class WearerViewPanel(QWidget):
             column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
         show_alike([column.canvas for column in self._eyes.values()])
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Place the eyes side by side, or one below the other if that makes them larger."""
+        super().resizeEvent(event)
+        column = self._eyes["left"]
+        texts_px = column.minimumSizeHint().height() - column.canvas.minimumHeight()
+        height_px = self.height() - _OPTIONS_EMS * self.fontMetrics().height()
+        beside_px = min(self.width() / 2, _SHAPE * (height_px - texts_px))
+        below_px = min(self.width(), _SHAPE * (height_px / 2 - texts_px))
+        directions = QBoxLayout.Direction
+        self._both.setDirection(
+            directions.TopToBottom if below_px > beside_px else directions.LeftToRight
+        )
+
     def _lay_out(self, whole: QCheckBox, before: QCheckBox) -> None:
-        options, eyes, legend = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
-        for row in (options, eyes, legend):
+        options, legend = QHBoxLayout(), QHBoxLayout()
+        self._both = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        for row in (options, self._both, legend):
             row.setSpacing(SPACING_PX)
         options.addWidget(whole)
         options.addWidget(before)
         options.addStretch()
         for column in self._eyes.values():
-            eyes.addWidget(column, 1)
+            self._both.addWidget(column, 1)
         for entry in self._entries.values():
             legend.addWidget(entry)
-        vbox(options, (eyes, 1), legend, on=self, margins=SPACING_PX, spacing=SPACING_PX)
+        vbox(options, (self._both, 1), legend, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 
 class _EyeColumn(QWidget):

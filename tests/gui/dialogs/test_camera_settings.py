@@ -58,3 +58,15 @@ def test_the_defaults_are_restored_but_the_camera_stays_the_same(qtbot: QtBot) -
     assert isinstance(restore, QPushButton)
     restore.click()
     assert dialog.settings() == RealSenseSettings(serial="42")
+
+
+def test_only_filters_are_read_out_as_filters(qtbot: QtBot) -> None:
+    dialog = CameraSettingsDialog(RealSenseSettings())
+    qtbot.addWidget(dialog)
+    names = {box.objectName(): box.accessibleName() for box in dialog.findChildren(QCheckBox)}
+    assert names["wholeImage"] == "Exposure of colour for the whole image"
+    assert [name for name, read in names.items() if "filter" in read] == [
+        "spatial",
+        "temporal",
+        "holes",
+    ]

@@ -112,6 +112,7 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     studio.headset.confirm()
     live.wait_for_state(State.ALIGNED)
     live.wait(lambda: "cannot write" in live.banner)
+    assert "Make room on the disk" in live.banner
     live.press_space_for(Action.SOLVE)
     live.wait_for_state(State.SOLVED)
     assert live.snapshot.record.alignments == {}

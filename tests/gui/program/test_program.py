@@ -127,6 +127,8 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     window = live.program.window
     solved_m = live.snapshot.procedure.applied_shift_m["left"]
     before = studio.headset.shown.projections["left"].P
+    QTest.keyClick(window, Qt.Key.Key_T)
+    live.wait(lambda: live.banner.startswith("The trial is not recorded yet: φ of the left eye"))
     window.docks["fine_tune"].raise_()
     panel = window.panels.fine_tune
     panel.setFocus()
@@ -155,6 +157,7 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
 
     QTest.keyClick(window, Qt.Key.Key_T)
     live.wait(lambda: len(live.snapshot.record.trials) == 1)
+    live.wait(lambda: live.banner == "")
     (trial,) = live.snapshot.record.trials.values()
     t_C0_V_m = live.snapshot.record.rig.eyes["left"].t_C0_V_m
     np.testing.assert_allclose(target.corners_V_m + t_C0_V_m, trial.corners_E_m)

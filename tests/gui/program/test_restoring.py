@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 from handcal.station.settings import StationSettings
 from handcal_gui import separate_windows
 from handcal_gui.dialogs.preferences import PreferencesDialog
-from handcal_gui.preferences import Preferences, PreferencesFile
+from handcal_gui.preferences import HIDDEN_LAYERS, Preferences, PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.window import MainWindow
 from tests.gui.helpers import child
@@ -43,6 +43,16 @@ def test_layouts_are_restored_before_the_window_is_maximized(
     assert not any(states)
     assert program.window.isMaximized()
     program.close()
+
+
+def test_hidden_layers_of_the_hand_cloud_are_remembered(qtbot: QtBot, tmp_path: Path) -> None:
+    file = PreferencesFile(tmp_path / "preferences.json")
+    for hidden in (HIDDEN_LAYERS, ("cursor",)):
+        program = Program(file)
+        qtbot.addWidget(program.window)
+        assert program.window.panels.cloud.hidden_layers == hidden
+        program.window.panels.cloud.hide_layers(("cursor",))
+        program.close()
 
 
 def test_settings_for_one_run_are_not_remembered(qtbot: QtBot, tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
         error = expected_error_arcmin(rig.eyes[eye], shift)
         another = results.expected_after_another_arcmin[eye]
         assert cells(rows, "Expected error")[column] == f"{error:.1f}′"
-        assert cells(rows, "With one more")[column] == f"{another:.1f}′"
+        assert cells(rows, "One more alignment")[column] == f"{another:.1f}′"
         assert cells(rows, "RMS (mm)")[column] == f"{1e3 * shift.rms_m:.2f}"
         assert cells(rows, "Inliers")[column] == f"{100 * shift.inlier_ratio:.0f} %"
         assert cells(rows, "Iterations")[column] == str(shift.iterations)
@@ -81,7 +81,7 @@ def test_what_was_known_before_is_shown_if_it_was_used(results: Results, rig: Ri
 
 def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -> None:
     rows = result_rows(left_only, rig)
-    for label in ("φ1 (mm)", "Expected error", "With one more", "Iterations"):
+    for label in ("φ1 (mm)", "Expected error", "One more alignment", "Iterations"):
         left, right = cells(rows, label)
         assert left != NOTHING
         assert right == NOTHING

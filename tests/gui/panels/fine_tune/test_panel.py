@@ -81,7 +81,8 @@ def test_cannot_be_used_during_an_alignment(
 
 def test_cannot_be_used_without_a_headset(panel: FineTunePanel, show: Show) -> None:
     show(link={"connected": False}, link_problem="switch the headset on")
-    assert status(panel) == "switch the headset on"
+    # In short: the banner and the link panel say why.
+    assert status(panel) == "The headset is not connected; see Link."
     assert not field(panel, "left", 1).isEnabled()
 
 

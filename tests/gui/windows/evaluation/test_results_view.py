@@ -41,8 +41,8 @@ def test_the_text_of_an_empty_view_is_no_greyed_control(qtbot: QtBot) -> None:
 
 
 def test_the_numbers_of_a_user_test_fit_beside_the_list_of_a_small_screen(qtbot: QtBot) -> None:
-    titles = ("wearer", "calibrations", "corners", "mean ± SD, px", "mean ± SD, arcmin")
-    titles += ("95 % interval, arcmin", "median (quartiles), arcmin", "min–max, arcmin")
+    titles = ["wearer", "calibrations", "corners", "mean ± SD, px", "mean ± SD, arcmin"]
+    titles += ["95 % interval, arcmin", "median (quartiles), arcmin", "min–max, arcmin"]
     numbers = ("10", "120", "8.12 ± 4.33", "10.79 ± 3.21", "6.33 to 14.12", "9.83 (7.12–12.45)")
     table = Table([Column(title) for title in titles], [("wearer-1", *numbers, "2.13–23.44")])
     view = show(qtbot, ResultsView(), 740, 300)
