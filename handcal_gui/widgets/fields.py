@@ -40,7 +40,8 @@ def with_name(field: Field, name: str, label: str = "", help_text: str = "") -> 
 
 def plain_tooltip(text: str) -> str:
     """Return a tooltip that shows a text from a file as it is: Qt takes tags for markup."""
-    return f"<p style='white-space: pre'>{escape(text)}</p>" if "<" in text else text
+    is_like_markup = "<" in text or "&" in text
+    return f"<p style='white-space: pre'>{escape(text)}</p>" if is_like_markup else text
 
 
 def number(
@@ -72,7 +73,8 @@ def choice(name: str, label: str, options: Mapping[Option, str], help_text: str 
 
 def button(name: str, text: str = "", label: str = "", help_text: str = "") -> QPushButton:
     """Return a button that Enter also presses while it has the focus."""
-    return with_name(QPushButton(text, autoDefault=True), name, label or text, help_text)
+    shown = label or text.replace("&", "")
+    return with_name(QPushButton(text, autoDefault=True), name, shown, help_text)
 
 
 class MainButton(QPushButton):

@@ -113,11 +113,11 @@ class WizardPanel(QWidget):
         self._go_back = self._go_back_actions()
         self._rail = _Rail()
         self._title = QLabel()
-        self._sentence = QLabel(wordWrap=True)
+        self._sentence = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._rows = [_PreconditionRow() for _ in range(_MOST_PRECONDITIONS)]
-        self._fact = QLabel(wordWrap=True)
+        self._fact = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._fact.setObjectName("wizardFact")
-        self._note = QLabel(wordWrap=True)
+        self._note = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._note.setObjectName("wizardNote")
         self.bar = ActionBar()
         self._plan = QComboBox()
@@ -381,7 +381,7 @@ class _PreconditionRow(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._icon = QLabel()
-        self._text = QLabel(wordWrap=True)
+        self._text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
         self.setMinimumHeight(3 * SPACING_PX)
 
