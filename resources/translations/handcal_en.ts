@@ -679,11 +679,11 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Press a button at the lower left</source>
+        <source>Alt+underlined letter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Alt+underlined letter</source>
+        <source>Press the button or enter the field of this letter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -831,7 +831,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Advanced</source>
+        <source>&amp;Advanced</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1049,6 +1049,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Res&amp;ume</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Open a session</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1061,6 +1065,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Open</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Open</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1069,11 +1077,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Example</source>
+        <source>Open the example session</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open the example session</source>
+        <source>E&amp;xample</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1085,11 +1093,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>All sessions…</source>
+        <source>Search, compare, export and repair sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Search, compare, export and repair sessions</source>
+        <source>A&amp;ll sessions…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1101,11 +1109,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Evaluate…</source>
+        <source>Measure the accuracy of calibrations</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Measure the accuracy of calibrations</source>
+        <source>Evalua&amp;te…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1129,10 +1137,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Calibrate…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Calibrate a rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1146,6 +1150,34 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hea&amp;dset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Rig file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Session folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cali&amp;brate…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Plan</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

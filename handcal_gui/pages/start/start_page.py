@@ -84,20 +84,20 @@ class StartPage(QWidget):
         )
         self._resume.setObjectName("resume")
         self._resume.hide()
-        self._unfinished = SessionList(tr("Unfinished sessions"), tr("Resume"))
+        self._unfinished = SessionList(tr("Unfinished sessions"), tr("Res&ume"))
         self._resume.body.addWidget(self._unfinished)
         self._open = Card(
             tr("Open a session"), tr("Review it, solve it again, export it."), "folder"
         )
         self._open.setObjectName("open")
         self._opened = SessionList(
-            tr("Recent sessions"), tr("Open"), tr("Recent sessions will be listed here.")
+            tr("Recent sessions"), tr("&Open"), tr("Recent sessions will be listed here.")
         )
-        example = button("example", tr("Example"), tr("Open the example session"))
+        example = button("example", tr("E&xample"), tr("Open the example session"))
         example.setToolTip(tr("A simulated wearer's session, copied to the session folder"))
         browse = button("browse", tr("Choose folder…"))
         library = button(
-            "library", tr("All sessions…"), tr("Search, compare, export and repair sessions")
+            "library", tr("A&ll sessions…"), tr("Search, compare, export and repair sessions")
         )
         for added in (browse, example):
             self._opened.add_button(added)
@@ -107,7 +107,7 @@ class StartPage(QWidget):
             tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "results"
         )
         evaluate = button(
-            "evaluate", tr("Evaluate…"), help_text=tr("Measure the accuracy of calibrations")
+            "evaluate", tr("Evalua&te…"), help_text=tr("Measure the accuracy of calibrations")
         )
         self._evaluate.add_to_head(evaluate)
         self._lay_out()
