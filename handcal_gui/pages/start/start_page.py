@@ -19,7 +19,7 @@ from handcal_gui.preferences import CurrentPreferences, Preferences
 from handcal_gui.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
-from handcal_gui.widgets.layouts import hbox, scrollable, vbox
+from handcal_gui.widgets.layouts import fit_soon, hbox, scrollable, vbox
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
@@ -110,6 +110,7 @@ class StartPage(QWidget):
             "evaluate", tr("Evalua&te…"), help_text=tr("Measure the accuracy of calibrations")
         )
         self._evaluate.add_to_head(evaluate)
+        self._fit_soon = fit_soon(self._fit, self)
         self._lay_out()
         self._find = LatestJob(lambda question: find_sessions(*question), self)
         self._find.answered.connect(self._show_sessions)
@@ -170,6 +171,9 @@ class StartPage(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Leave out texts that only greet, where the form needs their room."""
         super().resizeEvent(event)
+        self._fit_soon.start()
+
+    def _fit(self) -> None:
         is_high = self.height() >= _LOW * font_px()
         for text in (self._head, self.new.hint):
             text.setVisible(is_high)
