@@ -28,7 +28,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>frames per second: often fewer than the {:.0f} that are needed; {}</source>
+        <source>frames per second: often below the {:.0f} needed; {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
