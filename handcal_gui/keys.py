@@ -19,7 +19,10 @@ _IN_PANEL = tr("a panel; works while it has the keyboard focus")
 _NOT_ACTIONS = {
     _WINDOW: (
         (tr("Return"), tr("Press the button, or open the list, that has the focus")),
-        (tr("Alt+underlined letter"), tr("Press a button at the lower left")),
+        (
+            tr("Alt+underlined letter"),
+            tr("Press the button or enter the field of this letter"),
+        ),
         (tr("Esc"), tr("Close the message at the top")),
         (tr("Tab"), tr("Move to the next button or field")),
     ),
@@ -78,7 +81,7 @@ def keys_by_group(window: QMainWindow) -> dict[str, KeyGroup]:
     """Return the keys of the whole window, of the guide, of menus and of panels, by their names."""
     groups = {_WINDOW: KeyGroup(_EVERYWHERE, [])}
     for action in window.findChildren(QAction):
-        keys = ", ".join(_native(shortcut) for shortcut in action.shortcuts())
+        keys = ", ".join(native(shortcut) for shortcut in action.shortcuts())
         if keys and not _is_of_another_window(action, window):
             meaning = action.whatsThis() or action.text().replace("&", "").rstrip("…")
             row = keys, meaning
@@ -117,5 +120,6 @@ def _group(action: QAction) -> tuple[str, str]:
     return _WINDOW, _EVERYWHERE
 
 
-def _native(shortcut: QKeySequence) -> str:
-    return shortcut.toString(QKeySequence.SequenceFormat.NativeText)
+def native(keys: str | QKeySequence) -> str:
+    """Return the name of keys on this system."""
+    return QKeySequence(keys).toString(QKeySequence.SequenceFormat.NativeText)

@@ -87,7 +87,7 @@ def gate_problem(settings: StationSettings) -> Finding | None:
         return _broken(
             f"the depth gate ends at {gate.depth_max_m:.2f} m, before the cursors of the "
             "recommended plan",
-            f"let it end at {first_m:.2f} m or beyond, or choose the paper's plan",
+            f"let it end at {first_m:.2f} m or beyond, or choose the plan as in the paper",
         )
     return None
 
@@ -226,6 +226,8 @@ def _rig(settings: StationSettings) -> Finding:
 def _sessions(settings: StationSettings) -> Finding:
     if not settings.sessions:
         return _broken("no folder is chosen", "choose one")
+    if str(settings.sessions_path).startswith("~"):
+        return _broken(f"{settings.sessions_path.parts[0]} is no user's folder", "choose another")
     folder = settings.sessions_path.absolute()
     there = next(path for path in (folder, *folder.parents) if path.exists())
     if not there.is_dir():

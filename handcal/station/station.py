@@ -107,6 +107,7 @@ class Station(Closable):
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
             self.session = stack.enter_context(resume_or_create(settings, wearer, resume))
+            self._revision = self.session.revision
             self._record = Session.open(self.session.path)
             self.rig = self.worn_rig = self._record.rig
             self._worn_rig_path = Path(settings.worn_rig or self.session.path / "rig.yaml")
@@ -149,7 +150,6 @@ class Station(Closable):
         self._frame: Frame | None = None
         self._not_applied = self._not_stored = ""
         self._next_store_s = 0.0
-        self._revision = self.session.revision
 
     @property
     def pairing_key(self) -> str:

@@ -140,6 +140,4 @@ def _slow_text(rate_hz: float, *, is_camera: bool) -> str:
     if rate_hz >= _SLOW_HZ:
         return tr("fewer than two thirds of the camera's frames are used; close other programs")
     advice = tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
-    return tr("frames per second: often fewer than the {:.0f} that are needed; {}").format(
-        _SLOW_HZ, advice
-    )
+    return tr("frames per second: often below the {:.0f} needed; {}").format(_SLOW_HZ, advice)

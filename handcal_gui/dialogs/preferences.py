@@ -18,7 +18,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
 from handcal_gui.widgets.fields import choice, number, whole_number, with_name
 from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.layouts import scrollable, vbox
+from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _THEMES: dict[Theme, str] = {
@@ -88,6 +88,7 @@ class PreferencesDialog(QDialog):
             | QDialogButtonBox.StandardButton.Cancel
             | QDialogButtonBox.StandardButton.RestoreDefaults
         )
+        self._fit_soon = fit_soon(self._fit, self)
         self._lay_out()
         self._is_accepting = self._is_folder_refused = False
         self._check = LatestJob(check_sessions, self)
@@ -169,8 +170,15 @@ class PreferencesDialog(QDialog):
         problem = gate_problem(self.preferences().station)
         self._calibration.show_gate_problem(problem)
         self._ok.setEnabled(problem is None and not self._is_folder_refused)
+        self._fit_soon.start()
+
+    def _fit(self) -> None:
+        """Make the dialog higher for what is wrong; where the screen is too low, scroll to it."""
+        room_px = self.screen().availableGeometry().bottom() - self.frameGeometry().bottom()
+        missing_px = self._area.verticalScrollBar().maximum()
+        self.resize(self.width(), self.height() + max(0, min(missing_px, room_px)))
         for line in (self._calibration.gate_found, self._sessions_found):
-            if not line.isHidden():
+            if line.isVisible():
                 self._area.ensureWidgetVisible(line)
 
     def _lay_out(self) -> None:

@@ -15,7 +15,7 @@ from handcal_gui.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, main_button, paragraph
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.widgets.session_rows import RESUME_HELP
@@ -52,6 +52,7 @@ class ReviewPage(QWidget):
         scale_font(self._title, 1.6, is_bold=True)
         self._task = paragraph("reviewTask")
         self._is_solved = False
+        self._fit_soon = fit_soon(self._fit, self)
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
         self._facts.setVerticalSpacing(SPACING_PX)
@@ -129,7 +130,7 @@ class ReviewPage(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Show the residual map only where it fits below the rest."""
         super().resizeEvent(event)
-        self._fit()
+        self._fit_soon.start()
 
     def _fit(self) -> None:
         viewport, layout = self.parentWidget() or self, self.layout()

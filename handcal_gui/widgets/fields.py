@@ -40,7 +40,8 @@ def with_name(field: Field, name: str, label: str = "", help_text: str = "") -> 
 
 def plain_tooltip(text: str) -> str:
     """Return a tooltip that shows a text from a file as it is: Qt takes tags for markup."""
-    return f"<p style='white-space: pre'>{escape(text)}</p>" if "<" in text else text
+    is_like_markup = "<" in text or "&" in text
+    return f"<p style='white-space: pre'>{escape(text)}</p>" if is_like_markup else text
 
 
 class NumberField(QDoubleSpinBox):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeAlias, TypeVar
 
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
     QBoxLayout,
     QFrame,
@@ -34,6 +36,16 @@ def vbox(
 ) -> QVBoxLayout:
     """Lay out items from top to bottom, on a widget or as a part of another layout."""
     return _fill(QVBoxLayout(on) if on else QVBoxLayout(), items, margins, spacing)
+
+
+def fit_soon(fit: Callable[[], object], parent: QWidget) -> QTimer:
+    """Return a timer whose `start` has a widget show and hide parts that fit, after a resize event.
+
+    Not within the event: Qt lays out a part that is hidden while its page is laid out within that.
+    """
+    timer = QTimer(parent, interval=0, singleShot=True)
+    timer.timeout.connect(fit)
+    return timer
 
 
 def scrollable(content: QWidget) -> QScrollArea:

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, fill_row
+from handcal_gui.widgets.fields import button, fill_row, plain_tooltip
 
 INTRINSICS_FILES = tr("Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)")
 """File filter for a camera's intrinsics."""
@@ -99,7 +99,8 @@ class PathField(QWidget):
         self.set_path(chosen or self.path)
 
     def _show_whole_path(self) -> None:
-        self._line.setToolTip("\n".join(filter(None, (self.path, self.toolTip()))))
+        text = "\n".join(filter(None, (self.path, self.toolTip())))
+        self._line.setToolTip(plain_tooltip(text))
 
 
 class _PathLine(QLineEdit):

@@ -28,7 +28,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>frames per second: often fewer than the {:.0f} that are needed; {}</source>
+        <source>frames per second: often below the {:.0f} needed; {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -707,11 +707,11 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Press a button at the lower left</source>
+        <source>Alt+underlined letter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Alt+underlined letter</source>
+        <source>Press the button or enter the field of this letter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -859,7 +859,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Advanced</source>
+        <source>&amp;Advanced</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1077,6 +1077,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Res&amp;ume</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Open a session</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1089,7 +1093,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open</source>
+        <source>&amp;Open</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1097,11 +1101,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Example</source>
+        <source>Open the example session</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open the example session</source>
+        <source>E&amp;xample</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1113,11 +1117,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>All sessions…</source>
+        <source>Search, compare, export and repair sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Search, compare, export and repair sessions</source>
+        <source>A&amp;ll sessions…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1129,15 +1133,31 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Evaluate…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Measure the accuracy of calibrations</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Evalua&amp;te…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Calibrate a see-through headset with the wearer&apos;s bare hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hea&amp;dset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Rig file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Session folder</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1157,11 +1177,23 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Calibrate…</source>
+        <source>&amp;Wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Plan</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use the usual gate</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Calibrate a rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cali&amp;brate…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1174,10 +1206,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Wearer</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Use the usual gate</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2159,10 +2187,6 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Click here to use the arrow keys</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Sending to the headset…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2176,6 +2200,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>Fine-tuning starts with a session.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Click here to use the arrow keys</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4327,10 +4355,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Review the selected session (Return)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>&amp;Open</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -202,3 +202,18 @@ def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot, number:
     finally:
         for one, handler in zip(SIGNALS, before, strict=True):
             signal.signal(one, handler)
+
+
+@pytest.mark.process
+def test_the_first_window_makes_no_enumerations_of_qt() -> None:
+    """They took an eighth of the processor time until it is shown."""
+    shown = (
+        "from handcal_gui.app import QApplication, first_window; import PySide6.QtCore as core; "
+        "app = QApplication([]); window = first_window(None); print('Qt' in vars(core)); core.Qt; "
+        "print('Qt' in vars(core))"
+    )
+    environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
+    found = subprocess.run(
+        [sys.executable, "-c", shown], env=environment, capture_output=True, text=True, check=True
+    )
+    assert found.stdout.split() == ["False", "True"]

@@ -104,7 +104,15 @@ def _planned_views(
     wizard = PlannedWizard()
     wizard.is_held = is_held
     snapshots = [planned_snapshot(snapshot, name) for name in StepName]
-    views = [wizard.view(snapshots[0])]
+    former = replace(record.facts, former="session-20261124-024848-549254")
+    again = replace(record, facts=former, alignments={})
+    views = [
+        wizard.view(planned_snapshot(snapshot, StepName.RAISE, alignments={})),
+        wizard.view(
+            replace(planned_snapshot(snapshot, StepName.RAISE, alignments={}), record=again)
+        ),
+        wizard.view(snapshots[0]),
+    ]
     wizard.move(Action.NEXT, snapshots[0])
     views.extend(wizard.view(one) for one in snapshots)
     wizard.move(Action.NEXT, snapshots[-1])

@@ -310,7 +310,7 @@ def test_a_folder_of_the_user_is_the_same_checked_and_used(
     assert "will be created" in find("sessions", mine).found
     nobody = replace(settings, sessions="~nosuchuser/mine")
     assert nobody.sessions_path == Path("~nosuchuser/mine")
-    assert find("sessions", nobody).found
+    assert find("sessions", nobody).found == "~nosuchuser is no user's folder"
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="Linux has it")

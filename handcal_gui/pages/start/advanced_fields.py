@@ -30,7 +30,7 @@ class AdvancedFields(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._fold = with_name(QToolButton(autoRaise=True), "advanced")
-        self._fold.setText(tr("Advanced"))
+        self._fold.setText(tr("&Advanced"))
         self._fold.setCheckable(True)
         self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._calibration = CalibrationFields()

@@ -7,7 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QSizePolicy
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QComboBox,
+    QLineEdit,
+    QSizePolicy,
+    QWidget,
+)
 
 from handcal.progress import Progress
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
@@ -21,7 +28,9 @@ from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
-from handcal_gui.widgets.layouts import hbox, scrollable
+from handcal_gui.widgets.key_cap import KeyCap
+from handcal_gui.widgets.layouts import hbox, scrollable, vbox
+from handcal_gui.widgets.sentence import sentence
 
 Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
 
@@ -72,15 +81,25 @@ class NewCalibration(Card):
         self._starting: str | None = None
         self._is_opening = False
         self._wearer = with_name(QComboBox(), "wearer", tr("Wearer's name or code"))
-        self._wearer.setLineEdit(
-            QLineEdit(placeholderText=tr("Name or code"), maxLength=MAX_WEARER_CHARACTERS)
-        )
+        name = QLineEdit(placeholderText=tr("Name or code"), maxLength=MAX_WEARER_CHARACTERS)
+        name.textEdited.connect(self._drop_blanks)
+        self._wearer.setLineEdit(name)
         self._wearer.setEditable(True)
         self._wearer.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
-        self._form = StationForm(self._wearer, preferences.station, pairing_key)
+        self._wearer_problem = paragraph("wearerProblem")
+        self._wearer_problem.hide()
+        self._wearer.editTextChanged.connect(self._show_wearer_problem)
+        wearer = QWidget()
+        vbox(self._wearer, self._wearer_problem, on=wearer, margins=0, spacing=0)
+        wearer.setFocusProxy(self._wearer)
+        self._form = StationForm(wearer, preferences.station, pairing_key)
         self._problem = paragraph("startProblem")
         self._button = main_button("start", tr("Start calibration"))
         self._button.setEnabled(False)
+        self._start_key = KeyCap("startKey", "Return")
+        policy = self._start_key.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self._start_key.setSizePolicy(policy)
         self._cancel = button("cancelOpening", tr("Cancel"), help_text=tr("Cancel the start (Esc)"))
         # Without focus, a second press of the key that started it does not cancel.
         self._cancel.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -102,6 +121,9 @@ class NewCalibration(Card):
         self._form.connect_wanted.connect(self.connect_wanted)
         self._button.clicked.connect(self.start)
         self._cancel.clicked.connect(self._cancel_opening)
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        app.focusChanged.connect(self._show_key)
         self.show_preferences(preferences)
 
     @property
@@ -160,8 +182,8 @@ class NewCalibration(Card):
         """Check the station again, and start if it is ready."""
         try:
             self._starting = clean_wearer(self._wearer.currentText())
-        except ValueError as error:
-            self._problem.setText(f"{error}.")
+        except ValueError:
+            self._wearer.setFocus()  # the reason is below the name
             return
         self._button.setEnabled(False)
         self.check()
@@ -189,7 +211,9 @@ class NewCalibration(Card):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Start on Enter; cancel the opening of a station on Esc."""
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+        # Ctrl+Return is the guide's: once too often, it would start without a name.
+        is_plain = not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and is_plain:
             self._button.click()
         elif event.key() == Qt.Key.Key_Escape and self._is_opening:
             self._cancel.click()
@@ -243,8 +267,31 @@ class NewCalibration(Card):
         self._starting = None
         self._problem.setText(why)
 
+    def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
+        """Show the key that starts, unless it would press another button."""
+        is_here = new is self or (new is not None and self.isAncestorOf(new))
+        self._start_key.setVisible(
+            new is None or (is_here and not isinstance(new, QAbstractButton))
+        )
+
+    def _drop_blanks(self, typed: str) -> None:
+        """Take no blanks before a name: the space bar pressed the former page's button."""
+        if typed != typed.lstrip():
+            self._wearer.setEditText(typed.lstrip())
+
+    def _show_wearer_problem(self, typed: str) -> None:
+        try:
+            clean_wearer(typed)
+            problem = ""
+        except ValueError as error:
+            problem = f"{sentence(str(error))}."
+        self._wearer_problem.setText(problem)
+        self._wearer_problem.setVisible(bool(problem))
+
     def _lay_out(self) -> None:
-        last = hbox((self._problem, 1), self._cancel, self._button, spacing=SPACING_PX)
+        last = hbox(
+            (self._problem, 1), self._cancel, self._start_key, self._button, spacing=SPACING_PX
+        )
         form = scrollable(self._form)
         # Or the page around it would scroll, and hide the button.
         form.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)

@@ -25,7 +25,7 @@ from handcal_gui.widgets.error_bars import (
     error_bars,
     picture_text,
 )
-from handcal_gui.widgets.fields import button, paragraph, with_name
+from handcal_gui.widgets.fields import button, paragraph, plain_tooltip, with_name
 from handcal_gui.widgets.layouts import vbox
 
 
@@ -93,7 +93,8 @@ class SessionList(QWidget):
         for entry in entries:
             item = QListWidgetItem(entry.text)
             item.setData(Qt.ItemDataRole.UserRole, entry.path)
-            item.setToolTip("\n".join(filter(None, (str(entry.path), picture_text(entry.eyes)))))
+            about = "\n".join(filter(None, (str(entry.path), picture_text(entry.eyes))))
+            item.setToolTip(plain_tooltip(about))
             item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, picture_text(entry.eyes))
             if has_pictures:
                 item.setIcon(QIcon(error_bars(entry.eyes)))

@@ -19,7 +19,7 @@ from handcal_gui.preferences import CurrentPreferences, Preferences
 from handcal_gui.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button
-from handcal_gui.widgets.layouts import hbox, scrollable, vbox
+from handcal_gui.widgets.layouts import fit_soon, hbox, scrollable, vbox
 
 FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
@@ -84,20 +84,20 @@ class StartPage(QWidget):
         )
         self._resume.setObjectName("resume")
         self._resume.hide()
-        self._unfinished = SessionList(tr("Unfinished sessions"), tr("Resume"))
+        self._unfinished = SessionList(tr("Unfinished sessions"), tr("Res&ume"))
         self._resume.body.addWidget(self._unfinished)
         self._open = Card(
             tr("Open a session"), tr("Review it, solve it again, export it."), "folder"
         )
         self._open.setObjectName("open")
         self._opened = SessionList(
-            tr("Recent sessions"), tr("Open"), tr("Recent sessions will be listed here.")
+            tr("Recent sessions"), tr("&Open"), tr("Recent sessions will be listed here.")
         )
-        example = button("example", tr("Example"), tr("Open the example session"))
+        example = button("example", tr("E&xample"), tr("Open the example session"))
         example.setToolTip(tr("A simulated wearer's session, copied to the session folder"))
         browse = button("browse", tr("Choose folder…"))
         library = button(
-            "library", tr("All sessions…"), tr("Search, compare, export and repair sessions")
+            "library", tr("A&ll sessions…"), tr("Search, compare, export and repair sessions")
         )
         for added in (browse, example):
             self._opened.add_button(added)
@@ -107,9 +107,10 @@ class StartPage(QWidget):
             tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "results"
         )
         evaluate = button(
-            "evaluate", tr("Evaluate…"), help_text=tr("Measure the accuracy of calibrations")
+            "evaluate", tr("Evalua&te…"), help_text=tr("Measure the accuracy of calibrations")
         )
         self._evaluate.add_to_head(evaluate)
+        self._fit_soon = fit_soon(self._fit, self)
         self._lay_out()
         self._find = LatestJob(lambda question: find_sessions(*question), self)
         self._find.answered.connect(self._show_sessions)
@@ -170,6 +171,9 @@ class StartPage(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Leave out texts that only greet, where the form needs their room."""
         super().resizeEvent(event)
+        self._fit_soon.start()
+
+    def _fit(self) -> None:
         is_high = self.height() >= _LOW * font_px()
         for text in (self._head, self.new.hint):
             text.setVisible(is_high)

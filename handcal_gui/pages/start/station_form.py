@@ -25,10 +25,10 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.path_field import PathField
 
 TITLES: dict[Part, str] = {
-    "camera": tr("Camera"),
-    "headset": tr("Headset"),
-    "rig": tr("Rig file"),
-    "sessions": tr("Session folder"),
+    "camera": tr("&Camera"),
+    "headset": tr("Hea&dset"),
+    "rig": tr("&Rig file"),
+    "sessions": tr("&Session folder"),
 }
 
 
@@ -72,7 +72,7 @@ class StationForm(QWidget):
         self._rig.setToolTip(
             tr("The offline calibration of headset and camera; the virtual headset accepts any.")
         )
-        self._calibrate_rig = button("calibrateRig", tr("Calibrate…"), tr("Calibrate a rig"))
+        self._calibrate_rig = button("calibrateRig", tr("Cali&brate…"), tr("Calibrate a rig"))
         self._calibrate_rig.clicked.connect(self.rig_wanted)
         self._sessions = PathField(tr("Session folder"), "folder")
         self._sessions.setToolTip(tr("Each calibration gets its own folder in this folder."))
@@ -136,8 +136,8 @@ class StationForm(QWidget):
         grid.setHorizontalSpacing(2 * SPACING_PX)
         grid.setVerticalSpacing(SPACING_PX // 2)
         grid.setColumnStretch(1, 1)
-        _add_row(grid, tr("Wearer"), wearer)
-        _add_row(grid, tr("Plan"), self._plan)
+        _add_row(grid, tr("&Wearer"), wearer)
+        _add_row(grid, tr("&Plan"), self._plan)
         grid.setRowMinimumHeight(grid.rowCount(), SPACING_PX)
         for part in PARTS:
             _add_row(grid, TITLES[part], fields[part])

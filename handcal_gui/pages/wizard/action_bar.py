@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QKeySequence, QPalette
+from PySide6.QtGui import QKeyEvent, QPalette
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
@@ -17,11 +16,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.keys import add_action
+from handcal_gui.keys import add_action, native
 from handcal_gui.pages.wizard.view import ButtonSpec, WizardView
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.theme import SPACING_PX, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import main_button, with_name
+from handcal_gui.widgets.key_cap import KeyCap
 
 _KEY, _TEXT_KEY = "Space", "Ctrl+Return"
 _KEYS = {
@@ -59,10 +59,9 @@ class ActionBar(QWidget):
         self._main = main_button("wizardMain")
         self._main.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._main.setToolTip(
-            tr("{}, or {} from a text field").format(_native(_KEY), _native(_TEXT_KEY))
+            tr("{}, or {} from a text field").format(native(_KEY), native(_TEXT_KEY))
         )
-        self._key = QLabel(alignment=Qt.AlignmentFlag.AlignCenter)
-        self._key.setObjectName("wizardMainKey")
+        self._key = KeyCap("wizardMainKey", _KEY, _TEXT_KEY)
         self._others = [with_name(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
         self._arming = QTimer(self, interval=_ARMING_MS, singleShot=True)
         self._lay_out()
@@ -123,13 +122,7 @@ class ActionBar(QWidget):
         self._main.setText(_LONGEST_LABEL)
         self._main.setFixedSize(self._main.sizeHint().width() + 4 * SPACING_PX, 5 * SPACING_PX)
         self._main.setText(label)
-        follow_theme(self, self._draw_key)
         follow_theme(self, self._color_main)
-        scale_font(self._key, 0.9)
-        widest = max(
-            self._key.fontMetrics().horizontalAdvance(_native(keys)) for keys in (_KEY, _TEXT_KEY)
-        )
-        self._key.setFixedSize(widest + 2 * SPACING_PX, 3 * SPACING_PX)
         self._show_key(None, None)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(2 * SPACING_PX, SPACING_PX, 2 * SPACING_PX, SPACING_PX)
@@ -147,7 +140,7 @@ class ActionBar(QWidget):
         if spec is None:
             return
         button.setText(spec.label)
-        letter = _native(f"Alt+{spec.label.partition('&')[2][:1].upper()}")
+        letter = native(f"Alt+{spec.label.partition('&')[2][:1].upper()}")
         if spec.discards:
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             button.setToolTip(f"{spec.discards} ({letter})")
@@ -176,18 +169,11 @@ class ActionBar(QWidget):
             self.asked.emit(spec.action)
 
     def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
-        self._key.setText(_native(_TEXT_KEY if _takes_text(new) else _KEY))
+        self._key.show_key(_TEXT_KEY if _takes_text(new) else _KEY)
 
     def _color_main(self) -> None:
         # Without a palette of its own, the button has the accent colour of its class.
         self._main.setPalette(QApplication.palette() if self._is_quiet else QPalette())
-
-    def _draw_key(self) -> None:
-        shade = colors().muted
-        self._key.setStyleSheet(
-            f"color: {shade}; border: 1px solid {shade}; border-bottom-width: 3px;"
-            " border-radius: 4px; padding: 0;"
-        )
 
 
 def _takes_text(widget: QWidget | None) -> bool:
@@ -197,7 +183,3 @@ def _takes_text(widget: QWidget | None) -> bool:
     if isinstance(widget, (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)):
         return not widget.isReadOnly()
     return False
-
-
-def _native(keys: str) -> str:
-    return QKeySequence(keys).toString(QKeySequence.SequenceFormat.NativeText)

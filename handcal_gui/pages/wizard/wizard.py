@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -27,7 +27,7 @@ from handcal_gui.pages.wizard.view import STEPS, WEARERS, Action, Precondition, 
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 
@@ -113,19 +113,17 @@ class WizardPanel(QWidget):
         self._go_back = self._go_back_actions()
         self._rail = _Rail()
         self._title = QLabel()
-        self._sentence = QLabel(wordWrap=True)
+        self._sentence = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._rows = [_PreconditionRow() for _ in range(_MOST_PRECONDITIONS)]
-        self._fact = QLabel(wordWrap=True)
+        self._fact = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._fact.setObjectName("wizardFact")
-        self._note = QLabel(wordWrap=True)
+        self._note = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._note.setObjectName("wizardNote")
         self.bar = ActionBar()
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
-        # Later, because a part that is hidden while its page is laid out is laid out within that.
-        self._fit_soon = QTimer(self, interval=0, singleShot=True)
-        self._fit_soon.timeout.connect(self._fit)
+        self._fit_soon = fit_soon(self._fit, self)
         self.bar.asked.connect(self._on_asked)
         self._plan.currentIndexChanged.connect(self._choose_plan)
         follow_theme(self, self._refresh)
@@ -381,7 +379,7 @@ class _PreconditionRow(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._icon = QLabel()
-        self._text = QLabel(wordWrap=True)
+        self._text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
         self.setMinimumHeight(3 * SPACING_PX)
 

@@ -52,7 +52,6 @@ _KEYS = tr(
     "Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). "
     "Click here first; E changes the eye."
 )
-_CLICK = tr("Click here to use the arrow keys")
 _ARRIVALS = {
     Arrival.SENDING: ("wait", tr("Sending to the headset…")),
     Arrival.ARRIVED: ("check", tr("In the headset")),
@@ -145,8 +144,9 @@ class FineTunePanel(QWidget):
             self._refresh()
         arrival = self._stream.arrival
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
-        is_calm = self._is_editable() and arrival is Arrival.ARRIVED
-        self._show_status(sign, _CLICK if is_calm and not self._has_keys() else text)
+        if self._is_editable() and arrival is Arrival.ARRIVED and not self._has_keys():
+            sign, text = "fine-tune", tr("Click here to use the arrow keys")
+        self._show_status(sign, text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Move the selected eye by arrow keys."""

@@ -47,7 +47,7 @@ class LinkPanel(QWidget):
         self._readings: deque[tuple[float, LinkStatistics]] = deque()
         self._is_connected: bool | None = None
         self._sign = QLabel()
-        self._state = QLabel()
+        self._state = QLabel(textFormat=Qt.TextFormat.PlainText)
         self._state.setObjectName("link-state")
         self._state.setWordWrap(True)
         self._connect = button(

@@ -20,7 +20,7 @@ from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
@@ -69,6 +69,7 @@ class ResultsPanel(QWidget):
         self._compare = CompareTab()
         self._compare.requested.connect(self.compare_requested)
         self._compare.cancelled.connect(self.compare_cancelled)
+        self._fit_soon = fit_soon(self._fit, self)
         self._lay_out()
         self._add_copy()
 
@@ -118,7 +119,7 @@ class ResultsPanel(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the tab of the eyes into the panel."""
         super().resizeEvent(event)
-        self._fit()
+        self._fit_soon.start()
 
     def show_comparison(self, other: Results) -> None:
         """Show the results of another method for the same alignments."""

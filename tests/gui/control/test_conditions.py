@@ -67,7 +67,7 @@ def test_a_slow_computer_is_named_once_until_it_is_fast_again(snapshot: Maker) -
     assert watch(conditions, slow, [1.0, 3.0]) == ["", ""]
     texts = watch(conditions, slow, [4.0, 5.0, 6.0])
     assert conditions.is_slow
-    assert texts[-1].startswith("frames per second: often fewer than the 8 that")
+    assert texts[-1].startswith("frames per second: often below the 8 needed")
     slower = snapshot(camera={"rate_hz": 1.0})
     assert watch(conditions, slower, [7.0]) == texts[-1:]  # the text does not flicker
     watch(conditions, fast, [8.0, 11.0])

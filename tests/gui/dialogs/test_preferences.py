@@ -142,6 +142,7 @@ def test_a_folder_that_cannot_be_created_is_refused_beside_it(
     field.set_path(str(tmp_path / "file" / "folder"))
     opened.accept()  # at once: it waits for the check
     qtbot.waitUntil(found.isVisible)
+    qtbot.waitUntil(lambda: not found.visibleRegion().isEmpty())
     assert "is a file. Choose a folder." in found.text()
     assert opened.isVisible()
     assert not _button(opened, "Ok").isEnabled()

@@ -5,12 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QImage, QTextDocument
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, show
+
+
+@pytest.mark.parametrize("path", ["/a/<b>x</b>", "/a/&lt;b&gt;"])
+def test_a_path_like_markup_is_shown_as_it_is(qtbot: QtBot, path: str) -> None:
+    field = PathField("Folder", "folder")
+    qtbot.addWidget(field)
+    field.setToolTip("Explained")
+    field.set_path(path)
+    document = QTextDocument()
+    document.setHtml(child(field, QLineEdit).toolTip())
+    assert document.toPlainText().splitlines() == [path, "Explained"]
 
 
 def test_a_file_or_a_folder_is_chosen_in_a_dialog(

@@ -74,6 +74,55 @@ def test_typing_a_name_and_enter_starts(
     assert threading.main_thread() not in inspector.threads
 
 
+def test_keys_of_the_former_page_are_no_name_and_start_nothing(
+    qtbot: QtBot, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    for _ in range(2):
+        QTest.keyClick(wearer(page), Qt.Key.Key_Space)
+    assert wearer(page).currentText() == ""
+    with qtbot.assertNotEmitted(page.start_requested, wait=100):
+        QTest.keyClick(wearer(page), Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClicks(wearer(page), "Ada B")
+    assert wearer(page).currentText() == "Ada B"
+
+
+def test_what_is_wrong_with_a_name_is_said_beside_it(
+    qtbot: QtBot, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    problem = find(page, QLabel, "wearerProblem")
+    assert not problem.isVisible()
+    wearer(page).setEditText("A\x07B")
+    assert problem.isVisible()
+    assert "must not contain line breaks or control characters." in problem.text()
+    with qtbot.assertNotEmitted(page.start_requested, wait=100):
+        QTest.keyClick(wearer(page), Qt.Key.Key_Return)
+    wearer(page).setEditText("AB")
+    assert not problem.isVisible()
+
+
+def test_the_key_that_starts_is_shown_where_it_does(
+    qtbot: QtBot, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    key = find(page, QLabel, "startKey")
+    page.activateWindow()
+    for widget, is_shown in ((button(page, "calibrateRig"), False), (wearer(page), True)):
+        widget.setFocus()
+        qtbot.waitUntil(widget.hasFocus)
+        assert key.isVisible() == is_shown
+    assert key.text() == "Return"
+
+
+def test_fields_are_reached_by_letters(open_page: Callable[..., StartPage]) -> None:
+    labels = open_page().findChildren(QLabel)
+    letters = [one.text().partition("&")[2][:1].upper() for one in labels if one.buddy()]
+    found = [letter for letter in letters if letter]
+    assert set(found) == set("WPCDRS")
+    assert len(found) == len(set(found))
+
+
 def test_the_next_wearer_finds_everything_as_it_was(open_page: Callable[..., StartPage]) -> None:
     page = open_page(source="realsense", headset="network", port=50_001)
     QTest.keyClicks(wearer(page), "Ada")

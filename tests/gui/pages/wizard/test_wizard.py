@@ -288,5 +288,13 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_ey
     assert ring.accessibleDescription().startswith("1/2 verified")
 
 
+def test_names_and_paths_like_markup_are_shown_as_they_are(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.SHOW_HAND, camera={"name": "<b>D415</b>"}))
+    [label] = [one for one in panel.findChildren(QLabel) if "D415" in one.text()]
+    assert label.textFormat() is Qt.TextFormat.PlainText
+
+
 def _texts(panel: WizardPanel) -> set[str]:
     return {label.text() for label in panel.findChildren(QLabel)}
