@@ -3860,15 +3860,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Capture…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Take the captures with a camera; enter their folder first.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Track…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3884,7 +3876,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Record…</source>
+        <source>&amp;Capture…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Track…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rec&amp;ord…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4312,11 +4312,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Take again</source>
+        <source>&amp;Show</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Space bar</source>
+        <source>Take again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4333,6 +4333,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Fill the screen with the live image, to align a hand with it. Escape goes back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Close</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4432,6 +4436,18 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Open &amp;report</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open in &amp;browser</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open &amp;folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Numbers {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4440,15 +4456,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open report</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Report as PDF, for reading and archiving</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Open in browser</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4564,6 +4572,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Tracking</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Stopped</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4620,10 +4632,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>trials will be stored in {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Waiting for the headset</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4633,6 +4641,10 @@ one turns out.</source>
     </message>
     <message>
         <source>trials stored: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>session found: trials will be stored in {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4724,15 +4736,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open page</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>not accepted yet: take images of the grid for one eye at least</source>
+        <source>Open &amp;page</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Looking for grid and board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>for one eye at least, take images of the grid and {} or more of the board</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4741,6 +4753,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Depth camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>press Accept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not accepted yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5568,7 +5588,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Automatically</source>
+        <source>&amp;Automatically</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
