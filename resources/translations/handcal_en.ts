@@ -5308,6 +5308,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>save it in another folder, or under another name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>the next calibration uses this rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5771,6 +5775,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Numbe&amp;rs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the board was found in no image: see the reason beside each</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
