@@ -4368,6 +4368,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>press Show to open the camera again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Take</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5613,6 +5617,10 @@ one turns out.</source>
     </message>
     <message>
         <source>{} taken</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>press Show to open the cameras again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

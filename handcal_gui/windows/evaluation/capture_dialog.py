@@ -122,7 +122,7 @@ class CaptureDialog(PreparationDialog):
         self._look.failed.connect(self._show_failure)
         self.form.changed.connect(self._change_plan)
         self._camera.images_changed.connect(self._refresh)
-        self._camera.failed.connect(self._show_failure)
+        self._camera.failed.connect(self._show_camera_failure)
         self._camera.images_changed.connect(self._consider)
         self._list.chosen_changed.connect(self._refresh)
         self._list.chosen_changed.connect(self._turn_view)
@@ -297,6 +297,10 @@ class CaptureDialog(PreparationDialog):
             self._show_failure(why)
         else:
             self._found.show_finding(Finding("", Health.LIMITED, tr("not taken: {}").format(why)))
+
+    def _show_camera_failure(self, why: str) -> None:
+        advice = tr("press Show to open the camera again")
+        self._found.show_finding(Finding("", Health.BROKEN, why, advice))
 
     def _show_failure(self, why: str) -> None:
         self._found.show_finding(Finding("", Health.BROKEN, why))

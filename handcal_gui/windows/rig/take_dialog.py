@@ -172,7 +172,8 @@ class TakeDialog(QDialog):
     def _show_failure(self, why: str) -> None:
         self._stop_search()
         self._cameras.stop()
-        self._found.show_finding(Finding("", Health.BROKEN, why))
+        advice = tr("press Show to open the cameras again")
+        self._found.show_finding(Finding("", Health.BROKEN, why, advice))
 
     def _show_taken(self, views: list[BoardImage]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)

@@ -226,7 +226,8 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
     technician = make(entries)
     technician.start()
     technician.camera.failure = CameraError("it was unplugged")
-    technician.wait(lambda: technician.said == "It was unplugged.")
+    told = "It was unplugged. Press Show to open the camera again."
+    technician.wait(lambda: technician.said == told)
     assert not technician.button.isEnabled()
     technician.start()
 
