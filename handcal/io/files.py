@@ -180,6 +180,16 @@ def make_folder(path: Path) -> Path:
     return path
 
 
+def require_writable(folder: Path) -> None:
+    """Raise FileError if no file can be written to a folder, which need not exist yet."""
+    folder = folder.absolute()
+    there = next(path for path in (folder, *folder.parents) if path.exists())
+    if not there.is_dir():
+        raise FileError(f"{there} is a file: choose a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FileError(f"cannot write to {there}: choose another folder")
+
+
 def write_json(path: Path, value: object) -> None:
     """Write `value` as indented JSON, atomically; NaN is refused with ValueError."""
     write_atomic(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())

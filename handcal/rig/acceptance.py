@@ -124,9 +124,12 @@ def run_acceptance(settings: AcceptanceSettings, progress: Progress = Progress()
     for number, eye in enumerate(settings.eyes):
         share = 0.8 * number / len(settings.eyes), 0.8 * (number + 1) / len(settings.eyes)
         images = _read_eye(settings, rig.eyes[eye], eye, left_out, progress.part(*share))
-        found[eye] = accept_eye(
-            rig, rig.eyes[eye], images.homography, images.camera, images.pairs, depth_camera
-        )
+        try:
+            found[eye] = accept_eye(
+                rig, rig.eyes[eye], images.homography, images.camera, images.pairs, depth_camera
+            )
+        except HandcalError as error:
+            raise HandcalError(f"{eye}: {error}") from error
         tracked |= {f"{eye}/{name}": one for name, one in images.tracked.items()}
     move = camera_move(rig, tracked, depth_camera) if tracked else None
     problems = {eye: problem(one, settings.limit_arcmin) for eye, one in found.items()}

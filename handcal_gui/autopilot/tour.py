@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterator
 
 from PySide6.QtCore import QEvent, QObject, QRegularExpression, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QListWidget, QTabWidget, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QPushButton, QTabWidget, QWidget
 
+from handcal.camera.settings import RealSenseSettings
 from handcal.errors import FileError
 from handcal_gui.autopilot.screenshots import Screenshots
+from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.dialogs.keys import KeysDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
@@ -23,6 +25,8 @@ _PATIENCE_MS = 20_000
 _STEPS = 6
 _RAIL = QRegularExpression("Rail$")
 """Name of a list that chooses a window's page."""
+_OPENS_DIALOG = QRegularExpression("^(take|acceptRig|track)$")
+"""Names of buttons that open a dialog without asking for a file."""
 
 Walk = Iterator[int]
 """Actions in pieces; each yields the milliseconds to wait before the next."""
@@ -48,6 +52,7 @@ class Tour(QObject):
         super().__init__(program)
         self._program = program
         self._save = screenshots.save
+        self._opened: set[str] = set()
 
     def begin(self, walk: Walk, then: Callable[[], object]) -> None:
         """Run a walk, then call `then`."""
@@ -109,7 +114,12 @@ class Tour(QObject):
         yield _LOOK_MS
         self._save("review")
         preferences = PreferencesDialog(program.preferences, program.window)
-        for name, one in {"preferences": preferences, "keys": KeysDialog(program.window)}.items():
+        shown: dict[str, QDialog] = {
+            "preferences": preferences,
+            "keys": KeysDialog(program.window),
+            "camera-settings": CameraSettingsDialog(RealSenseSettings(), program.window),
+        }
+        for name, one in shown.items():
             one.show()
             yield _LOOK_MS
             self._save(name, one)
@@ -138,16 +148,31 @@ class Tour(QObject):
                 continue
             self._save(name, dialog)
             for rail in dialog.findChildren(QListWidget, _RAIL):
-                for row in range(1, rail.count()):
+                for row in range(rail.count()):
                     rail.setCurrentRow(row)
                     yield _LOOK_MS
-                    self._save(f"{name}-{row + 1}", dialog)
+                    if row > 0:
+                        self._save(f"{name}-{row + 1}", dialog)
+                    yield from self._opened_by_buttons(name, dialog)
             dialog.close()
         program.manual.open("docs/guide.md")
         program.manual.search.setText("target")
         yield _LOOK_MS
         self._save("manual", program.manual)
         program.manual.close()
+
+    def _opened_by_buttons(self, name: str, dialog: QWidget) -> Walk:
+        """Save the dialogs that a page of a window opens, each once."""
+        for button in dialog.findChildren(QPushButton, _OPENS_DIALOG):
+            if not button.isVisible() or button.objectName() in self._opened:
+                continue
+            self._opened.add(button.objectName())
+            button.click()
+            yield _LOOK_MS
+            if (opened := QApplication.activeModalWidget()) is not None:
+                self._save(f"{name}-{button.objectName()}", opened)
+                opened.close()
+                yield _TURN_MS
 
     def _fine_tune(self) -> Walk:
         """Change φ, record trials with it, and reset it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence
+from PySide6.QtGui import QKeySequence, QShowEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal_gui.keys import add_action
@@ -29,7 +29,7 @@ def action_strip(
     keys : str
         Press the main button from anywhere in the window; the first one is shown.
     """
-    strip = QWidget()
+    strip = _Strip(main)
     window = Qt.ShortcutContext.WindowShortcut
     meaning = tr("Press the large button")
     add_action(strip, meaning, keys, main.click, context=window).setAutoRepeat(False)
@@ -49,3 +49,17 @@ def action_strip(
 
     follow_theme(strip, draw_key)
     return strip
+
+
+class _Strip(QWidget):
+    """Makes the main button the dialog's default: Qt forgets what was set outside a dialog."""
+
+    def __init__(self, main: MainButton) -> None:
+        super().__init__()
+        self._main = main
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Set the default before the dialog takes its first button instead."""
+        super().showEvent(event)
+        self._main.setDefault(False)
+        self._main.setDefault(True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QPointF, QRectF, QSizeF, Qt
-from PySide6.QtGui import QGuiApplication, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -13,8 +13,8 @@ from handcal.io.resources import resource_path
 from handcal_gui.theme import colors, follow_theme
 from handcal_gui.translation import tr
 
-_LIVE_OPACITY = 0.18
-"""Of the live colour in filled parts."""
+_LIVE_SHARE = 0.18
+"""Of the live colour in filled parts, which hide the lines below them."""
 
 
 def themed_drawing(path: Path) -> QByteArray:
@@ -31,10 +31,21 @@ def themed_drawing(path: Path) -> QByteArray:
         "'#222'": f"'{palette.text().color().name()}'",
         "'#fff'": f"'{palette.base().color().name()}'",
         "'#888'": f"'{colors().muted}'",
-        "'#dde6f0'": f"'{colors().live}' fill-opacity='{_LIVE_OPACITY}'",
+        "'#dde6f0'": f"'{_mixed(palette.base().color(), QColor(colors().live)).name()}'",
     }.items():
         svg = svg.replace(drawn, shown)
     return QByteArray(svg.encode())
+
+
+def _mixed(ground: QColor, live: QColor) -> QColor:
+    def part(one: int, other: int) -> int:
+        return round(one + _LIVE_SHARE * (other - one))
+
+    return QColor(
+        part(ground.red(), live.red()),
+        part(ground.green(), live.green()),
+        part(ground.blue(), live.blue()),
+    )
 
 
 class Drawing(QWidget):

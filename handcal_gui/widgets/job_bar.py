@@ -69,6 +69,10 @@ class JobBar(QWidget):
         self._job.start()
         self._refresh()
 
+    def say(self, doing: str) -> None:
+        """Show that the running job does something else by now."""
+        self._doing.setText(f"{doing}…")
+
     def cancel(self) -> None:
         """Cancel the running job at its next check."""
         if self._job is not None:

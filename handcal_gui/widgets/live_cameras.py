@@ -177,6 +177,6 @@ class LiveCameras(QWidget):
             grid.addLayout(row, 0, column)
             grid.addWidget(self._recorded[title], 1, column)
             grid.addWidget(self._views[title], 2, column)
-            self._views[title].setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)
+            self._views[title].setMinimumSize(56 * SPACING_PX, 24 * SPACING_PX)
         grid.setRowStretch(2, 1)
         grid.setHorizontalSpacing(3 * SPACING_PX)

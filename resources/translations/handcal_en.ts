@@ -4050,15 +4050,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Capture…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Take the captures with a camera; enter their folder first.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Track…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4074,7 +4066,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Record…</source>
+        <source>&amp;Capture…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Track…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Rec&amp;ord…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4522,11 +4522,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Take again</source>
+        <source>&amp;Show</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Space bar</source>
+        <source>Take again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4571,6 +4571,10 @@ one turns out.</source>
     </message>
     <message>
         <source>not taken: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>press Show to open the camera again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4642,6 +4646,18 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Open &amp;report</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open in &amp;browser</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open &amp;folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Numbers {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4650,15 +4666,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open report</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Report as PDF, for reading and archiving</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Open in browser</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4774,6 +4782,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Tracking</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Stopped</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4830,10 +4842,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>trials will be stored in {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Waiting for the headset</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4843,6 +4851,10 @@ one turns out.</source>
     </message>
     <message>
         <source>trials stored: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>session found: trials will be stored in {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4934,15 +4946,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open page</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>not accepted yet: take images of the grid for one eye at least</source>
+        <source>Open &amp;page</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Looking for grid and board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>for one eye at least, take images of the grid and {} or more of the board</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4951,6 +4963,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Depth camera</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>press Accept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not accepted yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5498,6 +5518,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>save it in another folder, or under another name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>the next calibration uses this rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5778,7 +5802,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Automatically</source>
+        <source>&amp;Automatically</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5799,6 +5823,10 @@ one turns out.</source>
     </message>
     <message>
         <source>{} taken</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>press Show to open the cameras again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5981,6 +6009,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Numbe&amp;rs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the board was found in no image: see the reason beside each</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -29,6 +29,7 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
 from handcal_gui.widgets.finding_line import FindingLine
@@ -86,10 +87,9 @@ class CaptureDialog(PreparationDialog):
         self._instruction = paragraph("instruction")
         self._found = FindingLine("capture")
         self._bar = JobBar()
-        self._start = button("startCamera", tr("Show"))
+        self._start = button("startCamera", tr("&Show"))
         self._take = main_button("takeCapture", tr("Take again"))
         self._take.setMinimumWidth(self._take.sizeHint().width())
-        self._take.setToolTip(tr("Space bar"))
         self._by_itself = with_name(
             QCheckBox(tr("A&utomatically")),
             "byItself",
@@ -105,7 +105,7 @@ class CaptureDialog(PreparationDialog):
                 "Fill the screen with the live image, to align a hand with it. Escape goes back."
             ),
         )
-        self._close = button("close", tr("Close"))
+        self._close = button("close", tr("&Close"))
         self._watch: RestWatch | None = None
         self._is_watching = False
         self._warp: tuple[str, RotationWarp | None] = "", None
@@ -122,7 +122,7 @@ class CaptureDialog(PreparationDialog):
         self._look.failed.connect(self._show_failure)
         self.form.changed.connect(self._change_plan)
         self._camera.images_changed.connect(self._refresh)
-        self._camera.failed.connect(self._show_failure)
+        self._camera.failed.connect(self._show_camera_failure)
         self._camera.images_changed.connect(self._consider)
         self._list.chosen_changed.connect(self._refresh)
         self._list.chosen_changed.connect(self._turn_view)
@@ -298,6 +298,10 @@ class CaptureDialog(PreparationDialog):
         else:
             self._found.show_finding(Finding("", Health.LIMITED, tr("not taken: {}").format(why)))
 
+    def _show_camera_failure(self, why: str) -> None:
+        advice = tr("press Show to open the camera again")
+        self._found.show_finding(Finding("", Health.BROKEN, why, advice))
+
     def _show_failure(self, why: str) -> None:
         self._found.show_finding(Finding("", Health.BROKEN, why))
 
@@ -307,7 +311,6 @@ class CaptureDialog(PreparationDialog):
         self._start.setEnabled(self._looked_for is not None)
         self._take.setEnabled(is_ready and is_seen)
         self._take.setText(tr("Take again") if self._list.chosen_is_taken else tr("Take"))
-        self._take.setShortcut(Qt.Key.Key_Space)  # setText removes the shortcut
         self._instruction.setText(self._next_instruction())
 
     def _next_instruction(self) -> str:
@@ -323,15 +326,8 @@ class CaptureDialog(PreparationDialog):
         scale_font(self._instruction, 1.6, is_bold=True)
         self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
         middle = hbox((self._camera, 1), self._list, spacing=2 * SPACING_PX)
-        foot = hbox(
-            self._start,
-            self._take,
-            self._by_itself,
-            self._large,
-            (self._bar, 1),
-            self._close,
-            spacing=SPACING_PX,
-        )
+        others = self._close, self._start, self._by_itself, self._large
+        foot = action_strip(self._take, *others, bar=self._bar, keys="Space")
         vbox(
             self.form,
             (middle, 1),

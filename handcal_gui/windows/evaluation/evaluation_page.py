@@ -15,11 +15,12 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.windows.evaluation.results_view import ResultsView
 from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Readiness
@@ -189,16 +190,12 @@ class EvaluationPage(QWidget):
         return self._readiness.finding if self._readiness else None
 
     def _lay_out(self, question: str) -> None:
-        row = hbox(self._button, spacing=2 * SPACING_PX)
-        for prepare in self._preparing:
-            row.addWidget(prepare)
-        row.addWidget(self._bar, 1)
         vbox(
             paragraph("question", question),
             self.form,
-            row,
             self._found,
             (self._results, 1),
+            action_strip(self._button, *self._preparing, bar=self._bar),
             on=self,
             margins=0,
             spacing=SPACING_PX,

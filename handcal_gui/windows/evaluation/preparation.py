@@ -56,7 +56,8 @@ class PreparationButton(QPushButton):
 
     def __init__(self, preparation: Preparation, parent: QWidget | None = None) -> None:
         super().__init__(preparation.button, parent, autoDefault=True)
-        with_name(self, preparation.name, preparation.button, preparation.help_text)
+        label = preparation.button.replace("&", "")
+        with_name(self, preparation.name, label, preparation.help_text)
         self._preparation = preparation
         self._entries: Any = None
         self._dialog: PreparationDialog | None = None

@@ -74,19 +74,19 @@ class ResultsView(QWidget):
         for name, text, file, help_text in (
             (
                 "openPdf",
-                tr("Open report"),
+                tr("Open &report"),
                 "report.pdf",
                 tr("Report as PDF, for reading and archiving"),
             ),
             (
                 "openHtml",
-                tr("Open in browser"),
+                tr("Open in &browser"),
                 "report.html",
                 tr("The same report as HTML, with the numbers of each figure"),
             ),
             (
                 "openFolder",
-                tr("Open folder"),
+                tr("Open &folder"),
                 "",
                 tr("Folder with report, figures and raw numbers as CSV"),
             ),

@@ -64,13 +64,13 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             _cube_form,
             (
                 Preparation(
-                    tr("Capture…"),
+                    tr("&Capture…"),
                     tr("Take the captures with a camera; enter their folder first."),
                     lambda entries: bool(entries.captures),
                     CaptureDialog,
                 ),
                 Preparation(
-                    tr("Track…"),
+                    tr("&Track…"),
                     tr("Track the cube with the depth camera, and have the headset draw it."),
                     lambda _: True,
                     TrackDialog,
@@ -91,7 +91,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             _users_form,
             (
                 Preparation(
-                    tr("Record…"),
+                    tr("Rec&ord…"),
                     tr(
                         "Record the trials of one session with a cube in the room; enter the "
                         "session first."

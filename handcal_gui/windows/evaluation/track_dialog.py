@@ -21,6 +21,7 @@ from handcal.types import Float64
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, main_button
 from handcal_gui.widgets.finding_line import FindingLine
@@ -90,7 +91,7 @@ class TrackDialog(PreparationDialog):
         self._found = FindingLine("track")
         self._bar = JobBar(tr("Stop"))
         self._start = main_button("start", tr("Start"))
-        self._close = button("close", tr("Close"))
+        self._close = button("close", tr("&Close"))
         self._timer = QTimer(self, interval=_POLL_MS)
         self._timer.timeout.connect(self._poll)
         self.form.changed.connect(self._keep)
@@ -134,6 +135,8 @@ class TrackDialog(PreparationDialog):
         sight = self._sight
         if sight is None or sight is self._shown:
             return
+        if self._shown is None:
+            self._bar.say(tr("Tracking"))
         self._shown = sight
         self._view.show_text()
         self._view.show_image(sight.frame.color)
@@ -162,7 +165,7 @@ class TrackDialog(PreparationDialog):
 
     def _lay_out(self) -> None:
         middle = hbox((self._view, 2), (self._pose, 1), spacing=2 * SPACING_PX)
-        foot = hbox(self._start, (self._bar, 1), self._close, spacing=SPACING_PX)
+        foot = action_strip(self._start, self._close, bar=self._bar)
         vbox(
             self.form,
             (middle, 1),

@@ -22,6 +22,7 @@ from handcal.types import Eye, Float64
 from handcal_gui.evaluation_entries import UserEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
@@ -45,6 +46,7 @@ _MOVES: dict[str, tuple[str, int, int, int, Qt.Key]] = {
     "larger": (tr("Larger"), 0, 3, 3, Qt.Key.Key_Plus),
     "smaller": (tr("Smaller"), 2, 3, -3, Qt.Key.Key_Minus),
 }
+_KEY_SIGNS = dict(zip(_MOVES, "↑←→↓+−", strict=True))
 Record: TypeAlias = Callable[..., tuple[Trial, ...]]
 
 
@@ -163,11 +165,17 @@ class TrialsDialog(PreparationDialog):
         self._start = main_button("start", tr("Start"))
         self._next = main_button("next", tr("They coincide"))
         self._next.setMinimumWidth(self._next.sizeHint().width())
-        self._close = button("close", tr("Close"))
+        self._starting, self._going = action_strip(self._start), action_strip(self._next)
+        self._close = button("close", tr("&Close"))
         self._table = NumberTable("trials-recorded", tr("Trials recorded"))
         self._table.hide()
         self._moves = {
-            name: button(name, text, help_text=tr("{} ({:g} mm of φ)").format(text, 1e3 * STEP_M))
+            name: button(
+                name,
+                f"{text} {_KEY_SIGNS[name]}",
+                text,
+                tr("{} ({:g} mm of φ)").format(text, 1e3 * STEP_M),
+            )
             for name, (text, *_) in _MOVES.items()
         }
         self.told.connect(self._show_step)
@@ -246,7 +254,9 @@ class TrialsDialog(PreparationDialog):
         """Return where the trials will be stored, or why they cannot."""
         folder = self.entries.sessions
         if self._has_session:
-            return Finding("", Health.GOOD, tr("trials will be stored in {}").format(folder))
+            return Finding(
+                "", Health.GOOD, tr("session found: trials will be stored in {}").format(folder)
+            )
         return Finding(
             "",
             Health.BROKEN,
@@ -260,9 +270,9 @@ class TrialsDialog(PreparationDialog):
     def _refresh(self) -> None:
         step = self._step if self._bar.is_busy else None
         self.form.setEnabled(not self._bar.is_busy)
-        self._start.setVisible(not self._bar.is_busy)
+        self._starting.setVisible(not self._bar.is_busy)
+        self._going.setVisible(self._bar.is_busy)
         self._start.setEnabled(not self._bar.is_busy and self._has_session)
-        self._next.setVisible(self._bar.is_busy)
         self._next.setEnabled(step is not None)
         for move in self._moves.values():
             move.setEnabled(step is not None and step.is_adjusting)
@@ -279,7 +289,7 @@ class TrialsDialog(PreparationDialog):
         for name, move in self._moves.items():
             _, row, column, *_ = _MOVES[name]
             grid.addWidget(move, row, column)
-        foot = hbox(self._start, self._next, (self._bar, 1), self._close, spacing=SPACING_PX)
+        foot = hbox(self._close, (self._bar, 1), self._starting, self._going, spacing=SPACING_PX)
         vbox(
             self.form,
             self._instruction,

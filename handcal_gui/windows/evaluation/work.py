@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import cv2
 import numpy as np
 
+from handcal.io.files import require_writable
 from handcal.io.images import read_image
 from handcal.lab.settings import output_folder
 from handcal.lab.study.run import RUNNING, Study, share_done
@@ -90,7 +91,7 @@ class StudyEvaluation:
                 _note(tr("{} holds {:.0f} % of this study").format(folder, 100 * share), advice),
                 tr("Resume"),
             )
-        return Readiness(_ready())
+        return Readiness(_ready(folder))
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Run or resume the study, and report its progress with the remaining time."""
@@ -124,7 +125,7 @@ class FileEvaluation:
         folder = free_of_studies(output_folder(entries.output))
         if (folder / "report.pdf").exists():
             return Readiness(_note(tr("The report in {} will be replaced").format(folder)))
-        return Readiness(_ready())
+        return Readiness(_ready(folder))
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Evaluate the files and write the report."""
@@ -145,5 +146,7 @@ def _note(found: str, advice: str = "") -> Finding:
     return Finding("", Health.LIMITED, found, advice)
 
 
-def _ready() -> Finding:
+def _ready(folder: Path) -> Finding:
+    """Return that all is ready, or raise FileError if the results could not be written."""
+    require_writable(folder)
     return Finding("", Health.GOOD, tr("Ready"))

@@ -29,14 +29,16 @@ from handcal.station.doctor import Finding, Health
 from handcal.types import EYES, Eye
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.windows.rig.project import RigProject
+from handcal_gui.windows.rig.solve import CAMERA_MISSING
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
 _HOW = tr(
@@ -70,8 +72,8 @@ class AcceptDialog(QDialog):
         self._table.hide()
         self._bar = JobBar()
         self._run = main_button("runAcceptance", tr("Accept"))
-        self._open = button("openPage", tr("Open page"))
-        self._close = button("close", tr("Close"))
+        self._open = button("openPage", tr("Open &page"))
+        self._close = button("close", tr("&Close"))
         self._run.clicked.connect(self.run)
         self._open.clicked.connect(self._open_page)
         self._close.clicked.connect(self.accept)
@@ -81,13 +83,7 @@ class AcceptDialog(QDialog):
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
         self._refresh()
-        self._found.show_finding(
-            Finding(
-                "",
-                Health.LIMITED,
-                tr("not accepted yet: take images of the grid for one eye at least"),
-            )
-        )
+        self._show_state()
 
     def run(self) -> None:
         """Evaluate the eyes that have images."""
@@ -116,7 +112,22 @@ class AcceptDialog(QDialog):
 
     @property
     def _eyes(self) -> tuple[Eye, ...]:
-        return tuple(eye for eye in EYES if self._count(eye, "grid"))
+        return tuple(
+            eye
+            for eye in EYES
+            if self._count(eye, "grid") and self._count(eye, "viewpoint") >= FEWEST_VIEWS
+        )
+
+    @property
+    def _need(self) -> str:
+        """What is missing before the rig can be accepted; empty if nothing is."""
+        if not self._project.camera_file.exists():
+            return CAMERA_MISSING
+        if self._eyes:
+            return ""
+        return tr(
+            "for one eye at least, take images of the grid and {} or more of the board"
+        ).format(FEWEST_VIEWS)
 
     def _count(self, eye: Eye, what: str) -> int:
         folder = self._folder / eye / what
@@ -139,8 +150,13 @@ class AcceptDialog(QDialog):
                 return
             folders = {tr("Viewpoint camera"): self._folder / eye / "grid"}
         dialog = TakeDialog(folders, board, choose, project.realsense, self)
+        dialog.finished.connect(self._show_state)
         dialog.finished.connect(self._refresh)
         dialog.open()
+
+    def _show_state(self) -> None:
+        advice = self._need or tr("press Accept")
+        self._found.show_finding(Finding("", Health.LIMITED, tr("not accepted yet"), advice))
 
     def _grid_board(self, eye: Eye) -> Board:
         screen = screen_of(self._project.rig, eye)
@@ -180,7 +196,8 @@ class AcceptDialog(QDialog):
         for eye, shown in self._counts.items():
             grids, pairs = self._count(eye, "grid"), self._count(eye, "viewpoint")
             shown.setText(tr("{} of the grid, {} of the board").format(grids, pairs))
-        self._run.setEnabled(bool(self._eyes) and not self._bar.is_busy)
+        self._run.setEnabled(not self._need and not self._bar.is_busy)
+        self._run.setToolTip(self._need)
         self._open.setEnabled(self._page is not None)
 
     def _lay_out(self) -> None:
@@ -196,7 +213,7 @@ class AcceptDialog(QDialog):
         images.setColumnStretch(3, 1)
         drawing = Drawing("docs/pictures/setup-accept.svg")
         drawing.setMinimumHeight(10 * SPACING_PX)
-        foot = hbox(self._run, (self._bar, 1), self._open, self._close, spacing=SPACING_PX)
+        foot = action_strip(self._run, self._close, self._open, bar=self._bar)
         vbox(
             paragraph("how", _HOW),
             (drawing, 1),

@@ -223,7 +223,7 @@ class BoardPage(QWidget):
     def _lay_out(self) -> None:
         squares, paper = QWidget(), QWidget()
         fill_row(squares, self._columns, QLabel("×"), self._rows, grows=self._rows)
-        fill_row(paper, self._paper, self._picture, grows=self._picture)
+        hbox(self._paper, self._picture, 1, on=paper, margins=0, spacing=SPACING_PX)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)

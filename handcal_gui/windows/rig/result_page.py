@@ -115,7 +115,9 @@ class ResultPage(QWidget):
         try:
             self._project.save_rig_as(path)
         except FileError as error:
-            self._end.show_finding(Finding("", Health.BROKEN, tr("not saved: {}").format(error)))
+            found = tr("not saved: {}").format(error)
+            advice = tr("save it in another folder, or under another name")
+            self._end.show_finding(Finding("", Health.BROKEN, found, advice))
 
     def stop(self) -> None:
         """Close the acceptance, if it is open."""

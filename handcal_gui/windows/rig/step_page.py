@@ -75,7 +75,7 @@ class StepPage(QWidget):
             panel.bar.busy_changed.connect(self._refresh)
             panel.again_requested.connect(self.enter)
             panel.board_found.connect(project.note_found)
-            panel.board_found.connect(self._show_images)
+            panel.dropped_changed.connect(self._show_images)
         self.box.bar.busy_changed.connect(self._refresh)
         self.box.shown.connect(self._refresh)
         project.rig_changed.connect(self.show_known)
@@ -150,9 +150,9 @@ class StepPage(QWidget):
         vbox((tabs, 1), *searches, self.box, on=self, margins=0, spacing=SPACING_PX // 2)
 
     def _show_images(self) -> None:
-        """Show the images in place of how to take them, once all are found."""
-        if self._tabs.currentIndex() == 0 and not self._is_looking:
-            found = [place for place, one in enumerate(self.panels, _FIRST_PANEL) if one.shots]
+        """Show the images in place of how to take them, once all have been searched."""
+        found = [place for place, one in enumerate(self.panels, _FIRST_PANEL) if one.shots]
+        if found and self._tabs.currentIndex() == 0 and not self._is_looking:
             self._refresh()
             self._tabs.setCurrentIndex(found[0])
 
@@ -165,7 +165,6 @@ class StepPage(QWidget):
         for place, (title, panel) in enumerate(panels, _FIRST_PANEL):
             count = f" ({panel.count})" if panel.count else ""
             self._tabs.setTabText(place, f"{title}{count}")
-            self._tabs.setTabEnabled(place, bool(panel.shots))
         self._tabs.setTabEnabled(self._tabs.count() - 1, self.box.table.rowCount() > 0)
         need = "" if self._is_looking else self.need
         self.box.allow(need, is_busy=self._is_looking or self.box.bar.is_busy)
@@ -175,4 +174,8 @@ def images_needed(panel: ImagesPanel, request: str) -> str:
     """Return a request for images, unless some can be used."""
     if panel.used:
         return ""
-    return tr("to solve, tick an image in which the board was found") if panel.shots else request
+    if not panel.shots:
+        return request
+    if all(shot.problem for shot in panel.shots):
+        return tr("the board was found in no image: see the reason beside each")
+    return tr("to solve, tick an image in which the board was found")

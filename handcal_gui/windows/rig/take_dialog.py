@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QDialog, QWidget
 
 from handcal.camera.settings import RealSenseSettings
@@ -20,10 +19,11 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.fields import button, main_button, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
 
@@ -71,19 +71,17 @@ class TakeDialog(QDialog):
         )
         self._found = FindingLine("taken")
         self._bar = JobBar()
-        self._start = button("startCameras", tr("Show"))
+        self._start = button("startCameras", tr("&Show"))
         self._take = main_button("takeImage", tr("Take"))
-        self._take.setShortcut(Qt.Key.Key_Space)
-        self._take.setToolTip(tr("Space bar"))
         self._by_itself = with_name(
-            QCheckBox(tr("Automatically")),
+            QCheckBox(tr("&Automatically")),
             "byItself",
             help_text=tr(
                 "Take an image whenever the board is at rest, sharp, and at a position not covered "
                 "by earlier images."
             ),
         )
-        self._close = button("close", tr("Close"))
+        self._close = button("close", tr("&Close"))
         self._search = LatestJob(self._keep_if_new, self)
         self._search.answered.connect(self._on_searched)
         self._search.failed.connect(self._show_failure)
@@ -174,7 +172,8 @@ class TakeDialog(QDialog):
     def _show_failure(self, why: str) -> None:
         self._stop_search()
         self._cameras.stop()
-        self._found.show_finding(Finding("", Health.BROKEN, why))
+        advice = tr("press Show to open the cameras again")
+        self._found.show_finding(Finding("", Health.BROKEN, why, advice))
 
     def _show_taken(self, views: list[BoardImage]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)
@@ -189,14 +188,8 @@ class TakeDialog(QDialog):
         self._take.setEnabled(self.shown_images is not None and not self._bar.is_busy)
 
     def _lay_out(self) -> None:
-        foot = hbox(
-            self._start,
-            self._take,
-            self._by_itself,
-            (self._bar, 1),
-            self._close,
-            spacing=SPACING_PX,
-        )
+        others = self._close, self._start, self._by_itself
+        foot = action_strip(self._take, *others, bar=self._bar, keys="Space")
         vbox(
             (self._cameras, 1),
             self._found,

@@ -21,7 +21,7 @@ from handcal.rig_types import RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.fields import MainButton, button, paragraph, with_name
+from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
@@ -81,7 +81,6 @@ _STEPS: dict[str, tuple[str, RigPart | None]] = {
 class RigPage(Protocol):
     """Interface of a page of the wizard; the strip with its main button stands below it."""
 
-    main: MainButton
     strip: QWidget
 
     def enter(self) -> None:
@@ -188,9 +187,6 @@ class RigWizard(QDialog):
         self._purpose.setText(_STEPS[title][0])
         self._stack.setCurrentIndex(step)
         self._strips.setCurrentIndex(step)
-        main = self._pages[step].main
-        main.setDefault(False)  # Qt forgets a default set before the button was in a dialog
-        main.setDefault(True)
         self._back.setEnabled(step > 0)
         self._next.setEnabled(step < len(_STEPS) - 1)
         self._pages[step].enter()

@@ -55,4 +55,5 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     assert {"panel-camera", "panel-results", "panel-fine-tune", "panel-session"} <= names
     assert {"start", "window-trial-doubt", "export-done", "review", "preferences"} <= names
     assert {"station", "sessions", "rig", "evaluate", "support", "manual"} <= names
-    assert {"keys", "rig-6", "evaluate-5"} <= names
+    assert {"keys", "rig-6", "evaluate-5", "camera-settings"} <= names
+    assert {"rig-take", "rig-acceptRig", "evaluate-track"} <= names

@@ -155,6 +155,14 @@ def test_captures_are_taken_one_after_the_other(
     assert not technician.camera.is_open
 
 
+def test_it_fits_a_small_screen(qtbot: QtBot, tmp_path: Path) -> None:
+    dialog = CaptureDialog(CubeEntries(captures=str(tmp_path)), list_cameras=list)
+    qtbot.addWidget(dialog)
+    assert dialog.minimumSizeHint().width() <= 960
+    assert dialog.minimumSizeHint().height() <= 500
+    dialog.reject()
+
+
 def test_what_is_taken_can_be_taken_again(
     make: Callable[[CubeEntries], Technician], entries: CubeEntries
 ) -> None:
@@ -218,7 +226,8 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
     technician = make(entries)
     technician.start()
     technician.camera.failure = CameraError("it was unplugged")
-    technician.wait(lambda: technician.said == "It was unplugged.")
+    told = "It was unplugged. Press Show to open the camera again."
+    technician.wait(lambda: technician.said == told)
     assert not technician.button.isEnabled()
     technician.start()
 

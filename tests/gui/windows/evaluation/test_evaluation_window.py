@@ -10,13 +10,23 @@ from typing import Any, TypeVar
 import pytest
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, QTabWidget, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QTableWidget,
+    QTabWidget,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.lab.study.run import run_study
 from handcal_gui.evaluation_entries import EvaluationEntries
+from handcal_gui.widgets.fields import MainButton
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage
+from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 
 Kind = TypeVar("Kind", bound=QWidget)
@@ -169,3 +179,22 @@ def test_closing_cancels_and_remembers(
     assert not student.page.is_busy
     assert student.remembered[-1].noise.seed == 7
     assert 3 <= len(list(chunks.glob("*.json"))) < 10
+
+
+def test_each_page_has_one_main_button_and_keys(qtbot: QtBot) -> None:
+    window = EvaluationWindow(make_specs(), EvaluationEntries())
+    qtbot.addWidget(window)
+    window.resize(960, 510)
+    window.show()
+    for name in make_specs():
+        window.show_page(name)
+        QApplication.processEvents()
+        assert window.height() == 510
+        (main,) = (one for one in window.findChildren(MainButton) if one.isVisible())
+        buttons = [one for one in window.findChildren(QPushButton) if one.isVisible()]
+        assert [one for one in buttons if one.isDefault()] == [main]
+        assert main.mapTo(window, main.rect().center()).y() > 440, "at the bottom"
+        letters = [one.text().partition("&")[2][:1] for one in buttons if "&" in one.text()]
+        assert len(set(letters)) == len(letters)
+        assert [one for one in window.findChildren(QLabel, "mainKey") if one.isVisible()]
+    window.stop()

@@ -76,6 +76,9 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     assert isinstance(view, ImageView)
     assert view.has_image
     assert view.message == ""
+    doing = dialog.findChild(QLabel, "doing")
+    assert isinstance(doing, QLabel)
+    assert doing.text() == "Tracking…"
     stop.click()
     qtbot.waitUntil(start.isEnabled, timeout=60_000)
     assert view.message == "Stopped"

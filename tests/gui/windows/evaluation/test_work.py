@@ -53,6 +53,20 @@ def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseStudySet
         numbers.work.readiness(replace(entries, output=""))
 
 
+def test_nothing_is_ready_whose_results_cannot_be_written(
+    numbers: Any, entries: NoiseStudySettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = FileEvaluation(lambda _: "", lambda *_: UserTestRun(None, None, ()))  # type: ignore[arg-type]
+    (tmp_path / "file").touch()
+    for work, given in ((numbers.work, entries), (data, UserEntries())):
+        with pytest.raises(FileError, match="is a file: choose a folder"):
+            work.readiness(replace(given, output=str(tmp_path / "file" / "results")))
+    monkeypatch.setattr("os.access", lambda *_: False)
+    for work, given in ((numbers.work, entries), (data, replace(UserEntries(), output="new"))):
+        with pytest.raises(FileError, match="cannot write to"):
+            work.readiness(given)
+
+
 def test_given_data_never_goes_into_a_study(numbers: Any, entries: NoiseStudySettings) -> None:
     def order(given: UserEntries, progress: Progress) -> UserTestRun:
         progress.at(0.7, "Reading")

@@ -67,6 +67,19 @@ def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> Non
     taking.reject()
 
 
+def test_what_is_missing_is_in_sight(
+    qtbot: QtBot, dialog: AcceptDialog, project: RigProject, tmp_path: Path
+) -> None:
+    found = part(dialog, QLabel, "acceptedFound")
+    assert "5 or more of the board" in found.text()
+    project.enter(viewpoint=ViewpointEntries(intrinsics=str(tmp_path / "none.json")))
+    other = AcceptDialog(project)
+    qtbot.addWidget(other)
+    assert "intrinsics are missing" in part(other, QLabel, "acceptedFound").text()
+    assert not part(other, QPushButton, "runAcceptance").isEnabled()
+    other.reject()
+
+
 def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> None:
     folder = project.folder.path / "accept"
     write_acceptance(folder, project.rig, 6, np.random.default_rng(1), samples=1)

@@ -172,6 +172,8 @@ def test_another_board_is_searched_for_again(qtbot: QtBot, wizard: RigWizard) ->
     wizard.show_step(VIEWPOINT)
     wait(qtbot, wizard)
     assert all(shot.problem for shot in page.panels[0].shots)
+    assert "found in no image" in child(wizard, QLabel, "verdictFound").text()
+    assert child(wizard, QTreeWidget, "shots").topLevelItemCount() == 8
 
 
 def test_the_grid_is_saved(

@@ -97,7 +97,8 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
 ) -> None:
     start(qtbot, dialog)
     cameras["1"].failure = CameraError("it was unplugged")
-    qtbot.waitUntil(lambda: said(dialog) == "It was unplugged.")
+    told = "It was unplugged. Press Show to open the cameras again."
+    qtbot.waitUntil(lambda: said(dialog) == told)
     assert not button(dialog, "takeImage").isEnabled()
     start(qtbot, dialog)
 
