@@ -436,6 +436,14 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>nothing was exported; the sessions and earlier exports are unchanged</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>see the reasons below, then go back to choose another folder or try again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>file</source>
         <translation type="unfinished"></translation>
     </message>

@@ -124,16 +124,19 @@ class CompareTab(QWidget):
 
     def _set_busy(self, is_busy: bool) -> None:
         self._progress.setVisible(is_busy)
-        self._cancel.setEnabled(is_busy)
-        self._compare.setEnabled(not is_busy)
+        has_focus = self._compare.hasFocus() or self._cancel.hasFocus()
+        for one, is_offered in ((self._cancel, is_busy), (self._compare, not is_busy)):
+            one.setVisible(is_offered)  # in the same place
+            one.setEnabled(is_offered)
+            if is_offered and has_focus:
+                one.setFocus()
         self._methods.setEnabled(not is_busy)
 
     def _lay_out(self) -> None:
         label = QLabel(tr("Compare &with"))
         label.setBuddy(self._methods)
-        row = hbox(label, (self._methods, 1), self._compare, spacing=SPACING_PX)
-        busy_row = hbox((self._progress, 1), self._cancel, spacing=SPACING_PX)
-        vbox(row, busy_row, self._status, (self.table, 1), on=self, spacing=SPACING_PX)
+        row = hbox(label, (self._methods, 1), self._compare, self._cancel, spacing=SPACING_PX)
+        vbox(row, self._progress, self._status, (self.table, 1), on=self, spacing=SPACING_PX)
 
 
 def _keep_space(widget: QWidget) -> None:
