@@ -150,7 +150,7 @@ def test_the_panels_of_a_stored_session_have_the_room_that_its_page_leaves(
         QApplication.processEvents()
     bar = tabs.tabBar()
     assert all(bar.tabRect(i).width() >= bar.tabSizeHint(i).width() for i in range(bar.count()))
-    if text_scale == 1.0:
+    if text_scale == 1.0:  # larger texts make all columns as wide as the window
         assert compare.table.horizontalScrollBar().maximum() == 0
 
 
