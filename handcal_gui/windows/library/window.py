@@ -55,7 +55,7 @@ from handcal_gui.windows.library.tasks import (
     repair_beside,
     restore_sessions,
 )
-from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
+from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of, trend_text
 
 _TREND_PX = 20 * SPACING_PX
 _TASK = tr(
@@ -225,7 +225,7 @@ class LibraryWindow(QDialog):
         self._trend.setVisible(len(found) > 1)
         text = tr("Select a wearer with several calibrations to see how the errors changed.")
         if len(found) > 1:
-            text = tr("{}: {} calibrations").format(wearer, len(found))
+            text = trend_text(wearer, len(found))
             self._trend.show_calibrations(found)
         self._trend_title.setText(text)
 
