@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
-from typing import TypeVar, cast
+from typing import TypeAlias, TypeVar, cast
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QValidator
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QComboBox,
@@ -22,11 +22,13 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.theme import SPACING_PX, scale_font, set_style
 from handcal_gui.widgets.layouts import hbox
+from handcal_gui.widgets.numbers import MINUS, with_minus
 
 Field = TypeVar("Field", bound=QWidget)
 Spin = TypeVar("Spin", bound=QAbstractSpinBox)
 Option = TypeVar("Option", bound=str)
 
+_Validated: TypeAlias = tuple[QValidator.State, str, int]
 _FIXED = QSizePolicy.Policy.Fixed
 
 
@@ -68,6 +70,23 @@ def choice(name: str, label: str, options: Mapping[Option, str], help_text: str 
     field.setMinimumWidth(20 * SPACING_PX)
     _CalmWheel(field)
     return field
+
+
+class SignedField(QDoubleSpinBox):
+    """A field for a number that may be negative: it shows a minus, and reads a hyphen too."""
+
+    def textFromValue(self, value: float) -> str:
+        """Return a number as it is shown."""
+        return with_minus(super().textFromValue(value))
+
+    def valueFromText(self, text: str) -> float:
+        """Return the number that was typed."""
+        return super().valueFromText(text.replace(MINUS, "-"))
+
+    def validate(self, text: str, place: int) -> _Validated:
+        """Return whether a text is a number, or may become one."""
+        state, _, place = super().validate(text.replace(MINUS, "-"), place)
+        return state, text, place
 
 
 def button(name: str, text: str = "", label: str = "", help_text: str = "") -> QPushButton:

@@ -3892,6 +3892,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}: {} calibrations, and the error that each left, measured in the wearer&apos;s verification or only expected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Noise study</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4193,10 +4197,6 @@ one turns out.</source>
     </message>
     <message>
         <source>{} (Ctrl+Z)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{}: {} calibrations</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -19,6 +19,7 @@ from handcal.display import DrawnMove
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import SignedField
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.numbers import signed
 
@@ -111,7 +112,7 @@ class EyeShiftEditor(QWidget):
         return super().eventFilter(watched, event)
 
     def _make_field(self, title: str, axis: int, limit_mm: float) -> QDoubleSpinBox:
-        field = QDoubleSpinBox()
+        field = SignedField()
         field.setObjectName(f"phi{axis + 1}")
         field.setAccessibleName(tr("{} φ{} in millimetres").format(title, axis + 1))
         field.setToolTip(_tooltip(axis))

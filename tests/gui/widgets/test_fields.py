@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.widgets.fields import choice, number, whole_number
+from handcal_gui.widgets.fields import SignedField, choice, number, whole_number
 
 Field = QComboBox | QDoubleSpinBox | QSpinBox
 
@@ -61,3 +62,15 @@ def test_a_number_has_its_unit_on_the_right(qtbot: QtBot) -> None:
         assert field.alignment() & Qt.AlignmentFlag.AlignRight
     assert fine.text() == f"{fine.locale().toString(1.23, 'f', 2)} m"
     assert coarse.text() == f"{coarse.locale().toString(1.2, 'f', 1)} °"
+
+
+@pytest.mark.parametrize("typed", ["-2.5", "−2.5"])
+def test_a_minus_is_shown_and_a_hyphen_read_too(qtbot: QtBot, typed: str) -> None:
+    field = SignedField(minimum=-9.0, maximum=9.0)
+    qtbot.addWidget(field)
+    field.selectAll()
+    field.lineEdit().insert(typed)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert (field.value(), field.text()) == (-2.5, "−2.50")
+    field.stepBy(-1)
+    assert field.text() == "−3.50"
