@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
-from typing import TypeAlias, TypeVar, cast
+from typing import TypeVar, cast
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QAction, QValidator
@@ -28,7 +28,6 @@ Field = TypeVar("Field", bound=QWidget)
 Spin = TypeVar("Spin", bound=QAbstractSpinBox)
 Option = TypeVar("Option", bound=str)
 
-_Validated: TypeAlias = tuple[QValidator.State, str, int]
 _FIXED = QSizePolicy.Policy.Fixed
 
 
@@ -83,7 +82,7 @@ class SignedField(QDoubleSpinBox):
         """Return the number that was typed."""
         return super().valueFromText(text.replace(MINUS, "-"))
 
-    def validate(self, text: str, place: int) -> _Validated:
+    def validate(self, text: str, place: int) -> tuple[QValidator.State, str, int]:
         """Return whether a text is a number, or may become one."""
         state, _, place = super().validate(text.replace(MINUS, "-"), place)
         return state, text, place
