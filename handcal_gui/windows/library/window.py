@@ -37,14 +37,11 @@ from handcal_gui.widgets.fields import (
     with_name,
 )
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import NOTHING
 from handcal_gui.widgets.session_rows import RESUME_HELP
-from handcal_gui.windows.library.sessions_model import (
-    FILTERS,
-    SessionsModel,
-)
+from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
     Contents,
@@ -294,6 +291,7 @@ class LibraryWindow(QDialog):
     def _start(self, work: Work) -> None:
         if not self._jobs.is_busy:
             self._table.setFocus()  # or the search gets it from a button that is disabled
+            self._say("")
             self._jobs.run(tr("Starting"), work, self._end)
 
     def _end(self, said: object) -> None:
@@ -339,6 +337,7 @@ class LibraryWindow(QDialog):
         self._table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._undo = button("restoreSession", tr("Re&store"))
         self._undo.setAutoDefault(False)
+        keep_space(self._undo)
         self._undo.clicked.connect(self._undo_last)
         add_action(self, tr("Search"), "Ctrl+F", self._begin_search)
         add_action(self, tr("Undo the last change"), "Ctrl+Z", self._undo.click)
@@ -353,6 +352,7 @@ class LibraryWindow(QDialog):
 
     def _lay_out(self) -> None:
         self._change_text = ElidedLabel()
+        self._change_text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         below = QWidget()
         vbox(self._trend_title, (self._trend, 1), on=below, margins=0, spacing=0)
         halves = QSplitter(Qt.Orientation.Vertical)
@@ -375,12 +375,13 @@ class LibraryWindow(QDialog):
         )
         # Enter in the search opens the first session that it finds.
         opening = _pressed_for(self._open, main_button("openSession", self._open.text()))
-        actions = hbox((self._change_text, 1), self._undo, *buttons, opening, spacing=SPACING_PX)
+        counts = hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX)
+        actions = hbox(1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
             top,
             (halves, 1),
-            self._count,
+            counts,
             self._said,
             actions,
             on=self,
