@@ -98,7 +98,7 @@ class LibraryWindow(QDialog):
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
         self._table = SessionsTable(self._sessions)
-        self._count = paragraph("count")
+        self._count = paragraph("count", tr("Reading {}…").format(folder))
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(_TREND_PX)
         self._trend_title = paragraph("trendTitle")
@@ -194,11 +194,9 @@ class LibraryWindow(QDialog):
             else tr("{} of {} sessions").format(shown, total)
         )
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
-        shown_count = tr("{} in {}{}").format(count, self._folder, selected)
         if self._is_read:
             self._table.show_reason()
-        reading = tr("Reading {}…").format(self._folder)
-        self._count.setText(shown_count if self._is_read else reading)
+            self._count.setText(tr("{} in {}{}").format(count, self._folder, selected))
         self._show_trend(chosen[0].wearer if chosen else "")
 
     def _refresh_undo(self) -> None:
