@@ -141,8 +141,9 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
     )
     if page_px is not None:
         has_right = window.dockWidgetArea(docks["results"]) is _RIGHT
-        left = max((width - page_px) * (45 if has_right else 100) // 100, 1)
-        right = max(width - page_px - left, 1)
+        rest_px = max(width - page_px, 2)
+        left = rest_px * 45 // 100 if has_right else rest_px
+        right = rest_px - left if has_right else rest_px  # or all docks are tabs of one column
     window.resizeDocks([docks["camera"], docks["results"]], [left, right], across)
     column = [docks[name] for name in _LEFT_COLUMN]
     window.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)

@@ -52,6 +52,8 @@ Arrangement = Literal["panels", "station"]
 _LAYOUT_VERSION = 2
 _SMALL = 100.0, 57.5
 """Width and height below which all docks of a window are tabs, in sizes of the font."""
+_REVIEW_PERCENT = 36
+"""Of a large window's width, for the page of a stored session with its residual map."""
 _MENUS = {
     "File": tr("&File"),
     "Edit": tr("Edi&t"),  # Alt+E adds the left eye, or exports
@@ -173,7 +175,8 @@ class MainWindow(QMainWindow):
             dock.toggleViewAction().setEnabled(belongs)
             self._go_to[name].setEnabled(belongs)
         if page not in self._layouts:
-            review_px = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
+            least_px = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
+            review_px = max(least_px, self.width() * _REVIEW_PERCENT // 100)
             share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
         self._leave_titles_to_tabs()

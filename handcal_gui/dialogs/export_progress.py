@@ -26,6 +26,8 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.numbers import pluralize
 
 _WHOLE = 1000
+_NOTHING = tr("nothing was exported; the sessions and earlier exports are unchanged")
+_NOTHING_ADVICE = tr("see the reasons below, then go back to choose another folder or try again")
 _UNCHANGED = tr("the session and earlier exports are unchanged")
 
 
@@ -38,6 +40,8 @@ class ExportProgress(QWidget):
         self._bar = with_name(QProgressBar(maximum=_WHOLE), "progress", tr("Progress"))
         self._end = FindingLine("exportEnd")
         self._files = with_name(QListWidget(), "files", tr("Files"))
+        self._files.setWordWrap(True)
+        self._files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._files.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -68,16 +72,17 @@ class ExportProgress(QWidget):
             self._files.addItem(item)
         self._files.addItems([str(path.relative_to(folder)) for path in made.files])
         self._files.show()
+        lost = pluralize(len(made.missing), tr("session"), tr("sessions"))
+        not_exported = tr("{} not exported, see below.").format(lost)
+        self._doing.setText(not_exported if made.missing else tr("Done."))
+        if not made.files:
+            self._show_end(Finding("", Health.BROKEN, _NOTHING, _NOTHING_ADVICE))
+            return
         count = tr("{} in {}").format(pluralize(len(made.files), tr("file"), tr("files")), folder)
-        if made.missing:
-            lost = pluralize(len(made.missing), tr("session"), tr("sessions"))
-            self._doing.setText(tr("{} not exported, see below.").format(lost))
-        else:
-            self._doing.setText(tr("Done."))
         url = QUrl.fromLocalFile(str(folder))
         self._show_end(
             Finding("", Health.LIMITED if made.missing else Health.GOOD, count),
-            tr("&Open folder") if made.files else "",
+            tr("&Open folder"),
             lambda: QDesktopServices.openUrl(url),
         )
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QCursor, QGuiApplication
 from PySide6.QtWidgets import QToolTip, QWidget
 
+from handcal_gui.widgets.fields import plain_tooltip
+
 _SHOWN_MS = 3000
 
 
@@ -18,5 +20,7 @@ def show_briefly(source: QWidget, said: str) -> None:
     """Say something beside a widget for a moment, and to a screen reader; nothing moves."""
     pointer = source.mapFromGlobal(QCursor.pos())
     place = pointer if source.rect().contains(pointer) else source.rect().center()
-    QToolTip.showText(source.mapToGlobal(place), said, source, source.rect(), _SHOWN_MS)
+    QToolTip.showText(
+        source.mapToGlobal(place), plain_tooltip(said), source, source.rect(), _SHOWN_MS
+    )
     QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(source, said))

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.theme import SPACING_PX, scale_font, set_style
 from handcal_gui.widgets.layouts import hbox
+from handcal_gui.widgets.numbers import MINUS, with_minus
 
 Field = TypeVar("Field", bound=QWidget)
 Spin = TypeVar("Spin", bound=QAbstractSpinBox)
@@ -45,18 +46,29 @@ def plain_tooltip(text: str) -> str:
 
 
 class NumberField(QDoubleSpinBox):
-    """A field for a number, with a point as in every other number shown; a comma becomes one.
+    """A field for a number, with a point and a minus as in every other number shown.
 
-    In the system's locale a comma, or a point, is a separator of thousands: 0,5 was read as 5.
+    A comma becomes a point, and a hyphen is read as a minus. In the system's locale a comma, or a
+    point, is a separator of thousands: 0,5 was read as 5.
     """
 
     def __init__(self, decimals: int) -> None:
         super().__init__(decimals=decimals)
         self.setLocale(QLocale.c())
 
-    def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
-        """Read a comma as a point."""
-        return super().validate(text.replace(",", "."), position)
+    def textFromValue(self, value: float) -> str:
+        """Return a number as it is shown."""
+        return with_minus(super().textFromValue(value))
+
+    def valueFromText(self, text: str) -> float:
+        """Return the number that was typed."""
+        return super().valueFromText(text.replace(MINUS, "-"))
+
+    def validate(self, text: str, place: int) -> tuple[QValidator.State, str, int]:
+        """Return whether a text is a number, or may become one."""
+        text = text.replace(",", ".")
+        state, _, place = super().validate(text.replace(MINUS, "-"), place)
+        return state, text, place
 
 
 class WholeNumberField(QSpinBox):
@@ -66,11 +78,11 @@ class WholeNumberField(QSpinBox):
         super().__init__(minimum=low, maximum=high)
         self.setLocale(QLocale.c())
 
-    def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
+    def validate(self, text: str, place: int) -> tuple[QValidator.State, str, int]:
         """Refuse a point or a comma."""
         if {".", ","} & set(text.removesuffix(self.suffix())):
-            return QValidator.State.Invalid, text, position
-        return super().validate(text, position)
+            return QValidator.State.Invalid, text, place
+        return super().validate(text, place)
 
 
 def number(

@@ -59,6 +59,13 @@ def scrollable(content: QWidget) -> QScrollArea:
     return area
 
 
+def keep_space(widget: QWidget) -> None:
+    """Keep a widget's space while it is hidden."""
+    policy = widget.sizePolicy()
+    policy.setRetainSizeWhenHidden(True)
+    widget.setSizePolicy(policy)
+
+
 def _fill(box: _Box, items: tuple[Item, ...], margins: Margins, spacing: int | None) -> _Box:
     if margins is not None:
         sides = 4 * (margins,) if isinstance(margins, int) else margins

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.numbers import with_minus
 
 pg.setConfigOptions(antialias=True)
 
@@ -45,7 +46,8 @@ class Plot(QWidget):
         self.setAccessibleName(label)
         self._lines: list[tuple[pg.PlotDataItem, str, bool]] = []
         self._texts: list[pg.TextItem] = []
-        self._view = pg.PlotWidget(enableMenu=False)
+        axes = {side: _Axis(side) for side in ("bottom", "left")}
+        self._view = pg.PlotWidget(enableMenu=False, axisItems=axes)
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._view.setMinimumSize(100, 44)
         self.item = self._view.getPlotItem()
@@ -136,6 +138,13 @@ class Plot(QWidget):
             written.setColor(text)
         for line in self._lines:
             _color_line(*line)
+
+
+class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
+    """An axis whose negative numbers have a minus, not a hyphen."""
+
+    def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:
+        return [with_minus(text) for text in super().tickStrings(values, scale, spacing)]
 
 
 def _color_line(line: pg.PlotDataItem, role: str, dashed: bool) -> None:

@@ -11,7 +11,7 @@ from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.layouts import hbox
+from handcal_gui.widgets.layouts import hbox, keep_space
 from handcal_gui.widgets.session_rows import Deletion
 
 _TEXTS = {"alignment": tr("Alignment {} deleted."), "trial": tr("Trial {} deleted.")}
@@ -48,9 +48,7 @@ class UndoStrip(QWidget):
         self._undo.setObjectName("undo")
         self._button = QToolButton()
         self._button.setDefaultAction(self._undo)
-        policy = self._button.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self._button.setSizePolicy(policy)
+        keep_space(self._button)
         hbox(self._text, self._button, on=self, margins=0, spacing=SPACING_PX)
         self.show_deletions([])
 

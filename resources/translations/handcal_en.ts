@@ -412,6 +412,14 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>nothing was exported; the sessions and earlier exports are unchanged</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>see the reasons below, then go back to choose another folder or try again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>the session and earlier exports are unchanged</source>
         <translation type="unfinished"></translation>
     </message>
@@ -432,10 +440,6 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Open folder</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>{} in {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -445,6 +449,10 @@
     </message>
     <message>
         <source>files</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Open folder</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4026,6 +4034,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}: {} calibrations, and the error that each left, measured in the wearer&apos;s verification or only expected</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Noise study</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4298,10 +4310,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>{} of {} sessions</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4318,6 +4326,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Name before: {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4327,10 +4339,6 @@ one turns out.</source>
     </message>
     <message>
         <source>{} (Ctrl+Z)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{}: {} calibrations</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

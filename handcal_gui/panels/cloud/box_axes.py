@@ -13,6 +13,7 @@ from PySide6.QtGui import QColor, QPainter, QPen
 from handcal.types import Float64
 from handcal_gui.panels.cloud.orbit import Orbit
 from handcal_gui.theme import SPACING_PX, colors
+from handcal_gui.widgets.numbers import with_minus
 
 NAMES = ("right", "down", "away")
 _GRID_MM = 50.0
@@ -150,7 +151,7 @@ def _draw_ticks(
     ticks_mm = _ticks_mm(box, axis, step_mm)
     points = np.tile(end, (len(ticks_mm) + 1, 1))
     points[:-1, axis] = ticks_mm
-    labels = [*map(str, ticks_mm), NAMES[axis]]
+    labels = [*(with_minus(str(tick_mm)) for tick_mm in ticks_mm), NAMES[axis]]
     for (x, y, _), label in zip(orbit.project(points), labels, strict=True):
         _write_beside(painter, np.array([x, y]), outward, label)
 

@@ -19,7 +19,7 @@ from handcal.rig_types import Rig
 from handcal.types import METHODS, Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.result_rows import comparison_rows
 
@@ -53,7 +53,7 @@ class CompareTab(QWidget):
         self._results: Results | None = None
         self._rig: Rig | None = None
         self.table = NumberTable("comparison-of-methods", tr("Comparison of methods"))
-        _keep_space(self.table)
+        keep_space(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")
         self._methods.setAccessibleName(tr("Compare with method"))
@@ -67,7 +67,7 @@ class CompareTab(QWidget):
         self._progress = QProgressBar()
         self._progress.setRange(0, 0)
         self._progress.setTextVisible(False)
-        _keep_space(self._progress)
+        keep_space(self._progress)
         self._progress.setMaximumHeight(SPACING_PX)
         self._status = QLabel()
         self._status.setObjectName("comparison-status")
@@ -124,20 +124,16 @@ class CompareTab(QWidget):
 
     def _set_busy(self, is_busy: bool) -> None:
         self._progress.setVisible(is_busy)
-        self._cancel.setEnabled(is_busy)
-        self._compare.setEnabled(not is_busy)
+        has_focus = self._compare.hasFocus() or self._cancel.hasFocus()
+        for one, is_offered in ((self._cancel, is_busy), (self._compare, not is_busy)):
+            one.setVisible(is_offered)  # in the same place
+            one.setEnabled(is_offered)
+            if is_offered and has_focus:
+                one.setFocus()
         self._methods.setEnabled(not is_busy)
 
     def _lay_out(self) -> None:
         label = QLabel(tr("Compare &with"))
         label.setBuddy(self._methods)
-        row = hbox(label, (self._methods, 1), self._compare, spacing=SPACING_PX)
-        busy_row = hbox((self._progress, 1), self._cancel, spacing=SPACING_PX)
-        vbox(row, busy_row, self._status, (self.table, 1), on=self, spacing=SPACING_PX)
-
-
-def _keep_space(widget: QWidget) -> None:
-    """Keep a widget's space while it is hidden."""
-    policy = widget.sizePolicy()
-    policy.setRetainSizeWhenHidden(True)
-    widget.setSizePolicy(policy)
+        row = hbox(label, (self._methods, 1), self._compare, self._cancel, spacing=SPACING_PX)
+        vbox(row, self._progress, self._status, (self.table, 1), on=self, spacing=SPACING_PX)

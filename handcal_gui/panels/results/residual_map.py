@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from handcal.types import Float64
@@ -13,6 +14,8 @@ from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.residual_scale import LARGEST_MM, OUTLIER, residual_ramp
 
 _SHADES = 32
+_POINTS_ACROSS = 130
+"""A hand has about as many points across a large map, beside one another."""
 
 
 class ResidualMap(Plot):
@@ -56,6 +59,13 @@ class ResidualMap(Plot):
         """
         self._shown = places_m, residuals_m
         self._redraw()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw the points as large as the map has room for."""
+        super().resizeEvent(event)
+        least_px = min(self.width(), self.height()) // _POINTS_ACROSS
+        for scatter, smallest_px in zip(self.scatters, (4, 5), strict=True):
+            scatter.setSize(max(smallest_px, least_px))
 
     def _redraw(self) -> None:
         places_m, residuals_m = self._shown

@@ -66,6 +66,14 @@ class TrendPlot(Plot):
         self.item.getAxis("bottom").setTicks(ticks if len(entries) <= _MOST_TICKS else None)
 
 
+def trend_text(wearer: str, count: int) -> str:
+    """Return what the plot shows, in a sentence."""
+    return tr(
+        "{}: {} calibrations, and the error that each left, measured in the wearer's verification "
+        "or only expected"
+    ).format(wearer, count)
+
+
 def calibrations_of(wearer: str, entries: Sequence[LibraryEntry]) -> list[LibraryEntry]:
     """Return the solved sessions of a wearer, the oldest first; none of a wearer without a name.
 

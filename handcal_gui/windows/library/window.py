@@ -37,14 +37,11 @@ from handcal_gui.widgets.fields import (
     with_name,
 )
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import NOTHING
 from handcal_gui.widgets.session_rows import RESUME_HELP
-from handcal_gui.windows.library.sessions_model import (
-    FILTERS,
-    SessionsModel,
-)
+from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
     Contents,
@@ -55,7 +52,7 @@ from handcal_gui.windows.library.tasks import (
     repair_beside,
     restore_sessions,
 )
-from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
+from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of, trend_text
 
 _TREND_PX = 20 * SPACING_PX
 _TASK = tr(
@@ -101,7 +98,7 @@ class LibraryWindow(QDialog):
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
         self._table = SessionsTable(self._sessions)
-        self._count = paragraph("count")
+        self._count = paragraph("count", tr("Reading {}…").format(folder))
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(_TREND_PX)
         self._trend_title = paragraph("trendTitle")
@@ -197,11 +194,9 @@ class LibraryWindow(QDialog):
             else tr("{} of {} sessions").format(shown, total)
         )
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
-        shown_count = tr("{} in {}{}").format(count, self._folder, selected)
         if self._is_read:
             self._table.show_reason()
-        reading = tr("Reading {}…").format(self._folder)
-        self._count.setText(shown_count if self._is_read else reading)
+            self._count.setText(tr("{} in {}{}").format(count, self._folder, selected))
         self._show_trend(chosen[0].wearer if chosen else "")
 
     def _refresh_undo(self) -> None:
@@ -225,7 +220,7 @@ class LibraryWindow(QDialog):
         self._trend.setVisible(len(found) > 1)
         text = tr("Select a wearer with several calibrations to see how the errors changed.")
         if len(found) > 1:
-            text = tr("{}: {} calibrations").format(wearer, len(found))
+            text = trend_text(wearer, len(found))
             self._trend.show_calibrations(found)
         self._trend_title.setText(text)
 
@@ -294,6 +289,7 @@ class LibraryWindow(QDialog):
     def _start(self, work: Work) -> None:
         if not self._jobs.is_busy:
             self._table.setFocus()  # or the search gets it from a button that is disabled
+            self._say("")
             self._jobs.run(tr("Starting"), work, self._end)
 
     def _end(self, said: object) -> None:
@@ -339,6 +335,7 @@ class LibraryWindow(QDialog):
         self._table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._undo = button("restoreSession", tr("Re&store"))
         self._undo.setAutoDefault(False)
+        keep_space(self._undo)
         self._undo.clicked.connect(self._undo_last)
         add_action(self, tr("Search"), "Ctrl+F", self._begin_search)
         add_action(self, tr("Undo the last change"), "Ctrl+Z", self._undo.click)
@@ -353,6 +350,7 @@ class LibraryWindow(QDialog):
 
     def _lay_out(self) -> None:
         self._change_text = ElidedLabel()
+        self._change_text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         below = QWidget()
         vbox(self._trend_title, (self._trend, 1), on=below, margins=0, spacing=0)
         halves = QSplitter(Qt.Orientation.Vertical)
@@ -375,12 +373,13 @@ class LibraryWindow(QDialog):
         )
         # Enter in the search opens the first session that it finds.
         opening = _pressed_for(self._open, main_button("openSession", self._open.text()))
-        actions = hbox((self._change_text, 1), self._undo, *buttons, opening, spacing=SPACING_PX)
+        counts = hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX)
+        actions = hbox(1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
             top,
             (halves, 1),
-            self._count,
+            counts,
             self._said,
             actions,
             on=self,

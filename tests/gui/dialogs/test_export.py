@@ -37,6 +37,7 @@ class Exporter:
         self.doing = "Report (PDF)"
         self.failure = ""
         self.missing: tuple[str, ...] = ()
+        self.names: tuple[str, ...] = ("a.csv", "clouds/b.ply")
         self.folders: list[Path] = []
         self.settings: list[ExportSettings] = []
 
@@ -48,7 +49,7 @@ class Exporter:
             progress.check()
         if self.failure:
             raise FileError(self.failure)
-        return Exported((folder / "a.csv", folder / "clouds" / "b.ply"), self.missing)
+        return Exported(tuple(folder / name for name in self.names), self.missing)
 
 
 @pytest.fixture
@@ -169,6 +170,20 @@ def test_sessions_that_were_not_exported_are_named_above_the_files(
     assert isinstance(bar, QProgressBar)
     assert bar.isHidden()  # it would stay at the last share
     assert files(dialog)[:2] == ["bea: it has no alignments", "a.csv"]
+
+
+def test_if_no_session_was_exported_it_says_what_to_do(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
+) -> None:
+    exporter.names, exporter.missing = (), (f"bea: cannot write {90 * 'a '}",)
+    exporter.may_end.set()
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: text(dialog, "exportEndFound").startswith("Nothing was exported;"))
+    assert "choose another folder" in text(dialog, "exportEndFound")
+    assert press(dialog, "exportEndFix").isHidden()
+    listed = dialog.findChild(QListWidget, "files")
+    assert isinstance(listed, QListWidget)
+    assert listed.visualItemRect(listed.item(0)).width() <= listed.viewport().width()
 
 
 def test_a_long_name_neither_widens_the_dialog_nor_is_markup(

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.widgets.fields import choice, number, whole_number
+from handcal_gui.widgets.fields import NumberField, choice, number, whole_number
 
 Field = QComboBox | QDoubleSpinBox | QSpinBox
 
@@ -90,3 +90,16 @@ def test_a_number_is_the_same_in_every_language(qtbot: QtBot, typed: str) -> Non
     field.lineEdit().paste()
     assert field.value() == 12.5
     assert (whole.value(), whole.text()) == (125, "125")  # the separator is not taken
+
+
+@pytest.mark.parametrize("typed", ["-2.5", "−2.5"])
+def test_a_minus_is_shown_and_a_hyphen_read_too(qtbot: QtBot, typed: str) -> None:
+    field = NumberField(2)
+    qtbot.addWidget(field)
+    field.setRange(-9.0, 9.0)
+    field.selectAll()
+    field.lineEdit().insert(typed)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert (field.value(), field.text()) == (-2.5, "−2.50")
+    field.stepBy(-1)
+    assert field.text() == "−3.50"

@@ -99,3 +99,7 @@ def test_no_menu_of_pyqtgraph_outlives_a_plot() -> None:
         assert set(QApplication.topLevelWidgets()) <= before
     finally:
         gc.enable()
+
+
+def test_negative_numbers_on_an_axis_have_a_minus(plot: Plot) -> None:
+    assert plot.item.getAxis("left").tickStrings([-1.5, 0.0], 1.0, 0.5) == ["−1.5", "0"]

@@ -8,7 +8,7 @@ from typing import Literal
 
 import pytest
 from PySide6.QtCore import QObject, QPoint, QRect
-from PySide6.QtWidgets import QApplication, QPushButton, QScrollArea
+from PySide6.QtWidgets import QApplication, QPushButton, QScrollArea, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
@@ -16,9 +16,11 @@ from handcal.session.session import SessionRecord
 from handcal.station.states import State
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.wizard.view import Action
+from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.program import Program
 from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.window import MainWindow
+from tests.gui.helpers import child
 from tests.gui.views import NUDGED, all_views
 from tests.gui.window.conftest import Maker, main_button, say, shown
 
@@ -131,6 +133,25 @@ def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
         for area in window.findChildren(QScrollArea):
             if area.isVisible():
                 assert scrolled_px(area) == [0, 0], page
+
+
+@EACH_TEXT
+def test_the_panels_of_a_stored_session_have_the_room_that_its_page_leaves(
+    program: Program, record: SessionRecord, results: Results, text_scale: float
+) -> None:
+    window, panel = program.window, program.window.panels.results
+    window.resize(*SMALL_PX[0])
+    panel.show_results(results, record.alignments, record.rig)
+    window.show_page("review")
+    panel.show_comparison(replace(results, method="paper"))
+    tabs, compare = child(panel, QTabWidget, "results-tabs"), child(panel, CompareTab)
+    tabs.setCurrentWidget(compare)
+    for _ in range(3):
+        QApplication.processEvents()
+    bar = tabs.tabBar()
+    assert all(bar.tabRect(i).width() >= bar.tabSizeHint(i).width() for i in range(bar.count()))
+    if text_scale == 1.0:  # larger texts make all columns as wide as the window
+        assert compare.table.horizontalScrollBar().maximum() == 0
 
 
 @pytest.mark.parametrize("text_scale", [1.25, 1.5], indirect=True)

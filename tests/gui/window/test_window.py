@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QRadioButton, QTabBar, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
+from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.window import MainWindow, Page
@@ -297,3 +298,12 @@ def test_the_eye_of_the_next_trial_is_fine_tuned(program: Program) -> None:
     assert right.isChecked()
     panels.trials.eye_changed.emit("left")
     assert left.isChecked()
+
+
+def test_the_page_of_a_stored_session_grows_with_the_window(window: MainWindow) -> None:
+    window.resize(3840, 2100)
+    window.show_page("review")
+    QApplication.processEvents()
+    page = window.findChild(ReviewPage)
+    assert isinstance(page, ReviewPage)
+    assert page.width() > 1200

@@ -126,7 +126,7 @@ def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
     assert plot.isHidden()
     choose(window, "Ada")
     assert not plot.isHidden()
-    assert text(window, "trendTitle") == "Ada: 2 calibrations"
+    assert text(window, "trendTitle").startswith("Ada: 2 calibrations, and the error")
     measured, expected = plot._measured["left"].getData(), plot._expected["left"].getData()
     assert list(measured[1][:1]) == [4.0]
     assert list(expected[1]) == [9.0, 8.0]
