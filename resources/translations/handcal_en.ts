@@ -3010,6 +3010,10 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>They are lost if the calibration ends now. Cancel, and make room for them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Guide</source>
         <translation type="unfinished"></translation>
     </message>
