@@ -6,6 +6,7 @@ import argparse
 import logging
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from logging.handlers import RotatingFileHandler
@@ -63,7 +64,7 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     except HandcalError as error:
         raise LaunchError(error, 1) from error
     sys.excepthook = lambda *error: _report_error(program, *error)
-    close_on_signals(program.window)
+    close_on_signals(program.window, program.end)
     if arguments.size:
         program.window.resize(arguments.size)
         program.window.show()
@@ -81,13 +82,13 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
         raise LaunchError(demonstration.complaint, 1)
 
 
-def close_on_signals(window: QWidget) -> None:
+def close_on_signals(window: QWidget, close: Callable[[], object]) -> None:
     """Have the signals that end a process close a window."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) != signal.SIG_IGN:  # as nohup has it
             # From the event loop, which may not run yet.
-            signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
+            signal.signal(number, lambda *_: QTimer.singleShot(0, close))
     awake = QTimer(window, interval=200)
     awake.timeout.connect(lambda: None)  # Python handles signals only while it runs
     awake.start()

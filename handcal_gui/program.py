@@ -8,6 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, Qt
 from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QMessageBox
 
 from handcal.errors import FileError
 from handcal.session.session import Session
@@ -37,6 +38,7 @@ from handcal_gui.preferences import CurrentPreferences, Preferences, Preferences
 from handcal_gui.separate_windows import SeparateWindows
 from handcal_gui.theme import use_theme
 from handcal_gui.translation import tr
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.window import MainWindow, Page
 from handcal_gui.windows.manual import Manual
 
@@ -112,12 +114,16 @@ class Program(QObject):
 
     def resume_session(self, path: Path) -> None:
         """Resume a session, at the station that was used last or chosen since."""
+        if not self._may_leave():
+            return
         self.start.keep_entries(self._current)
         settings = self.preferences.station
         self._run(lambda: Station(settings, resume=path, pairings=self._current.pairings))
 
     def begin_from(self, path: Path) -> None:
         """Begin a session from a stored one of the same wearer, whose φ is verified first."""
+        if not self._may_leave():
+            return
         station = self.preferences.station
         plan = replace(station.plan, name="recommended", is_automatic=True)
         settings = replace(station, plan=plan)
@@ -130,6 +136,8 @@ class Program(QObject):
 
     def open_session(self, path: Path) -> None:
         """Open a stored session for review."""
+        if not self._may_leave():
+            return
         self.start.keep_entries(self._current)
         self.live.stop()
         self.window.banner.clear()
@@ -150,6 +158,11 @@ class Program(QObject):
         self.start.set_opening(False)
         self.start.show_preferences(self.preferences)
         self.window.show_page("start")
+
+    def end(self) -> None:
+        """Close the window without asking, as nobody may be there to answer."""
+        self.window.may_close = lambda: True
+        self.window.close()
 
     def close(self) -> None:
         """Save the window's layout and end all running work; safe to call twice."""
@@ -182,9 +195,7 @@ class Program(QObject):
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
         self.live.export_requested.connect(lambda: self.windows.export())
-        self.live.next_wearer_requested.connect(self.show_start)
-        # What was said of the former wearer.
-        self.live.next_wearer_requested.connect(self.window.banner.clear)
+        self.live.next_wearer_requested.connect(self._show_next_wearer)
         self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.windows.export())
@@ -206,10 +217,11 @@ class Program(QObject):
         panels.link.connect_requested.connect(self.windows.connect_headset)
         self._current.not_saved.connect(self.window.banner.show_message)
         self.window.closing.connect(self.close)
+        self.window.may_close = self._may_leave
 
     def _make_menus(self) -> None:
         add = self.window.add_action
-        add("File", tr("&Next wearer"), "Ctrl+N", self.show_start)
+        add("File", tr("&Next wearer"), "Ctrl+N", self._show_next_wearer)
         add("File", tr("&Open session…"), "Ctrl+O", self.windows.browse)
         add("File", tr("&Sessions…"), "Ctrl+L", self.windows.show_library)
         export = add("File", tr("&Export…"), "Ctrl+E", self.windows.export)
@@ -261,6 +273,28 @@ class Program(QObject):
         self.live.start(open_station, chosen.plan, bridges=chosen.bridges, is_held=is_held)
         self.start.set_opening(True)
         self.window.show_page("start")
+
+    def _show_next_wearer(self) -> None:
+        if self._may_leave():
+            self.window.banner.clear()  # what was said of the former wearer
+            self.show_start()
+
+    def _may_leave(self) -> bool:
+        """Ask before a calibration ends whose newest data could not be written yet."""
+        snapshot = self.live.snapshot
+        if snapshot is None or not snapshot.not_stored:
+            return True
+        buttons = QMessageBox.StandardButton
+        answer = QMessageBox.warning(
+            self.window,
+            tr("Not saved yet"),
+            sentence(snapshot.not_stored)
+            + "\n\n"
+            + tr("They are lost if the calibration ends now. Cancel, and make room for them."),
+            buttons.Discard | buttons.Cancel,
+            buttons.Cancel,
+        )
+        return answer == buttons.Discard
 
     def _resume_reviewed(self) -> None:
         if self.review.record is not None:

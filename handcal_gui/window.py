@@ -84,6 +84,8 @@ class MainWindow(QMainWindow):
         The window is about to close.
     arrangement_changed : Signal(str)
         The user has chosen panels around the guide, or only the guide.
+    may_close : callable
+        Returns False to keep the window open.
     """
 
     closing = Signal()
@@ -95,6 +97,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setObjectName("mainWindow")
         self.show_wearer("")
+        self.may_close: Callable[[], bool] = lambda: True
         self.panels = panels
         self.banner = Banner()
         self._pages: dict[Page, QWidget] = {"start": start, "live": wizard, "review": review}
@@ -284,7 +287,10 @@ class MainWindow(QMainWindow):
         return super().eventFilter(watched, event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Emit `closing` before the window closes."""
+        """Emit `closing` before the window closes, if it may."""
+        if not self.may_close():
+            event.ignore()
+            return
         self.closing.emit()
         super().closeEvent(event)
 

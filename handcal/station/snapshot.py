@@ -104,6 +104,8 @@ class Snapshot:
     procedure: Procedure
     record: SessionRecord
     """The session as stored on disk; the same object until it changes."""
+    not_stored: str = ""
+    """Reason why the newest data are not in the session yet; empty if they are."""
     contradiction: str = ""
     """Evidence against the calibration or this frame, with advice; empty if there is none."""
     views: Mapping[Eye, EyeView] = field(default_factory=dict)

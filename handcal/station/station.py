@@ -210,6 +210,7 @@ class Station(Closable):
             link=link,
             link_problem=self._link_problem(link),
             problem=self._not_stored or self._not_applied,
+            not_stored=self._not_stored,
             contradiction=self._contradiction(observation),
             procedure=read_procedure(
                 self.calibration,

@@ -3192,6 +3192,10 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>They are lost if the calibration ends now. Cancel, and make room for them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Guide</source>
         <translation type="unfinished"></translation>
     </message>

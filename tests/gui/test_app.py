@@ -192,7 +192,7 @@ def test_a_signal_closes_a_window_in_which_nothing_happens(qtbot: QtBot, number:
     try:
         for one in SIGNALS:
             signal.signal(one, signal.default_int_handler if one == number else signal.SIG_IGN)
-        close_on_signals(window)
+        close_on_signals(window, window.close)
         QTimer.singleShot(10_000, loop.quit)  # runs no Python code, which would handle the signal
         threading.Timer(0.05, signal.raise_signal, (number,)).start()
         loop.exec()

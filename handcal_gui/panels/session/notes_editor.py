@@ -61,9 +61,11 @@ class NotesEditor(QWidget):
         self._refresh()
 
     def flush(self) -> None:
-        """Save pending changes now."""
-        if self._timer.isActive():
-            self._timer.stop()
+        """Save now what is not saved, also what could not be saved before; at a session's end."""
+        self._timer.stop()
+        written = self._edit.toPlainText()
+        if written != self._saved:
+            self._saved = written  # once: the next session begins before it is shown
             self._save()
 
     def _begin(self) -> None:

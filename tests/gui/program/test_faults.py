@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
+from PySide6.QtWidgets import QLabel, QMessageBox, QPlainTextEdit, QPushButton
 
 from handcal.session.session import Session
 from handcal.station.snapshot import Snapshot
@@ -121,6 +122,46 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     live.wait(lambda: live.banner == "")
     live.wait(lambda: live.snapshot.record.is_solved)
     assert len(live.record.alignments) == 1
+
+
+@pytest.mark.parametrize("leave", ["close", "next wearer"])
+def test_data_not_written_yet_are_left_only_on_request(
+    live: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch, leave: str
+) -> None:
+    buttons = QMessageBox.StandardButton
+    answers, asked = [buttons.Cancel, buttons.Discard], []
+
+    def answer(_parent: object, _title: str, text: str, *_: object) -> object:
+        asked.append(text)
+        return answers[len(asked) - 1]
+
+    monkeypatch.setattr(QMessageBox, "warning", answer)
+    make_cursor(live, studio)
+    path = live.snapshot.session_path
+    path.rename(path.with_name("away"))
+    studio.camera.shows = "live"
+    live.wait(lambda: is_turned(live))
+    studio.headset.confirm()
+    live.wait(lambda: "cannot write" in live.banner)
+    window = live.program.window
+    next_wearer = live.program.live.next_wearer_requested.emit
+    leave_now: Callable[[], object] = window.close if leave == "close" else next_wearer
+    leave_now()
+    assert "cannot write" in asked[0].lower()
+    assert "They are lost" in asked[0]
+    assert window.isVisible()
+    assert window.page == "live"
+    leave_now()
+    assert len(asked) == 2
+    assert live.program.live.snapshot is None
+
+
+def test_a_signal_ends_the_program_without_a_question(
+    live: Technician, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live.program.window, "may_close", lambda: False)
+    live.program.end()
+    assert not live.program.window.isVisible()
 
 
 def test_notes_outlive_an_engine_that_breaks_down(

@@ -74,6 +74,20 @@ def test_flush_saves_at_once_what_was_written(
     assert asked.args == ["b"]
 
 
+def test_flush_tries_again_what_could_not_be_saved(
+    qtbot: QtBot, notes: NotesEditor, edit: QPlainTextEdit
+) -> None:
+    notes.show_saved(ONE, "a")
+    asked: list[str] = []
+    notes.changed.connect(asked.append)
+    edit.setPlainText("b")
+    qtbot.waitUntil(lambda: bool(asked), timeout=5 * SAVE_MS)
+    notes.show_saved(ONE, "a")  # the disk was full
+    for _ in range(2):
+        notes.flush()
+    assert asked == ["b", "b"]
+
+
 def test_too_long_notes_are_told_and_not_saved(
     qtbot: QtBot, notes: NotesEditor, edit: QPlainTextEdit
 ) -> None:
