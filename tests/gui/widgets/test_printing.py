@@ -8,11 +8,12 @@ import pytest
 from PySide6.QtCore import QMarginsF
 from PySide6.QtGui import QPagedPaintDevice, QPageLayout, QPageSize, QTextDocument
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter
-from PySide6.QtWidgets import QDialog, QMessageBox, QToolTip, QWidget
+from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import FileError
 from handcal_gui.widgets.printing import ask_printer, print_pages
+from tests.gui.helpers import text
 
 
 def hello(device: QPagedPaintDevice) -> None:
@@ -59,7 +60,7 @@ def test_a_file_that_cannot_be_written_is_said(
     ask_printer(parent, hello)
     assert path.exists()
     assert not told
-    assert QToolTip.text() == f"Saved as {path}"
+    assert text(parent, "brief") == f"Saved as {path}"
     path = missing
     ask_printer(parent, hello)
     assert len(told) == 1

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtPrintSupport import QPrinter
-from PySide6.QtWidgets import QApplication, QToolButton, QToolTip
+from PySide6.QtWidgets import QApplication, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.station.snapshot import Snapshot
@@ -18,7 +18,7 @@ from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.image_view import ImageView
-from tests.gui.helpers import button, child, show
+from tests.gui.helpers import button, child, show, text
 
 Maker = Callable[..., Snapshot]
 
@@ -34,7 +34,7 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     assert copied.startswith("Wearer: without a name\n")
     assert "Target: 6.5′" in copied
     assert copied.count("After, measured: not measured") == 2
-    assert QToolTip.text() == "Copied: the result"
+    assert text(bar.buttons, "brief") == "Copied: the result"
     printer = QPrinter()
     printer.setOutputFileName(str(tmp_path / "result.pdf"))
     bar.print_to(printer)

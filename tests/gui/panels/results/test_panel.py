@@ -294,3 +294,11 @@ def test_it_fits_a_small_dock(solved: ResultsPanel) -> None:
     smallest = solved.minimumSizeHint()
     assert smallest.width() <= 300
     assert smallest.height() <= 260
+
+
+def test_the_points_of_a_large_residual_map_are_large(qtbot: QtBot) -> None:
+    shown = show(qtbot, ResidualMap(), 300, 300)
+    inliers, _ = shown.scatters
+    assert inliers.opts["size"] == 4
+    shown.resize(1300, 1300)
+    assert inliers.opts["size"] == 10
