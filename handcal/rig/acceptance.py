@@ -221,7 +221,7 @@ def _page(
 
 def passed_words(eyes: Collection[Eye]) -> str:
     """Return the eyes that pass, and the one that was not looked at, in words."""
-    unseen = [f"{eye} not accepted: it has no images" for eye in EYES if eye not in eyes]
+    unseen = [f"{eye} not looked at" for eye in EYES if eye not in eyes]
     return "; ".join([" and ".join(eyes), *unseen])
 
 

@@ -222,7 +222,8 @@ class ManualPage(QTextBrowser):
         widest_px = self.window().width() - _BESIDE_PX
         if image.width() > widest_px:
             image = image.scaledToWidth(widest_px, Qt.TransformationMode.SmoothTransformation)
-        return image if is_drawing or not is_dark() else _dimmed(image)
+        is_light = not is_drawing and not image.isNull()
+        return _dimmed(image) if is_light and is_dark() else image
 
     def _load_again(self) -> None:
         """Load the page with its pictures in the colours of the theme."""

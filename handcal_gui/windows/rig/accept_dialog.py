@@ -120,7 +120,7 @@ class AcceptDialog(QDialog):
 
     @property
     def _need(self) -> str:
-        """What is missing before the rig can be accepted; empty if nothing is."""
+        """Advice on what is missing before the rig can be accepted; empty if nothing is."""
         if not self._project.camera_file.exists():
             return CAMERA_MISSING
         if self._eyes:

@@ -99,6 +99,7 @@ class BoardPage(QWidget):
         self._begin = button("begin", tr("&Use another initial rig…"))
         self._rig, self._state = paragraph("initialRig"), paragraph("initialRigState")
         self._found = FindingLine("board")
+        self._problem = ""
         self._preview = ImageView(tr("Preview of the board"))
         self._draw = LatestJob(_draw, self)
         self._draw.answered.connect(lambda _board, image: self._preview.show_image(image))
@@ -149,8 +150,10 @@ class BoardPage(QWidget):
             )
         except ValueError as error:
             self._preview.show_text(message=tr("No such board exists"))
-            self._found.show_finding(Finding("", Health.BROKEN, str(error)))
+            self._problem = str(error)
+            self._show_state()
             return
+        self._problem = ""
         self._preview.show_text()
         self._project.enter(board=board, paper=self._paper.currentData())
         self._show_state()
@@ -160,7 +163,9 @@ class BoardPage(QWidget):
         inner = " × ".join(map(str, self._project.inputs.board.inner))
         corners = tr("{} inner corners").format(inner)
         found = Finding("", Health.LIMITED, corners, tr("no image shows this board yet"))
-        if self._project.inputs.board_found:
+        if self._problem:
+            found = Finding("", Health.BROKEN, self._problem)
+        elif self._project.inputs.board_found:
             found = Finding("", Health.GOOD, tr("{}, found in an image").format(corners))
         self._found.show_finding(found)
 

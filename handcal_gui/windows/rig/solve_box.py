@@ -84,7 +84,8 @@ class SolveBox(QWidget):
     def show_finding(self, finding: Finding) -> None:
         """Show a message about the result, followed by what is needed to solve."""
         self._shown = finding
-        advice = self._need or finding.advice
+        parts = finding.advice.rstrip("."), sentence(self._need)
+        advice = ". ".join(part for part in parts if part)
         self._verdict.show_finding(replace(finding, advice=advice))
 
     def allow(self, need: str, *, is_busy: bool) -> None:

@@ -74,6 +74,9 @@ def test_in_dark_themes_no_picture_glares(manual: Manual, dark: None) -> None:
         inside = [picture.pixelColor(x, 20).lightness() for x in range(5, picture.width() - 5, 9)]
         return int(np.median(inside)), picture.pixelColor(0, 0).lightness()
 
+    missing = manual.page.loadResource(kind, QUrl("pictures/none.png"))
+    assert isinstance(missing, QImage)
+    assert missing.isNull()
     ground = manual.page.palette().base().color().lightness()
     assert lightness("setup-stereo.svg") == (ground, ground)
     dimmed, edge = lightness("start.png")

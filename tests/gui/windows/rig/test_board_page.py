@@ -81,6 +81,8 @@ def test_an_impossible_board_is_reported_and_not_taken(
     assert isinstance(marker, QDoubleSpinBox)
     marker.setValue(25.0)
     assert "0.3 to 0.95" in found(page)
+    page.enter()
+    assert "0.3 to 0.95" in found(page), "the step is shown again"
     assert project.inputs.board == Board()
 
 

@@ -327,7 +327,7 @@ def test_on_a_small_screen_nothing_scrolls(qtbot: QtBot, wizard: RigWizard) -> N
 
 
 def test_without_images_nothing_is_solved_and_the_reason_is_in_sight(
-    qtbot: QtBot, tmp_path: Path
+    qtbot: QtBot, choose: Callable[[Path], None], tmp_path: Path
 ) -> None:
     wizard = RigWizard(ProjectFolder(tmp_path / "empty"))
     qtbot.addWidget(wizard)
@@ -340,6 +340,10 @@ def test_without_images_nothing_is_solved_and_the_reason_is_in_sight(
         wizard.show_step(step)
         assert not child(wizard, QPushButton, "solve").isEnabled()
         assert reason in child(wizard, QLabel, "verdictFound").text()
+    choose(tmp_path / "grid.png")
+    child(wizard, QPushButton, "saveGrid").click()
+    said = child(wizard, QLabel, "verdictFound").text()
+    assert "Show it unscaled. The viewpoint camera's intrinsics are missing" in said
     wizard.accept()
 
 
