@@ -1,9 +1,8 @@
-"""The library window: found, compared, checked, repaired, deleted and restored."""
+"""The library window: found, sorted, compared, opened and exported."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,89 +10,31 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QInputDialog, QLabel, QLineEdit, QPushButton, QTableView
+from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
-from handcal.session.library import LibraryEntry, delete_session, read_library
+from handcal.session.library import LibraryEntry, read_library
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
-from handcal.types import Alignment
 from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel, make_row
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.helpers import child, text
 from tests.gui.views import VERIFIED
-
-PATIENCE_MS = 10_000
-
-
-def results(verdict: str, expected: float, measured: float | None = None) -> dict[str, Any]:
-    one: dict[str, Any] = {"verdict": verdict, "benefit": {"after_arcmin": expected}}
-    if measured is not None:
-        one["measured_arcmin"] = [2.0 * measured, measured]
-    return {"version": 2, "eyes": {"left": one, "right": one}}
-
-
-@pytest.fixture
-def folder(tmp_path: Path, alignment: Alignment) -> Path:
-    """Return a folder with two sessions of Ada, one of Bea and one of Cid that is damaged."""
-
-    def make(name: str, wearer: str, solved: dict[str, Any] | None) -> Path:
-        with Session.create(tmp_path, example_rig(), {}, name=name, wearer=wearer) as session:
-            session.save_alignment(alignment)
-            if solved is not None:
-                session.save_results(solved)
-                session.finish()
-        return session.path
-
-    make("ada-1", "Ada", results("accept", 9.0, 4.0))
-    make("ada-2", "Ada", results("accept", 8.0))
-    make("bea", "Bea", results("repeat", 17.0))
-    path = make("cid", "Cid", None)
-    (path / "alignments" / "1.npz").write_bytes(b"nonsense")
-    return tmp_path
-
-
-@pytest.fixture
-def window(qtbot: QtBot, folder: Path) -> Iterator[LibraryWindow]:
-    window = LibraryWindow(folder)
-    qtbot.addWidget(window)
-    window.show()
-    qtbot.waitUntil(lambda: table(window).model().rowCount() == 4, timeout=PATIENCE_MS)
-    yield window
-    window.stop()
-
-
-def table(window: LibraryWindow) -> QTableView:
-    return child(window, QTableView, "sessionTable")
-
-
-def rows(window: LibraryWindow) -> list[list[str]]:
-    model = table(window).model()
-    return [
-        [model.index(row, column).data() for column in range(model.columnCount())]
-        for row in range(model.rowCount())
-    ]
-
-
-def wearers(window: LibraryWindow) -> list[str]:
-    return [row[0] for row in rows(window)]
-
-
-def choose(window: LibraryWindow, *wearer: str) -> None:
-    table(window).clearSelection()
-    table(window).setSelectionMode(QTableView.SelectionMode.MultiSelection)
-    for number, row in enumerate(rows(window)):
-        if row[0] in wearer:
-            table(window).selectRow(number)
-
-
-def press(window: LibraryWindow, name: str) -> None:
-    found = child(window, QPushButton, name)
-    assert found.isEnabled()
-    found.click()
+from tests.gui.windows.library.conftest import (
+    PATIENCE_MS,
+    activate,
+    answer_name,
+    choose,
+    press,
+    results,
+    rows,
+    table,
+    wait_for,
+    wearers,
+)
 
 
 def test_the_newest_is_first_and_measured_is_not_expected(window: LibraryWindow) -> None:
@@ -185,37 +126,6 @@ def test_an_unreadable_one_among_others_is_left_to_the_export_and_keeps_its_name
     wait_for(qtbot, window, "Name corrected in 1 session.")
 
 
-def wait_for(qtbot: QtBot, window: LibraryWindow, said: str) -> None:
-    qtbot.waitUntil(lambda: said in text(window, "message"), timeout=PATIENCE_MS)
-
-
-def test_check_names_the_damage_and_repair_copies_the_rest(
-    qtbot: QtBot, window: LibraryWindow, folder: Path
-) -> None:
-    choose(window, "Ada", "Bea", "Cid")
-    press(window, "checkSessions")
-    wait_for(qtbot, window, "3 sessions sound, every file read.")
-    assert "cid: alignments/1.npz" in text(window, "message")
-    choose(window, "Cid")
-    press(window, "repairSession")
-    wait_for(qtbot, window, "cid-repaired: a copy with 0 alignments")
-    qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
-    assert (folder / "cid-repaired").is_dir()
-    assert not Session.open(folder / "cid-repaired").damaged
-    states = [row[8] for row in rows(window)]
-    assert states.count("Unfinished, repaired copy") == 1
-    state = table(window).model().index(states.index("Damaged, has a copy"), 8)
-    assert "Repaired in cid-repaired" in state.data(Qt.ItemDataRole.ToolTipRole)
-    assert [entry.path.name for entry in window.chosen] == ["cid-repaired"]
-
-
-def test_a_sound_session_is_not_copied(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
-    choose(window, "Bea")
-    press(window, "repairSession")
-    wait_for(qtbot, window, "bea is sound: there is nothing to repair.")
-    assert not (folder / "bea-repaired").exists()
-
-
 def test_a_repaired_copy_counts_once(folder: Path) -> None:
     repair_session(folder / "ada-1", folder / "ada-1-repaired")
     found = calibrations_of("Ada", read_library(folder))
@@ -269,23 +179,6 @@ def test_a_narrow_window_leaves_out_columns_and_cuts_none(
     assert "Rig: Example" in tip
 
 
-def test_what_was_deleted_together_is_restored_together_by_name(
-    qtbot: QtBot, window: LibraryWindow, folder: Path
-) -> None:
-    choose(window, "Ada", "Bea")
-    press(window, "deleteSessions")
-    wait_for(qtbot, window, "3 sessions deleted.")
-    qtbot.waitUntil(lambda: wearers(window) == ["Cid"], timeout=PATIENCE_MS)
-    tip = child(window, QPushButton, "restoreSession").toolTip
-    assert tip() == "Last deleted: 3 sessions (Ctrl+Z)"
-    press(window, "restoreSession")
-    wait_for(qtbot, window, "3 sessions restored.")
-    qtbot.waitUntil(lambda: len(rows(window)) == 4, timeout=PATIENCE_MS)
-    choose(window, "Bea")
-    press(window, "deleteSessions")
-    qtbot.waitUntil(lambda: tip().startswith("Last deleted: Bea, "), timeout=PATIENCE_MS)
-
-
 def test_few_calls_of_python_draw_and_choose_many_sessions(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -319,107 +212,6 @@ def test_long_names_are_cut_and_nothing_else(window: LibraryWindow) -> None:
         for column in (1, 4, 5, 6, 7):
             assert across.sectionSize(column) >= table(window).sizeHintForColumn(column)
     assert across.sectionSize(2) >= table(window).sizeHintForColumn(2)  # the rig: room for all
-
-
-def test_delete_and_restore(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
-    assert child(window, QPushButton, "restoreSession").isHidden()
-    choose(window, "Bea")
-    table(window).setFocus()
-    QTest.keyClick(table(window), Qt.Key.Key_Delete)
-    qtbot.waitUntil(lambda: "Bea" not in wearers(window), timeout=PATIENCE_MS)
-    assert not (folder / "bea").exists()
-    press(window, "restoreSession")
-    qtbot.waitUntil(lambda: "Bea" in wearers(window), timeout=PATIENCE_MS)
-    qtbot.waitUntil(child(window, QPushButton, "restoreSession").isHidden, timeout=PATIENCE_MS)
-
-
-def test_an_open_session_stays(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
-    choose(window, "Bea")
-    with Session(folder / "bea"):
-        press(window, "deleteSessions")
-        wait_for(qtbot, window, "is in use by process")
-    assert (folder / "bea").is_dir()
-
-
-def test_one_that_is_gone_does_not_keep_the_others_from_being_deleted(
-    qtbot: QtBot, window: LibraryWindow, folder: Path
-) -> None:
-    choose(window, "Bea", "Cid")
-    delete_session(folder / "bea")  # by another program
-    press(window, "deleteSessions")
-    wait_for(qtbot, window, "1 session deleted.\nbea: ")
-    assert "is no longer there" in text(window, "message")
-    qtbot.waitUntil(lambda: wearers(window) == ["Ada", "Ada"], timeout=PATIENCE_MS)
-
-
-def activate(qtbot: QtBot, window: LibraryWindow) -> None:
-    """Do what a window manager does when a dialog ends."""
-    window.activateWindow()
-    qtbot.waitUntil(window.isActiveWindow, timeout=PATIENCE_MS)
-
-
-def answer_name(qtbot: QtBot, window: LibraryWindow, name: str) -> list[str]:
-    """Press F2 and type a name; return the names that were offered."""
-    activate(qtbot, window)
-    table(window).setFocus()
-    QTest.keyClick(table(window), Qt.Key.Key_F2)
-    dialog = child(window, QInputDialog)
-    qtbot.waitUntil(dialog.isActiveWindow, timeout=PATIENCE_MS)  # else Return opens the session
-    typed = child(dialog, QComboBox).lineEdit()
-    assert typed is not None
-    assert typed.text() == window.chosen[0].wearer
-    typed.selectAll()
-    QTest.keyClicks(typed, name)
-    offered = dialog.comboBoxItems()
-    QTest.keyClick(typed, Qt.Key.Key_Return)
-    return offered
-
-
-def test_a_name_is_corrected_and_brought_back(
-    qtbot: QtBot, window: LibraryWindow, folder: Path
-) -> None:
-    choose(window, "Ada")
-    assert answer_name(qtbot, window, "ada") == ["Ada", "Bea", "Cid"]
-    qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "ada", "ada"], timeout=PATIENCE_MS)
-    wait_for(qtbot, window, "Name corrected in 2 sessions.")
-    assert [entry.wearer for entry in window.chosen] == ["ada", "ada"]
-    activate(qtbot, window)
-    QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "Ada", "Ada"], timeout=PATIENCE_MS)
-    assert Session.open(folder / "ada-1").wearer == "Ada"
-    qtbot.waitUntil(child(window, QPushButton, "correctName").isEnabled, timeout=PATIENCE_MS)
-    assert child(window, QPushButton, "restoreSession").isHidden()
-    assert answer_name(qtbot, window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
-
-
-def test_a_name_is_no_markup(qtbot: QtBot, window: LibraryWindow) -> None:
-    choose(window, "Bea")
-    answer_name(qtbot, window, "<b>Bea")
-    qtbot.waitUntil(lambda: window.chosen[0].wearer == "<b>Bea", timeout=PATIENCE_MS)
-    index = table(window).selectionModel().selectedRows()[0]
-    assert "&lt;b&gt;Bea" in index.data(Qt.ItemDataRole.ToolTipRole)
-    window._former_names = {window.chosen[0].path: "<b>Bea"}
-    window._refresh()
-    assert "Name before: &lt;b&gt;Bea" in child(window, QPushButton, "restoreSession").toolTip()
-    [told] = [one for one in window.findChildren(QLabel) if one.text() == "Name before: <b>Bea"]
-    assert told.textFormat() == Qt.TextFormat.PlainText
-    assert "&lt;b&gt;Bea" in told.toolTip()
-
-
-def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
-    choose(window, "Bea")
-    with Session(folder / "bea"):
-        answer_name(qtbot, window, "Eve")
-        wait_for(qtbot, window, "Name corrected in 0 sessions.\nbea: ")
-        qtbot.waitUntil(child(window, QPushButton, "restoreSession").isHidden, timeout=PATIENCE_MS)
-        choose(window, "Bea", "Cid")
-        answer_name(qtbot, window, "Eve")
-        wait_for(qtbot, window, "Name corrected in 1 session.\nbea: ")
-        assert "is in use by process" in text(window, "message")
-    qtbot.waitUntil(lambda: wearers(window)[:2] == ["Eve", "Bea"], timeout=PATIENCE_MS)
-    press(window, "restoreSession")  # only Cid's name was corrected
-    wait_for(qtbot, window, "Name corrected in 1 session.")
-    qtbot.waitUntil(lambda: wearers(window)[0] == "Cid", timeout=PATIENCE_MS)
 
 
 def test_the_context_menu_has_every_action(window: LibraryWindow, folder: Path) -> None:

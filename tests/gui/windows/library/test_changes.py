@@ -1,0 +1,148 @@
+"""Sessions of the library: checked, repaired, named, deleted and restored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal.session.library import delete_session
+from handcal.session.session import Session
+from handcal_gui.windows.library.window import LibraryWindow
+from tests.gui.helpers import child, text
+from tests.gui.windows.library.conftest import (
+    PATIENCE_MS,
+    activate,
+    answer_name,
+    choose,
+    press,
+    rows,
+    table,
+    wait_for,
+    wearers,
+)
+
+
+def test_check_names_the_damage_and_repair_copies_the_rest(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Ada", "Bea", "Cid")
+    press(window, "checkSessions")
+    wait_for(qtbot, window, "3 sessions sound, every file read.")
+    assert "cid: alignments/1.npz" in text(window, "message")
+    choose(window, "Cid")
+    press(window, "repairSession")
+    wait_for(qtbot, window, "cid-repaired: a copy with 0 alignments")
+    qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
+    assert (folder / "cid-repaired").is_dir()
+    assert not Session.open(folder / "cid-repaired").damaged
+    states = [row[8] for row in rows(window)]
+    assert states.count("Unfinished, repaired copy") == 1
+    state = table(window).model().index(states.index("Damaged, has a copy"), 8)
+    assert "Repaired in cid-repaired" in state.data(Qt.ItemDataRole.ToolTipRole)
+    assert [entry.path.name for entry in window.chosen] == ["cid-repaired"]
+
+
+def test_a_sound_session_is_not_copied(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    choose(window, "Bea")
+    press(window, "repairSession")
+    wait_for(qtbot, window, "bea is sound: there is nothing to repair.")
+    assert not (folder / "bea-repaired").exists()
+
+
+def test_what_was_deleted_together_is_restored_together_by_name(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Ada", "Bea")
+    press(window, "deleteSessions")
+    wait_for(qtbot, window, "3 sessions deleted.")
+    qtbot.waitUntil(lambda: wearers(window) == ["Cid"], timeout=PATIENCE_MS)
+    tip = child(window, QPushButton, "restoreSession").toolTip
+    assert tip() == "Last deleted: 3 sessions (Ctrl+Z)"
+    press(window, "restoreSession")
+    wait_for(qtbot, window, "3 sessions restored.")
+    qtbot.waitUntil(lambda: len(rows(window)) == 4, timeout=PATIENCE_MS)
+    choose(window, "Bea")
+    press(window, "deleteSessions")
+    qtbot.waitUntil(lambda: tip().startswith("Last deleted: Bea, "), timeout=PATIENCE_MS)
+
+
+def test_delete_and_restore(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    assert child(window, QPushButton, "restoreSession").isHidden()
+    choose(window, "Bea")
+    table(window).setFocus()
+    QTest.keyClick(table(window), Qt.Key.Key_Delete)
+    qtbot.waitUntil(lambda: "Bea" not in wearers(window), timeout=PATIENCE_MS)
+    assert not (folder / "bea").exists()
+    press(window, "restoreSession")
+    qtbot.waitUntil(lambda: "Bea" in wearers(window), timeout=PATIENCE_MS)
+    qtbot.waitUntil(child(window, QPushButton, "restoreSession").isHidden, timeout=PATIENCE_MS)
+
+
+def test_an_open_session_stays(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    choose(window, "Bea")
+    with Session(folder / "bea"):
+        press(window, "deleteSessions")
+        wait_for(qtbot, window, "is in use by process")
+    assert (folder / "bea").is_dir()
+
+
+def test_one_that_is_gone_does_not_keep_the_others_from_being_deleted(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Bea", "Cid")
+    delete_session(folder / "bea")  # by another program
+    press(window, "deleteSessions")
+    wait_for(qtbot, window, "1 session deleted.\nbea: ")
+    assert "is no longer there" in text(window, "message")
+    qtbot.waitUntil(lambda: wearers(window) == ["Ada", "Ada"], timeout=PATIENCE_MS)
+
+
+def test_a_name_is_corrected_and_brought_back(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    choose(window, "Ada")
+    assert answer_name(qtbot, window, "ada") == ["Ada", "Bea", "Cid"]
+    qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "ada", "ada"], timeout=PATIENCE_MS)
+    wait_for(qtbot, window, "Name corrected in 2 sessions.")
+    assert [entry.wearer for entry in window.chosen] == ["ada", "ada"]
+    activate(qtbot, window)
+    QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    qtbot.waitUntil(lambda: wearers(window) == ["Cid", "Bea", "Ada", "Ada"], timeout=PATIENCE_MS)
+    assert Session.open(folder / "ada-1").wearer == "Ada"
+    qtbot.waitUntil(child(window, QPushButton, "correctName").isEnabled, timeout=PATIENCE_MS)
+    assert child(window, QPushButton, "restoreSession").isHidden()
+    assert answer_name(qtbot, window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
+
+
+def test_a_name_is_no_markup(qtbot: QtBot, window: LibraryWindow) -> None:
+    choose(window, "Bea")
+    answer_name(qtbot, window, "<b>Bea")
+    qtbot.waitUntil(lambda: window.chosen[0].wearer == "<b>Bea", timeout=PATIENCE_MS)
+    index = table(window).selectionModel().selectedRows()[0]
+    assert "&lt;b&gt;Bea" in index.data(Qt.ItemDataRole.ToolTipRole)
+    window._former_names = {window.chosen[0].path: "<b>Bea"}
+    window._refresh()
+    assert "Name before: &lt;b&gt;Bea" in child(window, QPushButton, "restoreSession").toolTip()
+    [told] = [one for one in window.findChildren(QLabel) if one.text() == "Name before: <b>Bea"]
+    assert told.textFormat() == Qt.TextFormat.PlainText
+    assert "&lt;b&gt;Bea" in told.toolTip()
+
+
+def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
+    choose(window, "Bea")
+    with Session(folder / "bea"):
+        answer_name(qtbot, window, "Eve")
+        wait_for(qtbot, window, "Name corrected in 0 sessions.\nbea: ")
+        qtbot.waitUntil(child(window, QPushButton, "restoreSession").isHidden, timeout=PATIENCE_MS)
+        choose(window, "Bea", "Cid")
+        answer_name(qtbot, window, "Eve")
+        wait_for(qtbot, window, "Name corrected in 1 session.\nbea: ")
+        assert "is in use by process" in text(window, "message")
+    qtbot.waitUntil(lambda: wearers(window)[:2] == ["Eve", "Bea"], timeout=PATIENCE_MS)
+    press(window, "restoreSession")  # only Cid's name was corrected
+    wait_for(qtbot, window, "Name corrected in 1 session.")
+    qtbot.waitUntil(lambda: wearers(window)[0] == "Cid", timeout=PATIENCE_MS)
