@@ -19,6 +19,8 @@ from pytestqt.qtbot import QtBot
 
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
+from handcal.hand.settings import SegmentSettings
+from handcal.station.doctor import Health
 from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
@@ -121,6 +123,20 @@ def test_the_gate_stays_open(open_page: Callable[..., StartPage]) -> None:
     find(page, QDoubleSpinBox, "gateFar").setValue(0.0)
     segment = page.new.settings.calibration.segment
     assert (segment.depth_min_m, segment.depth_max_m) == pytest.approx((0.1, 0.15))
+
+
+def test_the_usual_gate_leaves_the_other_settings(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    choose(page, "roi", "right")
+    inspector.healths["camera"] = Health.BROKEN
+    find(page, QDoubleSpinBox, "gateNear").setValue(1.5)
+    fix = button(page, "cameraFix")
+    qtbot.waitUntil(lambda: fix.text() == "Use the usual gate")
+    fix.click()
+    segment = page.new.settings.calibration.segment
+    assert segment == SegmentSettings(roi="right")
 
 
 def test_the_pairing_key_is_hidden_until_asked_for(open_page: Callable[..., StartPage]) -> None:
