@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, QTimer, Signal
+from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QWidget
 
 from handcal.session.session import MAX_NOTES_CHARACTERS
@@ -46,7 +47,8 @@ class NotesEditor(QWidget):
 
     def show_saved(self, session: Path, notes: str) -> None:
         """Set the saved notes; the text being edited is replaced only for another session."""
-        self._saved = notes
+        # As the editor returns it: with its own line ends, and without no-break spaces.
+        self._saved = QTextDocument(notes).toPlainText()
         if session != self._session:
             self._session = session
             self._timer.stop()
