@@ -160,10 +160,11 @@ def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, 
     """Return a fix for a part: a button's label and changed settings; empty if there is none."""
     is_broken = finding.health is Health.BROKEN
     if part == "camera" and gate_problem(settings) is not None:
-        usual, calibration = SegmentSettings(), settings.calibration
-        gate = {"depth_min_m": usual.depth_min_m, "depth_max_m": usual.depth_max_m}
-        changed = replace(calibration, segment=replace(calibration.segment, **gate))
-        return tr("Use the usual gate"), {"calibration": changed}
+        calibration, usual = settings.calibration, SegmentSettings()
+        segment = replace(
+            calibration.segment, depth_min_m=usual.depth_min_m, depth_max_m=usual.depth_max_m
+        )
+        return tr("Use the usual gate"), {"calibration": replace(calibration, segment=segment)}
     is_simulated, is_virtual = settings.source == "simulator", settings.headset == "virtual"
     if part == "camera" and is_broken:
         return tr("Use the simulator"), {"source": "simulator", "headset": "virtual"}
