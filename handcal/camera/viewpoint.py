@@ -19,6 +19,7 @@ from handcal.types import UInt8
 
 _BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_DSHOW, "darwin": cv2.CAP_AVFOUNDATION}
 _MOST_CAMERAS = 10
+_IMAGE_S, _PERIOD_S = 1.0, 1.0 / 30.0
 
 
 class ViewpointCamera(Closable):
@@ -67,7 +68,7 @@ def open_viewpoint(
     size_px : (int, int), optional
         Width and height requested from a camera, which may deliver others.
     playback : PlaybackSettings, optional
-        Playback of a video.
+        Playback of a folder or video; in real time, each image of a folder is shown for a second.
 
     Raises
     ------
@@ -76,7 +77,8 @@ def open_viewpoint(
     """
     if isinstance(source, int):
         return _Device(source, size_px)
-    return _Images(source) if source.is_dir() else _Video(source, playback or PlaybackSettings())
+    kind = _Images if source.is_dir() else _Video
+    return kind(source, playback or PlaybackSettings())
 
 
 def list_viewpoints() -> list[int]:
@@ -89,19 +91,27 @@ def list_viewpoints() -> list[int]:
 
 
 class _Images(ViewpointCamera):
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, playback: PlaybackSettings) -> None:
         self.name = f"Images in {folder.name}"
         try:
             paths = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES]
         except OSError as error:
             raise CameraError(f"cannot read {folder}: {error.strerror or error}") from error
-        self._remaining: list[Path] | None = sorted(paths, reverse=True)
-        if not self._remaining:
+        if not paths:
             raise CameraError(f"{folder} holds no PNG or JPEG image")
+        self._paths = sorted(paths, reverse=True)
+        self._remaining: list[Path] | None = [*self._paths]
+        self._playback = playback
+        self._shown, self._until_s = np.empty((0, 0, 3), np.uint8), 0.0
 
     def read(self) -> tuple[UInt8, int]:
         if self._remaining is None:
             raise CameraError(f"{self.name}: this camera is closed; open it again")
+        if time.monotonic() < self._until_s:  # again, in the pace of a camera
+            time.sleep(_PERIOD_S)
+            return self._shown, time.monotonic_ns()
+        if not self._remaining and self._playback.loop:
+            self._remaining = [*self._paths]
         if not self._remaining:
             raise CameraEndError(f"{self.name}: that was the last image")
         path = self._remaining.pop()
@@ -109,6 +119,8 @@ class _Images(ViewpointCamera):
             image = read_image(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
         except FileError as error:
             raise CameraError(str(error)) from error
+        if self._playback.real_time:
+            self._shown, self._until_s = image, time.monotonic() + _IMAGE_S
         return image, time.monotonic_ns()
 
     def close(self) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from handcal.camera import viewpoint
+from handcal.camera.playback import PlaybackSettings
 from handcal.camera.viewpoint import list_viewpoints, open_viewpoint
 from handcal.errors import CameraEndError, CameraError
 
@@ -36,6 +37,24 @@ def test_images_of_a_folder_come_by_name(tmp_path: Path) -> None:
             camera.read()
     with pytest.raises(CameraError, match="is closed"):
         camera.read()
+
+
+def test_a_folder_is_played_in_a_loop_each_image_for_a_while(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(viewpoint, "_IMAGE_S", 0.2)
+    monkeypatch.setattr(viewpoint, "_PERIOD_S", 0.001)
+    for level in range(2):
+        cv2.imwrite(str(tmp_path / f"{level}.png"), flat(level)[..., ::-1])
+    playback = PlaybackSettings(real_time=True, loop=True)
+    times: list[tuple[int, int]] = []  # level, and how often in a row
+    with open_viewpoint(tmp_path, playback=playback) as camera:
+        while len(times) < 4:
+            level = int(camera.read()[0][0, 0, 0]) - RGB[0]
+            count = times.pop()[1] if times and times[-1][0] == level else 0
+            times.append((level, count + 1))
+    assert [level for level, _ in times] == [0, 1, 0, 1]
+    assert all(count > 1 for _, count in times[:3])
 
 
 def test_a_folder_without_images_and_a_damaged_image_are_named(tmp_path: Path) -> None:
