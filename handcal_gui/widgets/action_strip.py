@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence, QShowEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QWidget
 
 from handcal_gui.keys import add_action
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import MainButton, with_name
+from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.job_bar import JobBar
+from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox
 
 _KEYS = "Ctrl+Return Ctrl+Enter"
@@ -33,21 +34,9 @@ def action_strip(
     window = Qt.ShortcutContext.WindowShortcut
     meaning = tr("Press the large button")
     add_action(strip, meaning, keys, main.click, context=window).setAutoRepeat(False)
-    native = QKeySequence(keys.split()[0]).toString(QKeySequence.SequenceFormat.NativeText)
-    key = with_name(QLabel(native, alignment=Qt.AlignmentFlag.AlignCenter), "mainKey")
-    scale_font(key, 0.9)
-    key.setFixedSize(key.fontMetrics().horizontalAdvance(native) + 2 * SPACING_PX, 3 * SPACING_PX)
+    key = KeyCap("mainKey", keys.split()[0])
     middle = [1] if bar is None else [(bar, 1)]
     hbox(*others, *middle, key, main, on=strip, margins=0, spacing=SPACING_PX)
-
-    def draw_key() -> None:
-        shade = colors().muted
-        key.setStyleSheet(
-            f"color: {shade}; border: 1px solid {shade}; border-bottom-width: 3px;"
-            " border-radius: 4px; padding: 0;"
-        )
-
-    follow_theme(strip, draw_key)
     return strip
 
 

@@ -29,7 +29,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.key_cap import KeyCap
-from handcal_gui.widgets.layouts import hbox, scrollable, vbox
+from handcal_gui.widgets.layouts import hbox, keep_space, scrollable, vbox
 from handcal_gui.widgets.sentence import sentence
 
 Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
@@ -97,9 +97,7 @@ class NewCalibration(Card):
         self._button = main_button("start", tr("Start calibration"))
         self._button.setEnabled(False)
         self._start_key = KeyCap("startKey", "Return")
-        policy = self._start_key.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self._start_key.setSizePolicy(policy)
+        keep_space(self._start_key)
         self._cancel = button("cancelOpening", tr("Cancel"), help_text=tr("Cancel the start (Esc)"))
         # Without focus, a second press of the key that started it does not cancel.
         self._cancel.setFocusPolicy(Qt.FocusPolicy.NoFocus)

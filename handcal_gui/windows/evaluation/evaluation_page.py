@@ -20,7 +20,7 @@ from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import keep_space, vbox
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationButton
 from handcal_gui.windows.evaluation.results_view import ResultsView
 from handcal_gui.windows.evaluation.work import Evaluation, Outcome, Readiness
@@ -69,9 +69,7 @@ class EvaluationPage(QWidget):
         self._preparing = [PreparationButton(one) for one in spec.preparations]
         self._bar = JobBar()
         self._found = FindingLine("readiness")
-        policy = self._found.sizePolicy()
-        policy.setRetainSizeWhenHidden(True)
-        self._found.setSizePolicy(policy)
+        keep_space(self._found)
         self._results = ResultsView()
         self._look = LatestJob(self._check, self)
         self._lay_out(spec.question)
