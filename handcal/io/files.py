@@ -183,7 +183,7 @@ def make_folder(path: Path) -> Path:
 def require_writable(folder: Path) -> None:
     """Raise FileError if no file can be written to a folder, which need not exist yet."""
     folder = folder.absolute()
-    there = next(path for path in (folder, *folder.parents) if path.exists())
+    there = next(path for path in (folder, *folder.parents) if os.path.exists(path))
     if not there.is_dir():
         raise FileError(f"{there} is a file: choose a folder")
     if not os.access(there, os.W_OK | os.X_OK):

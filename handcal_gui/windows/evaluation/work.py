@@ -85,13 +85,14 @@ class StudyEvaluation:
             return Readiness(
                 _note(tr("{} contains the complete study").format(folder)), tr("Show results")
             )
+        require_writable(folder)
         if share:
             advice = tr("completed trials are kept")
             return Readiness(
                 _note(tr("{} holds {:.0f} % of this study").format(folder, 100 * share), advice),
                 tr("Resume"),
             )
-        return Readiness(_ready(folder))
+        return Readiness(_ready())
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Run or resume the study, and report its progress with the remaining time."""
@@ -123,9 +124,10 @@ class FileEvaluation:
         if missing := self.missing(entries):
             return Readiness(_note(missing), is_complete=False)
         folder = free_of_studies(output_folder(entries.output))
+        require_writable(folder)
         if (folder / "report.pdf").exists():
             return Readiness(_note(tr("The report in {} will be replaced").format(folder)))
-        return Readiness(_ready(folder))
+        return Readiness(_ready())
 
     def run(self, entries: Any, progress: Progress) -> Outcome:
         """Evaluate the files and write the report."""
@@ -146,7 +148,5 @@ def _note(found: str, advice: str = "") -> Finding:
     return Finding("", Health.LIMITED, found, advice)
 
 
-def _ready(folder: Path) -> Finding:
-    """Return that all is ready, or raise FileError if the results could not be written."""
-    require_writable(folder)
+def _ready() -> Finding:
     return Finding("", Health.GOOD, tr("Ready"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,9 @@ def test_a_study_is_done_and_told(numbers: Any, entries: NoiseStudySettings) -> 
     assert numbers.work.readiness(entries).button == "Show results"
 
 
-def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseStudySettings) -> None:
+def test_a_study_goes_on_in_its_folder_only(
+    numbers: Any, entries: NoiseStudySettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shares: list[float] = []
     with pytest.raises(CancelledError):
         numbers.work.run(
@@ -47,10 +50,25 @@ def test_a_study_goes_on_in_its_folder_only(numbers: Any, entries: NoiseStudySet
     readiness = numbers.work.readiness(entries)
     assert readiness.button == "Resume"
     assert readiness.finding.found.endswith("holds 40 % of this study")
+    with monkeypatch.context() as patch:
+        patch.setattr("os.access", lambda *_: False)
+        with pytest.raises(FileError, match="cannot write to"):
+            numbers.work.readiness(entries)
     with pytest.raises(FileError, match="holds another study"):
         numbers.work.readiness(replace(entries, seed=2))
     with pytest.raises(FileError, match="choose a folder"):
         numbers.work.readiness(replace(entries, output=""))
+
+
+def _refuse(refused: Path, exists: Callable[[Path], bool]) -> Callable[[Path], bool]:
+    """Return a test of existence that raises an error as for a folder of another user."""
+
+    def refuse(path: Path) -> bool:
+        if path == refused:
+            raise PermissionError(13, "Permission denied", str(path))
+        return exists(path)
+
+    return refuse
 
 
 def test_nothing_is_ready_whose_results_cannot_be_written(
@@ -61,8 +79,15 @@ def test_nothing_is_ready_whose_results_cannot_be_written(
     for work, given in ((numbers.work, entries), (data, UserEntries())):
         with pytest.raises(FileError, match="is a file: choose a folder"):
             work.readiness(replace(given, output=str(tmp_path / "file" / "results")))
+    replaced, out_of_reach = tmp_path / "replaced", tmp_path / "another user" / "new"
+    replaced.mkdir()
+    (replaced / "report.pdf").touch()
     monkeypatch.setattr("os.access", lambda *_: False)
-    for work, given in ((numbers.work, entries), (data, replace(UserEntries(), output="new"))):
+    monkeypatch.setattr(Path, "exists", _refuse(out_of_reach, Path.exists))
+    for work, given in (
+        (numbers.work, entries),
+        *((data, UserEntries(output=str(one))) for one in ("new", replaced, out_of_reach)),
+    ):
         with pytest.raises(FileError, match="cannot write to"):
             work.readiness(given)
 
