@@ -21,6 +21,7 @@ from handcal.camera.usb import explain_absence
 from handcal.errors import CancelledError, HandcalError
 from handcal.hand.shipped import load_detector
 from handcal.io.resources import resource_path
+from handcal.io.x_display import x_server_answers
 from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import DEFAULT_SETTINGS
@@ -282,10 +283,16 @@ def examine_camera(device: Device) -> Finding:
 
 
 def _screen() -> Finding:
-    if sys.platform != "linux" or any(os.environ.get(v) for v in ("DISPLAY", "WAYLAND_DISPLAY")):
-        return Finding("Screen", Health.GOOD, "available")
     advice = "commands run without one; windows need one"
-    return Finding("Screen", Health.LIMITED, "none", advice)
+    if sys.platform != "linux" or os.environ.get("WAYLAND_DISPLAY"):
+        return Finding("Screen", Health.GOOD, "available")
+    display = os.environ.get("DISPLAY")
+    if not display:
+        return Finding("Screen", Health.LIMITED, "none", advice)
+    if not x_server_answers(display):
+        found = f"the X server at DISPLAY={display} does not answer"
+        return Finding("Screen", Health.LIMITED, found, advice)
+    return Finding("Screen", Health.GOOD, "available")
 
 
 def _disk() -> Finding:

@@ -203,7 +203,10 @@ def test_the_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     assert of("Screen").health is Health.LIMITED
     monkeypatch.setenv("DISPLAY", ":0")
-    assert of("Screen").health is Health.GOOD
+    for answers, health in ((True, Health.GOOD), (False, Health.LIMITED)):
+        monkeypatch.setattr(doctor, "x_server_answers", lambda _, answers=answers: answers)
+        assert of("Screen").health is health
+    assert of("Screen").found == "the X server at DISPLAY=:0 does not answer"
 
 
 def test_the_disk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
