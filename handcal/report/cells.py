@@ -1,15 +1,27 @@
-"""Lengths and statistics formatted for table cells, without line breaks."""
+"""Numbers and statistics formatted as text, without line breaks."""
 
 from __future__ import annotations
 
 from handcal.statistics import MeanInterval, Summary
 
 NOTHING = "–"
+MINUS = "−"
+
+
+def with_minus(number: str) -> str:
+    """Return a number that Python or Qt has written, with a minus in place of a hyphen."""
+    return number.replace("-", MINUS)
+
+
+def signed(value: float, decimals: int) -> str:
+    """Return a number with its sign; zero, also after rounding, has a plus."""
+    rounded = round(value, decimals) + 0.0  # turns −0 into 0
+    return with_minus(f"{rounded:+.{decimals}f}")
 
 
 def length_mm(length_m: float) -> str:
     """Return a length in millimetres with two decimals and a true minus sign."""
-    return f"{1e3 * length_m:.2f}".replace("-", "−")
+    return with_minus(f"{1e3 * length_m:.2f}")
 
 
 def mean_sd(summary: Summary) -> str:

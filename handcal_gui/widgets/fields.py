@@ -20,9 +20,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.report.cells import MINUS, with_minus
 from handcal_gui.theme import SPACING_PX, scale_font, set_style
 from handcal_gui.widgets.layouts import hbox
-from handcal_gui.widgets.numbers import MINUS, with_minus
 
 Field = TypeVar("Field", bound=QWidget)
 Spin = TypeVar("Spin", bound=QAbstractSpinBox)

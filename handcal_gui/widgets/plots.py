@@ -8,9 +8,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QWidget
 
+from handcal.report.cells import with_minus
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.numbers import with_minus
 
 pg.setConfigOptions(antialias=True)
 

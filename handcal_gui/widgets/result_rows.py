@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
+from handcal.report.cells import signed
 from handcal.rig_types import EyeDisplay, Rig
 from handcal.types import EYES, Eye, EyeShift, VerdictName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
-from handcal_gui.widgets.numbers import pluralize, signed
+from handcal_gui.widgets.numbers import pluralize
 
 EYE_NAMES: Mapping[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
 VERDICT_WORDS: Mapping[VerdictName, str] = {

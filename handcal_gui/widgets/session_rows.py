@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from handcal.register.results import Results
+from handcal.report.cells import signed
 from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
 from handcal.types import EYES, Eye, EyeShift
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
-from handcal_gui.widgets.numbers import pluralize, signed
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.record_table import RecordColumn
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
 from handcal_gui.widgets.times import local_time

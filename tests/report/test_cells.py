@@ -1,9 +1,19 @@
-"""Statistics as texts."""
+"""Numbers and statistics as texts."""
 
 from __future__ import annotations
 
-from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
+import pytest
+
+from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles, signed
 from handcal.statistics import mean_interval, summarise
+
+
+@pytest.mark.parametrize(
+    ("value", "decimals", "text"),
+    [(1.25, 2, "+1.25"), (-3.06, 1, "−3.1"), (-0.04, 1, "+0.0"), (-0.0, 0, "+0")],
+)
+def test_sign(value: float, decimals: int, text: str) -> None:
+    assert signed(value, decimals) == text
 
 
 def test_texts_are_two_decimals_and_never_broken() -> None:

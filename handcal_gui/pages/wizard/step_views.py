@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handcal.report.cells import signed
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
@@ -26,7 +27,7 @@ from handcal_gui.pages.wizard.view import (
     WizardView,
 )
 from handcal_gui.translation import tr
-from handcal_gui.widgets.numbers import pluralize, signed
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0

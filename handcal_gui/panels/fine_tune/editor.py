@@ -15,12 +15,12 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.display import DrawnMove
+from handcal.report.cells import signed
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import NumberField
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.numbers import signed
 
 _SLIDER_MAX_MM = 15.0
 _SLIDER_STEPS_PER_MM = 100

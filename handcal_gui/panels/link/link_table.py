@@ -10,11 +10,11 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from handcal.link.rates import LinkRates
 from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import Rejection
+from handcal.report.cells import signed
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
-from handcal_gui.widgets.numbers import signed
 
 RATES_S = 2.0
 """Interval of rates and losses."""
