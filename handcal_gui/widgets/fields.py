@@ -43,8 +43,12 @@ def with_name(field: Field, name: str, label: str = "", help_text: str = "") -> 
 
 def plain_tooltip(text: str) -> str:
     """Return a tooltip that shows a text from a file as it is: Qt takes tags for markup."""
-    is_like_markup = "<" in text or "&" in text
-    return f"<p style='white-space: pre'>{escape(text)}</p>" if is_like_markup else text
+    return _as_it_is(text, "pre")
+
+
+def plain_message(text: str) -> str:
+    """Return a text for a message box, which shows it as it is and breaks its lines."""
+    return _as_it_is(text, "pre-wrap")
 
 
 class NumberField(QDoubleSpinBox):
@@ -168,6 +172,11 @@ def fill_row(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
     """Lay out widgets in a row without margins, from the left; one of them may stretch."""
     items = [(widget, 1 if widget is grows else 0) for widget in widgets]
     hbox(*items, 0, on=row, margins=0, spacing=SPACING_PX)
+
+
+def _as_it_is(text: str, white_space: str) -> str:
+    is_like_markup = "<" in text or "&" in text
+    return f"<p style='white-space: {white_space}'>{escape(text)}</p>" if is_like_markup else text
 
 
 def _show_range(spin: QAbstractSpinBox, event: QEvent) -> bool:
