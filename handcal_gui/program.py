@@ -38,6 +38,7 @@ from handcal_gui.preferences import CurrentPreferences, Preferences, Preferences
 from handcal_gui.separate_windows import SeparateWindows
 from handcal_gui.theme import use_theme
 from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import plain_message
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.window import MainWindow, Page
 from handcal_gui.windows.manual import Manual
@@ -282,15 +283,18 @@ class Program(QObject):
     def _may_leave(self) -> bool:
         """Ask before a calibration ends whose newest data could not be written yet."""
         snapshot = self.live.snapshot
-        if snapshot is None or not snapshot.not_stored:
+        problems = [snapshot.not_stored if snapshot else "", self.live.save_notes()]
+        told = [sentence(problem) for problem in problems if problem]
+        if not told:
             return True
+        told.append(
+            tr("They are lost if the calibration ends now. Cancel, and make room for them.")
+        )
         buttons = QMessageBox.StandardButton
         answer = QMessageBox.warning(
             self.window,
             tr("Not saved yet"),
-            sentence(snapshot.not_stored)
-            + "\n\n"
-            + tr("They are lost if the calibration ends now. Cancel, and make room for them."),
+            plain_message("\n\n".join(told)),
             buttons.Discard | buttons.Cancel,
             buttons.Cancel,
         )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Page
-from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.font_manager import FontEntry, FontProperties, findfont, fontManager, get_font
 from matplotlib.lines import Line2D
 
 from handcal.report.document import Column, Figure
@@ -25,6 +25,8 @@ CONTENT_MM = WIDTH_MM - 2 * _MARGIN_MM
 MM_PER_INCH, _POINTS_PER_INCH = 25.4, 72.0
 _LINE = 1.35
 _FAMILY = "DejaVu Sans"
+_PLACEHOLDERS = "Last Resort"
+"""Beginning of the name of matplotlib's font that has a box for every character."""
 _TABLE_PT, _TEXT_PT = 7.5, 9.0
 _CELL_PAD_MM = 1.2
 _GREY = "0.45"
@@ -189,8 +191,16 @@ def add_strip(canvas: Page, corner_mm: tuple[float, float], figure: Figure) -> l
 
 
 def plain(text: str) -> str:
-    """Return a text without characters that the report's font lacks, or control characters."""
+    """Return a text without control characters, and with the codes of those that no font has.
+
+    By their codes, wearers with such names can be told apart.
+    """
     return "".join(map(_plain_char, text))
+
+
+def families(text: str) -> list[str]:
+    """Return the report's font, and those of the system for characters that it lacks."""
+    return list(dict.fromkeys((_FAMILY, *filter(None, map(_family_of, text)))))
 
 
 def _wrap(text: str, points: float, weight: str, width_mm: float) -> list[str]:
@@ -268,7 +278,9 @@ def _width_mm(text: str, points: float, weight: str) -> float:
 @lru_cache(maxsize=4096)
 def _char_width_mm(char: str, weight: str) -> float:
     """Return the width of a character of one point."""
-    font = get_font(findfont(FontProperties(family=_FAMILY, weight=weight)))
+    family = _family_of(char) or _FAMILY
+    properties = FontProperties(family=family, weight=weight if family == _FAMILY else "normal")
+    font = get_font(findfont(properties))
     font.set_size(100.0, _POINTS_PER_INCH)
     advance: int = font.load_char(ord(char)).linearHoriAdvance
     return advance / 2**16 / 100.0 * MM_PER_INCH / _POINTS_PER_INCH
@@ -276,14 +288,27 @@ def _char_width_mm(char: str, weight: str) -> float:
 
 @lru_cache(maxsize=4096)
 def _plain_char(char: str) -> str:
-    if char == _NO_BREAK or (char.isprintable() and ord(char) in _charmap()):
+    if char == _NO_BREAK:
         return char
-    return " " if char.isspace() else "\ufffd"
+    if not char.isprintable():
+        return " " if char.isspace() else "\ufffd"
+    return char if _family_of(char) else f"[U+{ord(char):04X}]"
 
 
-@lru_cache(maxsize=1)
-def _charmap() -> frozenset[int]:
-    return frozenset(get_font(findfont(FontProperties(family=_FAMILY))).get_charmap())
+@lru_cache(maxsize=4096)
+def _family_of(char: str) -> str:
+    """Return the report's font, or one of the system that has a character; empty if none has."""
+    if get_font(findfont(FontProperties(family=_FAMILY))).get_char_index(ord(char)):
+        return _FAMILY
+    regular = (font for font in fontManager.ttflist if font.style == "normal")
+    fonts = sorted(regular, key=lambda font: ("Sans" not in font.name, font.name))
+    return next((font.name for font in fonts if _has(font, char)), "")
+
+
+def _has(font: FontEntry, char: str) -> bool:
+    if font.weight != 400 or font.name.startswith(_PLACEHOLDERS):
+        return False
+    return bool(get_font(font.fname).get_char_index(ord(char)))
 
 
 def _line_mm(points: float) -> float:
@@ -292,13 +317,16 @@ def _line_mm(points: float) -> float:
 
 def _put(page: Page, text: str, x_mm: float, y_mm: float, points: float, **style: Any) -> None:
     """Draw one line with its upper edge at `y_mm`."""
+    family = families(text)
+    if len(family) > 1:  # the others may have no bold font
+        style["weight"] = "normal"
     baseline_mm = y_mm + 0.95 * points * MM_PER_INCH / _POINTS_PER_INCH
     page.text(
         x_mm / WIDTH_MM,
         1.0 - baseline_mm / HEIGHT_MM,
         text,
         fontsize=points,
-        family=_FAMILY,
+        family=family,
         verticalalignment="baseline",
         parse_math=False,
         **style,

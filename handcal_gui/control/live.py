@@ -46,6 +46,9 @@ _PANELS_OF_STEPS = {
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot of those that the guide shows."""
 _NO_BRIDGES = BridgeSettings()
+_SAVING = tr("save the notes")
+_SAVING_S = 1.0
+"""Longest wait for the notes to be saved before a session is left."""
 
 
 class CalibrationController(QObject):
@@ -97,7 +100,7 @@ class CalibrationController(QObject):
         self._visible: set[object] = set()  # panels
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
-        self._failed_command = ""
+        self._failed_command = self._notes_problem = ""
         self._shown_ns = self._count = 0  # time of the snapshot shown, and number of those shown
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
@@ -125,6 +128,7 @@ class CalibrationController(QObject):
         """End the present calibration and open a station; if held, no step runs automatically."""
         self.stop()
         self._is_watching = self._is_broken = False
+        self._notes_problem = ""
         self._is_plan_held = True
         self._doing = self._shown = 0
         self._conditions = Conditions()
@@ -137,6 +141,14 @@ class CalibrationController(QObject):
         self._engine.failed.connect(self._on_command_failed)
         self._engine.ended.connect(self._on_ended)
         self._engine.start()
+
+    def save_notes(self) -> str:
+        """Save the notes now; return why they could not be saved, empty if they were."""
+        if self._engine is None or self._window.panels.session.notes_are_saved:
+            return ""
+        self._window.panels.session.save_notes()
+        self._engine.settle(_SAVING_S)
+        return self._notes_problem
 
     def cancel(self) -> None:
         """Cancel opening the station without waiting; `ended` follows once it is closed."""
@@ -306,14 +318,18 @@ class CalibrationController(QObject):
         self.opened.emit(station.session.path)
 
     def _on_command_done(self, name: str, _answer: object) -> None:
+        if name == _SAVING:
+            self._notes_problem = ""
         # A message about a failed action of the wizard is obsolete once another has succeeded.
         if name == self._failed_command or {name, self._failed_command} <= set(Action):
             self._window.banner.clear()
 
     def _on_command_failed(self, name: str, why: str) -> None:
         self._failed_command = name
-        done = ACTION_NAMES.get(name, name)
-        self._window.banner.show_message(tr("Could not {}: {}").format(done, why))
+        text = tr("Could not {}: {}").format(ACTION_NAMES.get(name, name), why)
+        if name == _SAVING:
+            self._notes_problem = text
+        self._window.banner.show_message(text)
 
     def _on_doubted(self, name: str, why: str) -> None:
         self._failed_command = name
@@ -325,7 +341,7 @@ class CalibrationController(QObject):
             with suppress(FileError), Session(self._snapshot.session_path) as session:
                 session.save_notes(text)
         else:
-            self._submit(tr("save the notes"), lambda station: station.session.save_notes(text))
+            self._submit(_SAVING, lambda station: station.session.save_notes(text))
 
     def _on_ended(self, why: str) -> None:
         self._timer.stop()

@@ -18,7 +18,7 @@ from handcal.errors import HandcalError
 from handcal.link.pairing import Pairing, Pairings
 from handcal_gui.theme import SPACING_PX, flat_header, number_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, paragraph
+from handcal_gui.widgets.fields import button, paragraph, plain_message
 from handcal_gui.widgets.layouts import hbox, vbox
 
 _NAME, _DEVICE = range(2)
@@ -136,7 +136,7 @@ class PairedDevices(QWidget):
             "Revoke {}? Its session ends, and it connects again only after it has been "
             "paired again."
         ).format(one.name or one.device_id)
-        if QMessageBox.question(self, tr("Revoke"), question) == buttons.Yes:
+        if QMessageBox.question(self, tr("Revoke"), plain_message(question)) == buttons.Yes:
             self._change(lambda: self._pairings.revoke(one.device_id))
 
     def _change(self, change: Callable[[], None]) -> None:

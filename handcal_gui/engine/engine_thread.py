@@ -91,6 +91,13 @@ class EngineThread(Worker):
         self._submitted += 1
         return self._submitted
 
+    def settle(self, timeout_s: float) -> None:
+        """Wait until the commands submitted so far are done, and deliver their signals."""
+        done = threading.Event()
+        self.submit("settle", lambda _station: done.set())
+        done.wait(timeout_s)
+        self._deliver_pending()
+
     def request_stop(self) -> None:
         """Ask the thread to end, without waiting; it then emits `ended`."""
         self._closing.set()

@@ -7,7 +7,7 @@ from html import escape
 from typing import TypeVar, cast
 
 from PySide6.QtCore import QEvent, QLocale, QObject, Qt
-from PySide6.QtGui import QAction, QValidator
+from PySide6.QtGui import QAction, QHelpEvent, QValidator
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QComboBox,
@@ -17,11 +17,13 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QSpinBox,
     QToolButton,
+    QToolTip,
     QWidget,
 )
 
 from handcal.report.cells import MINUS, with_minus
 from handcal_gui.theme import SPACING_PX, scale_font, set_style
+from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox
 
 Field = TypeVar("Field", bound=QWidget)
@@ -41,8 +43,12 @@ def with_name(field: Field, name: str, label: str = "", help_text: str = "") -> 
 
 def plain_tooltip(text: str) -> str:
     """Return a tooltip that shows a text from a file as it is: Qt takes tags for markup."""
-    is_like_markup = "<" in text or "&" in text
-    return f"<p style='white-space: pre'>{escape(text)}</p>" if is_like_markup else text
+    return _as_it_is(text, "pre")
+
+
+def plain_message(text: str) -> str:
+    """Return a text for a message box, which shows it as it is and breaks its lines."""
+    return _as_it_is(text, "pre-wrap")
 
 
 class NumberField(QDoubleSpinBox):
@@ -55,6 +61,10 @@ class NumberField(QDoubleSpinBox):
     def __init__(self, decimals: int) -> None:
         super().__init__(decimals=decimals)
         self.setLocale(QLocale.c())
+
+    def event(self, event: QEvent) -> bool:
+        """Name the range in the tooltip."""
+        return _show_range(self, event) or super().event(event)
 
     def textFromValue(self, value: float) -> str:
         """Return a number as it is shown."""
@@ -77,6 +87,10 @@ class WholeNumberField(QSpinBox):
     def __init__(self, low: int, high: int) -> None:
         super().__init__(minimum=low, maximum=high)
         self.setLocale(QLocale.c())
+
+    def event(self, event: QEvent) -> bool:
+        """Name the range in the tooltip."""
+        return _show_range(self, event) or super().event(event)
 
     def validate(self, text: str, place: int) -> tuple[QValidator.State, str, int]:
         """Refuse a point or a comma."""
@@ -158,6 +172,23 @@ def fill_row(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
     """Lay out widgets in a row without margins, from the left; one of them may stretch."""
     items = [(widget, 1 if widget is grows else 0) for widget in widgets]
     hbox(*items, 0, on=row, margins=0, spacing=SPACING_PX)
+
+
+def _as_it_is(text: str, white_space: str) -> str:
+    is_like_markup = "<" in text or "&" in text
+    return f"<p style='white-space: {white_space}'>{escape(text)}</p>" if is_like_markup else text
+
+
+def _show_range(spin: QAbstractSpinBox, event: QEvent) -> bool:
+    """Show a field's tooltip and range if an event asks for it: nothing outside is taken."""
+    if event.type() != QEvent.Type.ToolTip:
+        return False
+    field = cast(QDoubleSpinBox, spin)  # or a field for whole numbers, with the same functions
+    low, high = (field.textFromValue(end) for end in (field.minimum(), field.maximum()))
+    allowed = tr("Allowed: {} to {}").format(low, high + field.suffix())
+    text = f"{field.toolTip()}\n{allowed}".strip()
+    QToolTip.showText(cast(QHelpEvent, event).globalPos(), text, field)
+    return True
 
 
 def _settle(field: Spin) -> Spin:

@@ -14,6 +14,7 @@ from handcal.errors import FileError
 from handcal.io.files import write_atomic
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import show_briefly
+from handcal_gui.widgets.fields import plain_message
 from handcal_gui.widgets.sentence import sentence
 
 PrintTo = Callable[[QPagedPaintDevice], object]
@@ -27,7 +28,7 @@ def ask_printer(parent: QWidget, print_to: PrintTo) -> None:
     try:
         show_briefly(parent, print_pages(printer, print_to))
     except FileError as error:
-        QMessageBox.warning(parent, tr("Print"), sentence(str(error)))
+        QMessageBox.warning(parent, tr("Print"), plain_message(sentence(str(error))))
 
 
 def print_pages(printer: QPrinter, print_to: PrintTo) -> str:

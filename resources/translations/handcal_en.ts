@@ -6031,5 +6031,9 @@ width is {:.0f}′.</source>
         <source>to solve, tick an image in which the board was found</source>
         <translation type="unfinished"></translation>
     </message>
+    <message>
+        <source>Allowed: {} to {}</source>
+        <translation type="unfinished"></translation>
+    </message>
 </context>
 </TS>

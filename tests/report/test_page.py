@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Page
+from matplotlib.font_manager import fontManager
 from matplotlib.transforms import Bbox
 
+from handcal.report import page as page_module
 from handcal.report.document import Column, Figure
 from handcal.report.page import CONTENT_MM, WIDTH_MM, Document, plain
 
@@ -63,9 +66,39 @@ def test_no_word_is_lost_and_nothing_is_set_as_mathematics() -> None:
     assert not any(text.get_parse_math() for page in pages for text in page.texts)
 
 
-def test_what_the_font_lacks_is_replaced() -> None:
-    assert plain("Zoë φ₁ ± 2′ \u00a0") == "Zoë φ₁ ± 2′ \u00a0"
-    assert plain("a\nb\tc\x00d🙂e中") == "a b c\ufffdd\ufffde\ufffd"
+def test_control_characters_are_replaced() -> None:
+    assert plain("Zoë φ₁ ± 2′ \u00a0 عمر") == "Zoë φ₁ ± 2′ \u00a0 عمر"
+    assert plain("a\nb\tc\x00d\u202ee") == "a b c\ufffdd\ufffde"
+
+
+@pytest.fixture(params=["with", "without"])
+def system_font(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """Return a font of the system with letters that the report's font lacks, or none."""
+    own = [font for font in fontManager.ttflist if font.name in ("DejaVu Sans", "STIXGeneral")]
+    only = [font for font in own if request.param == "with" or font.name == "DejaVu Sans"]
+    monkeypatch.setattr(fontManager, "ttflist", only)
+    _forget_fonts()
+    yield "STIXGeneral" if request.param == "with" else ""
+    _forget_fonts()
+
+
+def _forget_fonts() -> None:
+    for cached in (page_module._family_of, page_module._plain_char, page_module._char_width_mm):
+        cached.cache_clear()
+
+
+def test_names_that_the_font_lacks_stay_different(system_font: str) -> None:
+    names = "Ada ᶁ", "Ada ᶄ"
+    document = Document("footer")
+    document.title(names[0])
+    document.table([Column("wearer")], [[name] for name in names])
+    (page,) = document.finish()
+    shown = {text.get_text(): text.get_fontfamily() for text in page.texts}
+    assert len(shown) == 5
+    for name in names:
+        written = name if system_font else f"Ada [U+{ord(name[-1]):04X}]"
+        assert system_font in ("", *shown[written])
+    assert_in_order(page)
 
 
 def test_a_tables_head_is_not_parted_from_its_first_row() -> None:

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from handcal.export.figures import COLORS, MARKERS, name_axes
 from handcal.lab.evaluate.user_test import CornerRow, GroupErrors
-from handcal.report.page import plain
+from handcal.report.page import families, plain
 from handcal.types import EYES, Float64
 
 # More points than these are drawn as a picture: otherwise a page would take long to show.
@@ -45,7 +45,8 @@ def draw_wearers(
             means.plot(ends, (place, place), color=COLORS["left"], linewidth=1.2)
     titles = "reprojection error by wearer", "mean, with interval"
     for ax, title in zip(axes, titles, strict=True):
-        ax.set_yticks(places, [_short(wearer) for wearer in by_wearer], parse_math=False)
+        names = [_short(wearer) for wearer in by_wearer]
+        ax.set_yticks(places, names, parse_math=False, family=families("".join(names)))
         ax.set_ylim(len(by_wearer) - 0.4, -0.6)
         ax.set_xlim(left=0.0)
         name_axes(ax, title, "arcmin", "")

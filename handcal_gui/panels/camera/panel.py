@@ -30,7 +30,7 @@ from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import tool_button
+from handcal_gui.widgets.fields import plain_message, tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
@@ -142,7 +142,7 @@ class CameraPanel(QWidget):
             try:
                 self.save_picture(Path(name).with_suffix(".png"))
             except FileError as error:
-                QMessageBox.warning(self, tr("Save image"), str(error))
+                QMessageBox.warning(self, tr("Save image"), plain_message(str(error)))
 
 
 class _Pictures(QWidget):

@@ -62,12 +62,21 @@ class NotesEditor(QWidget):
         self._edit.setReadOnly(is_read_only)
         self._refresh()
 
+    @property
+    def are_saved(self) -> bool:
+        """True if what is written is what is stored."""
+        return self._edit.toPlainText() == self._saved
+
+    def save_now(self) -> None:
+        """Save what is written, also what is too long, so that the reason is told."""
+        self._timer.stop()
+        self.changed.emit(self._edit.toPlainText())
+
     def flush(self) -> None:
         """Save now what is not saved, also what could not be saved before; at a session's end."""
         self._timer.stop()
-        written = self._edit.toPlainText()
-        if written != self._saved:
-            self._saved = written  # once: the next session begins before it is shown
+        if not self.are_saved:
+            self._saved = self._edit.toPlainText()  # the next session begins before it is shown
             self._save()
 
     def _begin(self) -> None:
@@ -87,7 +96,6 @@ class NotesEditor(QWidget):
         elif self._too_many() > 0:
             text = tr("⚠ Too long by {:,} characters: not saved").format(self._too_many())
         else:
-            written = self._edit.toPlainText()
-            saved = tr("✓ Saved") if written else ""  # nothing is written yet
-            text = saved if written == self._saved else tr("Not saved yet")
+            saved = tr("✓ Saved") if self._saved else ""  # nothing is written yet
+            text = saved if self.are_saved else tr("Not saved yet")
         self._state.setText(text)

@@ -136,6 +136,15 @@ class SessionPanel(QWidget):
             part.set_read_only(is_read_only)
         self._refresh()
 
+    @property
+    def notes_are_saved(self) -> bool:
+        """True if the notes written are those stored."""
+        return self._notes.are_saved
+
+    def save_notes(self) -> None:
+        """Request to save the notes now."""
+        self._notes.save_now()
+
     def flush(self) -> None:
         """Save pending changes of the notes now."""
         self._notes.flush()

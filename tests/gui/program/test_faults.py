@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -154,6 +156,39 @@ def test_data_not_written_yet_are_left_only_on_request(
     leave_now()
     assert len(asked) == 2
     assert live.program.live.snapshot is None
+
+
+@pytest.mark.parametrize("begins", ["typed just now", "refused before"])
+def test_notes_that_cannot_be_saved_are_left_only_on_request(
+    technician: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch, begins: str
+) -> None:
+    answers, asked = [QMessageBox.StandardButton.Cancel], []
+
+    def answer(_parent: object, _title: str, text: str, *_: object) -> object:
+        asked.append(text)
+        return answers[0]
+
+    monkeypatch.setattr(QMessageBox, "warning", answer)
+    folder = Path(studio.settings.sessions).with_name("<b>sessions")
+    technician.program.start_calibration(replace(studio.settings, sessions=str(folder)), "Ada")
+    technician.wait_for_page("live")
+    window = technician.program.window
+    window.docks["session"].raise_()
+    notes = technician.child(QPlainTextEdit, "")
+    technician.wait(notes.isEnabled)
+    path = technician.snapshot.session_path
+    path.rename(path.with_name("away"))  # as good as a full disk
+    notes.setPlainText("wears glasses")
+    if begins == "refused before":
+        technician.wait(lambda: "Could not save the notes" in technician.banner)
+    window.close()
+    assert "Could not save the notes" in asked[0]
+    assert "&lt;b&gt;sessions" in asked[0]
+    assert window.isVisible()
+    path.with_name("away").rename(path)  # now there is room
+    window.close()
+    assert len(asked) == 1
+    assert Session.open(path).notes == "wears glasses"
 
 
 def test_a_signal_ends_the_program_without_a_question(

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from PySide6.QtCore import QLocale, QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtCore import QEvent, QLocale, QPoint, QPointF
+from PySide6.QtGui import QHelpEvent, Qt, QTextDocument, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox, QToolTip
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.widgets.fields import NumberField, choice, number, whole_number
+from handcal_gui.widgets.fields import (
+    NumberField,
+    choice,
+    number,
+    plain_message,
+    whole_number,
+)
 
 Field = QComboBox | QDoubleSpinBox | QSpinBox
 
@@ -103,3 +109,26 @@ def test_a_minus_is_shown_and_a_hyphen_read_too(qtbot: QtBot, typed: str) -> Non
     assert (field.value(), field.text()) == (-2.5, "−2.50")
     field.stepBy(-1)
     assert field.text() == "−3.50"
+
+
+def test_the_tooltip_names_the_range_with_the_unit(qtbot: QtBot) -> None:
+    length, port = number("x", -1.0, 2.5, 0.5, " m", "Length."), whole_number("y", 1, 65535, "")
+    texts = []
+    for field in (length, port):
+        qtbot.addWidget(field)
+        field.show()
+        middle = field.lineEdit().rect().center()
+        event = QHelpEvent(QEvent.Type.ToolTip, middle, field.lineEdit().mapToGlobal(middle))
+        QApplication.sendEvent(field.lineEdit(), event)
+        texts.append(QToolTip.text())
+    assert texts == ["Length.\nAllowed: −1.0 to 2.5 m", "Allowed: 1 to 65535"]
+
+
+@pytest.mark.parametrize("text", ["cannot write /a/<b>x</b>\n\nMake room.", "a&lt;b", "no markup"])
+def test_a_message_shows_tags_as_they_are(text: str) -> None:
+    document, message = QTextDocument(), plain_message(text)
+    if Qt.mightBeRichText(message):
+        document.setHtml(message)
+    else:
+        document.setPlainText(message)
+    assert document.toPlainText() == text
