@@ -44,6 +44,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The trial is not recorded yet: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>restart the headset</source>
         <translation type="unfinished"></translation>
     </message>
@@ -81,10 +85,6 @@
     </message>
     <message>
         <source>Could not {}: {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The trial is not recorded yet: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5992,6 +5992,10 @@ width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Allowed: {} to {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Print</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6029,10 +6033,6 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>to solve, tick an image in which the board was found</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Allowed: {} to {}</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
