@@ -129,7 +129,7 @@ def test_a_trial_of_nothing_must_be_asked_for_twice(
     with qtbot.waitSignal(panel.doubted) as doubted:
         panel.record_action.trigger()
     assert doubted.args is not None
-    assert "φ of the left eye is still the solved one: the error would be 0 px" in doubted.args[0]
+    assert "φ of the left eye has not been fine-tuned: the error would be 0 px" in doubted.args[0]
     choose(panel, "Eye", "Right eye")
     assert asked == []
     for _ in range(2):
