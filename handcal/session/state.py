@@ -55,6 +55,9 @@ class SessionEvent(StrEnum):
 ASIDE = (SessionEvent.NOTES_SAVED, SessionEvent.WEARER_CORRECTED, SessionEvent.UPGRADED)
 """Events after which a finished session stays finished."""
 
+VERIFYING = "verifying"
+"""The station's event at the start of a verification and after each nudge."""
+
 
 class NumberedItems(Generic[Item]):
     """Items numbered from 1 that can be deleted and restored; a number is never used twice.

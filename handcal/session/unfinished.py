@@ -9,7 +9,7 @@ from handcal.errors import FileError
 from handcal.io.lock import FileLock
 from handcal.session.journal import find_journals, read_journal
 from handcal.session.session import Session
-from handcal.session.state import ASIDE, SessionEvent
+from handcal.session.state import ASIDE, VERIFYING, SessionEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,8 @@ class UnfinishedSession:
     """Numbers of those that are not deleted."""
     verified: int = 0
     """Number of verified eyes; after a slipped headset they are all there is."""
+    is_verifying: bool = False
+    """True if a verification was begun, of which nothing else may remain."""
     damaged: int = 0
     """Number of damaged parts, which are left out when it is resumed."""
     problem: str = ""
@@ -80,6 +82,7 @@ def _inspect(
         len(record.alignments),
         len(record.trials),
         len(record.facts.verified),
+        VERIFYING in names,
         len(record.damaged),
         is_repaired=bool(record.damaged) and has_copy,
     )

@@ -12,13 +12,13 @@ from handcal.link.nudges import VerifyRequest
 from handcal.link.server import HeadsetServer, Nudge
 from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
+from handcal.session.state import VERIFYING
 from handcal.station.alignments import AlignmentSteps
 from handcal.station.hands import PlacedHand
 from handcal.station.hold import merge_hold
 from handcal.station.states import CalibrationSettings, Observation, ProcedureError, State
 from handcal.station.verifying import (
     SKIPPED,
-    VERIFYING,
     Verifying,
     hand_centre_E_m,
     new_id,

@@ -21,12 +21,10 @@ from handcal.link.server import Nudge
 from handcal.register.nudge import nudged_shift_m
 from handcal.rig_types import EyeDisplay, Rig
 from handcal.session.journal import Event
-from handcal.session.state import SessionEvent
+from handcal.session.state import VERIFYING, SessionEvent
 from handcal.station.hands import PlacedHand
 from handcal.types import EYES, Eye, Float64, Verification
 
-VERIFYING = "verifying"
-"""The journal's event at the start of a verification and after each nudge."""
 SKIPPED = "verification_skipped"
 _ENDS = (
     SKIPPED,

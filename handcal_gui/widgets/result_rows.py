@@ -53,9 +53,13 @@ class Quantity:
     decimals: int
     sigma: Callable[[EyeShift], float] | None = None
     """Computes the number's standard deviation from the shift."""
+    is_registered: bool = False
+    """True if there is none without an alignment, as after a slipped headset."""
 
     def text(self, shift: EyeShift, display: EyeDisplay) -> str:
         """Return the number, with its standard deviation if it has one."""
+        if not self._is_known(shift):
+            return NOTHING
         value = self.value(shift, display)
         if self.sigma is None:
             return f"{value:.{self.decimals}f}{self.suffix}"
@@ -65,8 +69,13 @@ class Quantity:
 
     def difference(self, shift: EyeShift, other: EyeShift, display: EyeDisplay) -> str:
         """Return the other's number minus this one."""
+        if not (self._is_known(shift) and self._is_known(other)):
+            return NOTHING
         apart = self.value(other, display) - self.value(shift, display)
         return f"{signed(apart, self.decimals)}{self.suffix}"
+
+    def _is_known(self, shift: EyeShift) -> bool:
+        return not self.is_registered or shift.residuals_m.size > 0
 
 
 def _phi(index: int, direction: str) -> Quantity:
@@ -106,6 +115,7 @@ QUANTITIES = (
         ),
         lambda shift, _: 1e3 * shift.rms_m,
         2,
+        is_registered=True,
     ),
     Quantity(
         tr("Inliers"),
@@ -113,9 +123,15 @@ QUANTITIES = (
         tr("Share of the hand's points with a partner on the cursor"),
         lambda shift, _: 100 * shift.inlier_ratio,
         0,
+        is_registered=True,
     ),
     Quantity(
-        tr("Iterations"), "", tr("Sum over all alignments"), lambda s, _: float(s.iterations), 0
+        tr("Iterations"),
+        "",
+        tr("Sum over all alignments"),
+        lambda shift, _: float(shift.iterations),
+        0,
+        is_registered=True,
     ),
 )
 _ANOTHER = tr("Expected error after one more alignment like these")
@@ -140,11 +156,14 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
         meaning = tr("Used in the results; {}").format(measured.source)
         rows.append(Row(tr("Eye distance measured"), (str(measured),), meaning))
     if sessions := results.fused.prior.sessions:
-        learned = tr("learned from {} sessions").format(sessions)
+        counted = pluralize(sessions, tr("session"), tr("sessions"))
+        learned = tr("learned from {}").format(counted)
         rows.append(
             Row(tr("Prior"), (learned,), tr("Where eyes are expected before any alignment"))
         )
     count = pluralize(len(results.alignments), tr("alignment"), tr("alignments"))
+    if not results.alignments:
+        count = pluralize(len(results.fused.verified), tr("verified eye"), tr("verified eyes"))
     fused = f"{count}, {results.method}"
     return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
 

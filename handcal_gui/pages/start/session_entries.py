@@ -66,8 +66,8 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
         unfinished=tuple(
             _unfinished(session)
             for session in unfinished
-            if (session.problem or session.alignments or session.verified or session.trials)
-            and not session.is_repaired
+            if not session.is_repaired
+            and (session.problem or any(_counts(session)) or session.is_verifying)
         ),
         recent=tuple(islice((entry for entry in offered if entry is not None), MOST_RECENT)),
     )
@@ -79,13 +79,19 @@ def _unfinished(session: UnfinishedSession) -> Entry:
         named = session.problem.replace(str(session.path), name)
         text = named if name in named else f"{name}: {named}"
         return Entry(session.path, text, is_enabled=False)
-    counts = session.alignments, session.verified, session.trials
+    counts = _counts(session)
     text = _text(session.wearer, session.started, *counts)
+    if not any(counts):
+        text += tr(" · verification begun")
     if session.damaged:
         text += tr(" · damaged: {} left out").format(
             pluralize(session.damaged, tr("part"), tr("parts"))
         )
     return Entry(session.path, text, wearer=session.wearer)
+
+
+def _counts(session: UnfinishedSession) -> tuple[int, int, int]:
+    return session.alignments, session.verified, session.trials
 
 
 def _recent(path: Path) -> Entry | None:

@@ -32,8 +32,8 @@ def hand_found(snapshot: Snapshot) -> Precondition:
     # A hand that is seen without a problem is placed with one of the next frames.
     if is_placed(snapshot) or (seen and seen.cloud is not None and not seen.problem):
         return Precondition(tr("Hand found"), True)
-    problem = seen.problem if seen is not None else ""
-    return Precondition(sentence(problem or tr("no hand in view")), False)
+    without = tr("No image from the camera") if snapshot.camera.problem else tr("No hand in view")
+    return Precondition((seen and sentence(seen.problem)) or without, False)
 
 
 def eyes_accepted(snapshot: Snapshot) -> tuple[Precondition, ...]:

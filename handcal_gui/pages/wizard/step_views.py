@@ -104,7 +104,11 @@ def align_view(snapshot: Snapshot) -> WizardView:
             hand,
             Precondition(tr("Hand rotated by less than {:g}°").format(limit_deg), is_straight),
         ),
-        ButtonSpec(Action.CONFIRM, tr("Confirm for the wearer"), is_placed(snapshot) and is_due),
+        ButtonSpec(
+            Action.CONFIRM,
+            tr("Confirm for the wearer"),
+            is_placed(snapshot) and is_due and snapshot.link.connected,
+        ),
         (ButtonSpec(Action.REDO, tr("&Make another cursor"), discards=tr("Discards this cursor")),),
         procedure.refusal,
     )
@@ -185,7 +189,11 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
         Step.VERIFY,
         text,
         (hand_found(snapshot), hand_still(snapshot)),
-        ButtonSpec(Action.VERIFIED, tr("It covers the hand"), is_steady(snapshot) and is_due),
+        ButtonSpec(
+            Action.VERIFIED,
+            tr("It covers the hand"),
+            is_steady(snapshot) and is_due and snapshot.link.connected,
+        ),
         (
             ButtonSpec(Action.UNDO_NUDGE, tr("&Undo"), verifying.can_undo),
             ButtonSpec(Action.SKIP, tr("&Skip")),

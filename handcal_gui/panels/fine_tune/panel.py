@@ -7,17 +7,14 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
-from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent, QResizeEvent
+from PySide6.QtGui import QAction, QActionGroup, QHideEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QButtonGroup,
     QComboBox,
-    QFrame,
     QHBoxLayout,
     QLabel,
-    QLayout,
-    QScrollArea,
     QSizePolicy,
     QWidget,
 )
@@ -28,6 +25,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import MAX_HAND_SET_SHIFT_M
 from handcal.types import EYES, Eye
 from handcal_gui.keys import add_action
+from handcal_gui.panels.fine_tune.controls_area import ControlsArea
 from handcal_gui.panels.fine_tune.editor import EyeShiftEditor
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream, find_obstacle
@@ -48,10 +46,6 @@ _MOVES: dict[int, tuple[int, int]] = {
     Qt.Key.Key_PageUp: (2, 1),
 }
 """Axis and direction of φ, opposite to the picture's, which moves in the key's direction."""
-_KEYS = tr(
-    "Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). "
-    "Click here first; E changes the eye."
-)
 _ARRIVALS = {
     Arrival.SENDING: ("wait", tr("Sending to the headset…")),
     Arrival.ARRIVED: ("check", tr("In the headset")),
@@ -359,39 +353,9 @@ class FineTunePanel(QWidget):
         )
         status = _row(self._sign, self._status)
         status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 4)
-        vbox((_ControlsArea(controls), 1), status, on=self, margins=0)
+        vbox((ControlsArea(controls), 1), status, 0, on=self, margins=0)
         for one in self.findChildren(QAbstractButton):
             one.installEventFilter(self)
-
-
-class _ControlsArea(QScrollArea):
-    """Scrolls controls, with the keys below them where there is room.
-
-    The arrow keys are left to the enclosing panel.
-    """
-
-    def __init__(self, controls: QLayout) -> None:
-        super().__init__(widgetResizable=True)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._controls, self._keys = controls, QLabel(text=_KEYS, wordWrap=True)
-        body = QWidget()
-        body.setToolTip(_KEYS)
-        margins = SPACING_PX, SPACING_PX // 2, SPACING_PX, 0
-        vbox(controls, self._keys, 1, on=body, margins=margins, spacing=SPACING_PX // 2)
-        self.setWidget(body)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        event.ignore()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leave the keys to the tooltip where they would have to be scrolled to."""
-        # Beside a scroll bar, too: Qt keeps one that the text needs only because of the bar.
-        bar_px = self.verticalScrollBar().sizeHint().width()
-        keys_px = self._keys.heightForWidth(self.width() - bar_px - 2 * SPACING_PX)
-        least_px = self._controls.totalMinimumSize().height() + keys_px + SPACING_PX
-        self._keys.setVisible(least_px <= self.height())
-        super().resizeEvent(event)
 
 
 def _row(*items: QWidget | QAction | None, spacing: int = SPACING_PX) -> QHBoxLayout:

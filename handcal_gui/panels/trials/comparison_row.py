@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from handcal.session.comparison import Answer, Place
 from handcal_gui.theme import SPACING_PX
@@ -66,7 +66,10 @@ class ComparisonRow(QWidget):
             one.clicked.connect(lambda _=False, place=place: self._ask(place))
         for answer, one in self._answers.items():
             one.clicked.connect(lambda _=False, answer=answer: self.answered.emit(answer))
-        self._how = paragraph("comparisonHow")
+        # As high as the longer text: no button moves between the drawings and the answer.
+        self._how = QStackedWidget()
+        for name, text in (("compareLook", _LOOK), ("compareAsk", _ASK)):
+            self._how.addWidget(paragraph(name, text))
         self._running = QWidget()
         vbox(
             self._how,
@@ -96,7 +99,7 @@ class ComparisonRow(QWidget):
         )
         for place, one in self._show.items():
             one.setChecked(place == shown)
-        self._how.setText(_ASK if has_seen_both else _LOOK)
+        self._how.setCurrentIndex(int(has_seen_both))
         for one in self._answers.values():
             one.setEnabled(has_seen_both)
             one.setToolTip("" if has_seen_both else _NOT_YET)

@@ -51,7 +51,7 @@ _UNTOUCHED = tr(
     "Press T again if this is a separate trial."
 )
 _ZERO = tr(
-    "φ of the {} is still the solved one: the error would be 0 px. "
+    "φ of the {} has not been fine-tuned: the error would be 0 px. "
     "Press T again if the wearer sees no error."
 )
 

@@ -20,6 +20,7 @@ from handcal_gui.widgets.result_rows import (
     single_alignment_rows,
     verdict_rows,
 )
+from tests.gui.views import VERIFIED
 
 
 def cells(rows: Sequence[Row], label: str) -> tuple[str, ...]:
@@ -77,6 +78,21 @@ def test_what_was_known_before_is_shown_if_it_was_used(results: Results, rig: Ri
     rows = result_rows(known, rig)
     assert cells(rows, "Eye distance measured") == ("63.0 ± 1.0 mm",)
     assert cells(rows, "Prior") == ("learned from 12 sessions",)
+
+
+def test_a_result_of_verifications_alone_has_no_numbers_of_a_registration(rig: Rig) -> None:
+    verification = replace(VERIFIED, hand_E_m=(0.0, 0.0, 0.5))
+    verified = solve_session([], rig, SolveSettings(), verified={"left": verification})
+    prior = replace(verified.fused.prior, sessions=1)
+    verified = replace(verified, fused=replace(verified.fused, prior=prior))
+    rows = result_rows(verified, rig)
+    for label in ("RMS (mm)", "Inliers", "Iterations"):
+        assert cells(rows, label) == (NOTHING, NOTHING)
+    assert cells(rows, "Prior") == ("learned from 1 session",)
+    assert cells(rows, "Solved from") == (f"1 verified eye, {verified.method}",)
+    compared = {row.label: row.cells for row in comparison_rows(verified, verified, rig)}
+    assert compared["RMS (mm)"] == (NOTHING, NOTHING, NOTHING)
+    assert compared["Expected error"][2] == "+0.0′"
 
 
 def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -> None:

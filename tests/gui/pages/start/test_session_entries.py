@@ -11,6 +11,7 @@ from handcal.rig.example import example_rig
 from handcal.session.library import EyeOutcome
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
+from handcal.session.state import VERIFYING
 from handcal.types import Alignment
 from handcal_gui.pages.start.session_entries import find_sessions
 from tests.gui.views import VERIFIED
@@ -48,6 +49,16 @@ def test_sessions_that_were_only_verified_are_offered(tmp_path: Path) -> None:
     for (entry,), wearer in ((found.unfinished, "Ada"), (found.recent, "Bea")):
         assert entry.wearer == wearer
         assert entry.text.endswith(" · 1 verified eye")
+
+
+def test_a_session_that_was_interrupted_in_its_first_verification_can_be_resumed(
+    tmp_path: Path,
+) -> None:
+    with Session.create(tmp_path, example_rig(), {}, wearer="Ada") as session:
+        session.record(VERIFYING, eye="left")
+    (entry,) = find_sessions(tmp_path, ()).unfinished
+    assert entry.text.startswith("Ada · ")
+    assert entry.text.endswith(" · verification begun")
 
 
 def test_a_damaged_session_is_reported_with_the_reason(

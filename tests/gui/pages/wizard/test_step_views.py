@@ -14,9 +14,10 @@ from handcal.session.session import SessionRecord
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName, Verification
+from handcal_gui.pages.wizard.preconditions import hand_found
 from handcal_gui.pages.wizard.step_views import connect_view, distance, save_view
 from handcal_gui.pages.wizard.steps import Wizard
-from handcal_gui.pages.wizard.view import Action, Step
+from handcal_gui.pages.wizard.view import Action, Precondition, Step
 from tests.gui.views import NUDGED, Maker, actions, judged
 
 
@@ -136,6 +137,24 @@ def test_a_drawing_is_not_confirmed_before_anyone_can_have_looked(snapshot: Make
         return Wizard().view(seen).main.is_enabled
 
     assert [can_confirm(ago_s) for ago_s in (0.1, 1.4, 1.6)] == [False, False, True]
+
+
+def test_without_the_headset_nothing_is_confirmed(snapshot: Maker) -> None:
+    for connected in (True, False):
+        seen = snapshot(
+            State.VERIFY, procedure={"verifying": NUDGED}, link={"connected": connected}
+        )
+        assert Wizard().view(seen).main.is_enabled == connected
+        aligning = snapshot(
+            State.ALIGN, link={"connected": connected}, t_host_ns=seen.t_host_ns + 2 * 10**9
+        )
+        assert Wizard().view(aligning).main.is_enabled == connected
+
+
+def test_without_an_image_no_hand_is_said_to_be_missing(snapshot: Maker) -> None:
+    for problem, text in (("", "No hand in view"), ("unplugged", "No image from the camera")):
+        seen = snapshot(State.SHOW_HAND, observation=None, camera={"problem": problem})
+        assert hand_found(seen) == Precondition(text, False)
 
 
 def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:

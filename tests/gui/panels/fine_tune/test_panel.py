@@ -292,18 +292,32 @@ def test_a_small_panel_needs_no_scrolling(panel: FineTunePanel, show: Show) -> N
             )
 
 
-def test_the_keys_are_told_where_there_is_room_for_them(panel: FineTunePanel, show: Show) -> None:
+def test_the_keys_are_told_where_there_is_room_for_them(
+    qtbot: QtBot, panel: FineTunePanel, show: Show
+) -> None:
     [keys] = [one for one in panel.findChildren(QLabel) if one.text().startswith("Arrow keys")]
     show()
     assert keys.isVisible()
     panel.resize(384, 284)
     show()
-    QApplication.processEvents()
-    assert not keys.isVisible()
+    qtbot.waitUntil(lambda: not keys.isVisible())
     [area] = panel.findChildren(QScrollArea)
     body = area.widget()
     assert body is not None
     assert body.toolTip() == keys.text()
+    assert area.verticalScrollBar().maximum() == 0
+
+
+def test_in_a_high_panel_the_status_stands_below_its_controls(
+    qtbot: QtBot, panel: FineTunePanel, show: Show
+) -> None:
+    show()
+    [area] = panel.findChildren(QScrollArea)
+    said = child(panel, QLabel, "status")
+    for height_px in (284, 900):
+        panel.resize(430, height_px)
+        qtbot.waitUntil(lambda: said.y() - area.geometry().bottom() < said.height())
+    assert area.height() < 450
     assert area.verticalScrollBar().maximum() == 0
 
 
