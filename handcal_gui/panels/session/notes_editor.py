@@ -89,3 +89,4 @@ class NotesEditor(QWidget):
             saved = tr("✓ Saved") if written else ""  # nothing is written yet
             text = saved if written == self._saved else tr("Not saved yet")
         self._state.setText(text)
+        self._state.setVisible(bool(text))  # empty, it was a bar below the notes
