@@ -116,8 +116,8 @@ def _known_first(value: float | None) -> float:
 COLUMNS = (
     _Column(
         tr("Wearer"),
-        tr("Name or code"),
-        lambda e: e.wearer or NOTHING,
+        tr("Name or code; of a session that cannot be read, its folder"),
+        lambda e: e.wearer or (e.path.name if e.problem else NOTHING),
         lambda e: e.wearer.casefold(),
     ),
     _Column(

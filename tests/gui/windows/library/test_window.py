@@ -117,8 +117,8 @@ def test_an_unreadable_one_among_others_is_left_to_the_export_and_keeps_its_name
 ) -> None:
     (folder / "cid" / "journal.jsonl").write_text("nonsense\n")
     window.reload()
-    qtbot.waitUntil(lambda: "–" in wearers(window), timeout=PATIENCE_MS)
-    choose(window, "Bea", "–")
+    qtbot.waitUntil(lambda: "cid" in wearers(window), timeout=PATIENCE_MS)
+    choose(window, "Bea", "cid")
     with qtbot.waitSignal(window.export_requested) as asked:
         press(window, "exportSessions")
     assert set(asked.args[0]) == {folder / "bea", folder / "cid"}  # which names it with the reason
