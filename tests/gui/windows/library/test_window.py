@@ -57,7 +57,9 @@ def test_search_filter_and_sorting(window: LibraryWindow) -> None:
         kinds.setCurrentIndex(kinds.findData(kind))
         assert len(rows(window)) == expected[kind]
     kinds.setCurrentIndex(0)
-    table(window).sortByColumn(5, Qt.SortOrder.AscendingOrder)  # the unmeasured follow
+    header = table(window).model().headerData(5, Qt.Orientation.Horizontal)
+    assert header == "Verified ′"  # an error that is expected, with a verification behind it
+    table(window).sortByColumn(5, Qt.SortOrder.AscendingOrder)  # those not verified follow
     assert rows(window)[0][5] == "4.0 / 4.0"
 
 
