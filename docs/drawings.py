@@ -163,8 +163,8 @@ ARRANGEMENTS = {
     "setup-board": (
         "Display off: the camera unmoved, the headset tracks the board",
         [(40, 60, "headset H tracks"), (40, 130, "viewpoint camera C")],
-        [(230, 130, "combiner (off)"), (430, 95, "board")],
-        "several distances and angles",
+        [(230, 112, "combiner (off)"), (430, 95, "board")],
+        "several distances, tilted",
     ),
     "setup-display": (
         "Display: the viewpoint camera in the eye's place, dark room",
@@ -175,13 +175,13 @@ ARRANGEMENTS = {
     "setup-accept": (
         "Acceptance: after the grid, the board at several distances",
         [(40, 60, "depth camera D"), (40, 130, "viewpoint camera C")],
-        [(230, 130, "combiner (off)"), (430, 95, "board")],
+        [(230, 112, "combiner (off)"), (430, 95, "board")],
         "0.35 to 0.65 m",
     ),
     "setup-cube": (
         "Cube in the room: tracked by D, drawn by the headset",
         [(40, 60, "depth camera D"), (40, 130, "eye, or camera C")],
-        [(230, 130, "combiner"), (430, 95, "cube")],
+        [(230, 112, "combiner"), (430, 95, "cube")],
         "0.4, 0.5, 0.6 m",
     ),
 }

@@ -20,6 +20,10 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, fill_row, paragraph, whole_number, with_name
 from handcal_gui.widgets.layouts import vbox
 
+_ABOUT = tr(
+    "Choose how the RealSense takes images. Calibrate without filters: they smooth and invent "
+    "depth."
+)
 _AS_IT_IS = tr("Keep the camera's setting")
 _PROFILES: dict[Profile, str] = {
     "auto": tr("Largest available"),
@@ -84,19 +88,19 @@ class CameraSettingsDialog(QDialog):
             150,
         )
         self._whole = with_name(
-            QCheckBox(tr("For the whole image")),
+            QCheckBox(tr("For the &whole image")),
             "wholeImage",
             tr("Exposure of colour for the whole image"),
             tr("Measures the exposure of colour on the whole image, not on the hand once found."),
         )
         self._spatial = _filter(
-            "spatial", tr("Spatial"), tr("Smooths each depth image, keeping edges.")
+            "spatial", tr("&Spatial"), tr("Smooths each depth image, keeping edges.")
         )
         self._temporal = _filter(
-            "temporal", tr("Temporal"), tr("Averages over the last depth images.")
+            "temporal", tr("&Temporal"), tr("Averages over the last depth images.")
         )
         self._holes = _filter(
-            "holes", tr("Hole filling"), tr("Fills in depth where none was measured.")
+            "holes", tr("&Hole filling"), tr("Fills in depth where none was measured.")
         )
         self._lay_out()
         self._show(settings)
@@ -130,15 +134,12 @@ class CameraSettingsDialog(QDialog):
         fill_row(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
         form = QFormLayout()
         form.setSpacing(SPACING_PX)
-        form.addRow(tr("Image size"), self._profile)
-        form.addRow(tr("Depth preset"), self._preset)
-        form.addRow(tr("Exposure"), self._exposure)
+        form.addRow(tr("&Image size"), self._profile)
+        form.addRow(tr("Depth &preset"), self._preset)
+        form.addRow(tr("&Exposure"), self._exposure)
         form.addRow(tr("Exposure of colour"), self._whole)
-        form.addRow(tr("Laser power"), self._laser)
+        form.addRow(tr("&Laser power"), self._laser)
         form.addRow(tr("Depth filters"), filters)
-        form.addRow(
-            "", paragraph(text=tr("Filters smooth and invent depth: calibrate without them."))
-        )
         standard = QDialogButtonBox.StandardButton
         buttons = QDialogButtonBox(standard.Ok | standard.Cancel | standard.RestoreDefaults)
         for one in buttons.buttons():
@@ -146,11 +147,12 @@ class CameraSettingsDialog(QDialog):
         restore = with_name(
             buttons.button(standard.RestoreDefaults), "restore", tr("Restore defaults")
         )
-        restore.setText(tr("Restore defaults"))
+        restore.setText(tr("Restore &defaults"))
         restore.clicked.connect(lambda: self._show(RealSenseSettings()))
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
-        vbox(form, buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
+        what = paragraph("cameraAbout", _ABOUT)
+        vbox(what, form, buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
 
 
 class _OwnNumber(QWidget):
@@ -175,6 +177,7 @@ class _OwnNumber(QWidget):
             QCheckBox(left), f"{number.objectName()}Left", f"{label}: {left}", number.toolTip()
         )
         self._left.toggled.connect(number.setDisabled)
+        self.setFocusProxy(self._left)  # the number may be disabled
         fill_row(self, number, self._left, grows=self._left)
 
     @property
@@ -196,4 +199,5 @@ def _number(name: str, low: int, high: int, step: int, unit: str, help_text: str
 
 
 def _filter(name: str, text: str, help_text: str) -> QCheckBox:
-    return with_name(QCheckBox(text), name, tr("{} filter").format(text), help_text)
+    label = tr("{} filter").format(text.replace("&", ""))
+    return with_name(QCheckBox(text), name, label, help_text)

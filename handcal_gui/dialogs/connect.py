@@ -77,13 +77,13 @@ class ConnectDialog(QDialog):
         self._code.setFont(number_font())
         scale_font(self._code, 1.6, is_bold=True)
         self._how = paragraph("howToPair")
-        self._invite = button("invite", tr("New code"), tr("Invite another headset"))
+        self._invite = button("invite", tr("&New code"), tr("Invite another headset"))
         self._state = FindingLine("headset")
         self._problem = paragraph("connectProblem")
         self._devices = PairedDevices(server.pairings)
         self._devices.failed.connect(self._problem.setText)
         self._squares = {eye: _Square(eye) for eye in EYES}
-        self._close = button("close", tr("Close"))
+        self._close = button("close", tr("&Close"))
         self._lay_out()
         self._close.setFocus()  # Enter must not replace a code that is being typed
         self._invite.clicked.connect(self.invite)
@@ -200,9 +200,9 @@ class ConnectDialog(QDialog):
 
     def _lay_out(self) -> None:
         left = vbox(
+            self._how,
             (self._qr, 1),
             hbox(self._code, 1, self._invite, spacing=SPACING_PX),
-            self._how,
             0,
             spacing=SPACING_PX,
         )
@@ -228,7 +228,7 @@ class _Square(QWidget):
         self.sent: tuple[Outgoing, ...] = ()
         self._eye = eye
         name = EYE_NAMES[eye]
-        self.send = button(f"square-{eye}", tr("Show to {}").format(name.lower()))
+        self.send = button(f"square-{eye}", tr("Show to &{}").format(name.lower()))
         self._state = paragraph(f"squareState-{eye}")
         self._seen = with_name(
             QCheckBox(tr("The wearer sees it")),

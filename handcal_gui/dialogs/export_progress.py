@@ -89,7 +89,8 @@ class ExportProgress(QWidget):
     def show_failure(self, why: str) -> None:
         """Show the reason why nothing was exported."""
         self._doing.setText(tr("Nothing was exported."))
-        self._show_end(Finding("", Health.BROKEN, why, _UNCHANGED))
+        advice = tr("{}; go back to choose another folder, or to try again").format(_UNCHANGED)
+        self._show_end(Finding("", Health.BROKEN, why, advice))
 
     def show_cancelling(self) -> None:
         """Show that the export is being cancelled."""

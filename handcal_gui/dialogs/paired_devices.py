@@ -59,10 +59,10 @@ class PairedDevices(QWidget):
         across.setSectionResizeMode(_NAME, QHeaderView.ResizeMode.Stretch)
         across.setSectionResizeMode(_DEVICE, QHeaderView.ResizeMode.ResizeToContents)
         self._empty = paragraph("noDevices", tr("No headset is paired yet."))
-        self._rename = button("renameDevice", tr("Rename"), tr("Rename the chosen headset"))
+        self._rename = button("renameDevice", tr("Rena&me"), tr("Rename the chosen headset"))
         self._revoke = button(
             "revokeDevice",
-            tr("Revoke…"),
+            tr("Re&voke…"),
             tr("Revoke the chosen headset"),
             tr("It can then no longer connect"),
         )

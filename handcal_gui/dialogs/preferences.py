@@ -73,7 +73,7 @@ class PreferencesDialog(QDialog):
         self._calibration = CalibrationFields(explains=True)
         self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
         self._learn = with_name(
-            QCheckBox(tr("Learn from earlier sessions")), "learnPrior", help_text=_LEARN_HELP
+            QCheckBox(tr("&Learn from earlier sessions")), "learnPrior", help_text=_LEARN_HELP
         )
         host = preferences.bridges.slicer_host
         hosts = _SLICER if host in _SLICER else {**_SLICER, host: host}  # typed into the file
@@ -82,7 +82,7 @@ class PreferencesDialog(QDialog):
         self._slicer.currentIndexChanged.connect(
             lambda: self._port.setEnabled(bool(self._slicer.currentData()))
         )
-        self._lsl = with_name(QCheckBox(tr("Send events")), "lsl", help_text=_LSL_HELP)
+        self._lsl = with_name(QCheckBox(tr("Send &events")), "lsl", help_text=_LSL_HELP)
         self._buttons = QDialogButtonBox(
             QDialogButtonBox.StandardButton.Ok
             | QDialogButtonBox.StandardButton.Cancel
@@ -184,18 +184,18 @@ class PreferencesDialog(QDialog):
     def _lay_out(self) -> None:
         add = self._calibration.add_row
         add(
-            tr("Target"),
+            tr("Tar&get"),
             self._target,
             tr("Largest expected error of an accepted eye; 60′ are 1°."),
         )
         add(tr("Eye box"), self._learn, tr("Expects eyes where those of earlier wearers were."))
         self._calibration.add_heading(tr("Sent to other programs, from the next calibration on"))
-        add("OpenIGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
-        add(tr("Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
+        add("Open&IGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
+        add(tr("&Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
         add("LSL", self._lsl, tr("Marks events in recordings of other instruments."))
         self._calibration.add_heading(tr("Program"))
-        add(tr("Theme"), self._theme, tr("Colours of all windows."))
-        add(tr("Session folder"), self._sessions)
+        add(tr("The&me"), self._theme, tr("Colours of all windows."))
+        add(tr("Session f&older"), self._sessions)
         self._calibration.add_line(self._sessions_found)
         buttons = self._buttons
         for one in buttons.buttons():

@@ -6,24 +6,27 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QFormLayout, QWidget
 
 from handcal.io.files import user_path
 from handcal.progress import Progress
+from handcal.station.doctor import Finding, Health
 from handcal.station.support import SupportSettings, run_support
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, paragraph
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.fields import button, main_button, paragraph
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _ABOUT = tr(
-    "One file to send with a bug report: the checks of the installation, package versions, and the "
-    "log, in which wearers' names, your user name and the home folder are replaced. It contains "
-    "nothing from sessions, and camera frames only if you add a recording here."
+    "Choose a folder, write one file there, and send it with a bug report. It contains the checks "
+    "of the installation, package versions, and the log, in which wearers' names, your user name "
+    "and the home folder are replaced; nothing from sessions, and camera frames only if you add a "
+    "recording here."
 )
+_ADVICE = tr("nothing was written; choose another folder or recording, and try again")
 
 
 class SupportDialog(QDialog):
@@ -45,24 +48,26 @@ class SupportDialog(QDialog):
         self.setWindowTitle(tr("Support bundle"))
         self._settings = settings
         self._job: Job | None = None
+        self._fit_soon = fit_soon(self._fit, self)
         self._folder = PathField(tr("Folder"), "folder")
         self._folder.set_path(str(folder))
         self._folder.setMinimumWidth(45 * SPACING_PX)
         self._frames = PathField(tr("Recording to add"), "either", empty=tr("None"))
-        self._said = paragraph("supportSaid")
-        self._said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._write = button("writeBundle", tr("Write"))
-        self._write.setDefault(True)
-        close = button("close", tr("Close"))
+        self._doing = paragraph("supportDoing")
+        self._said = FindingLine("support")
+        self._said.hide()
+        self._write = main_button("writeBundle", tr("&Write"))
+        close = button("close", tr("&Close"))
         self._write.clicked.connect(self.write)
         close.clicked.connect(self.reject)
         self.finished.connect(self.stop)
         form = QFormLayout()
-        form.addRow(tr("Folder"), self._folder)
-        form.addRow(tr("Recording to add"), self._frames)
+        form.addRow(tr("&Folder"), self._folder)
+        form.addRow(tr("&Recording to add"), self._frames)
         vbox(
             paragraph("supportAbout", _ABOUT),
             form,
+            self._doing,
             self._said,
             1,
             hbox(1, close, self._write, spacing=SPACING_PX),
@@ -86,9 +91,10 @@ class SupportDialog(QDialog):
 
         self._write.setEnabled(False)
         self._job = Job(work)
-        self._job.progressed.connect(lambda doing, _: self._said.setText(f"{doing}…"))
-        self._job.succeeded.connect(self._end)
-        self._job.failed.connect(self._end)
+        self._said.hide()
+        self._job.progressed.connect(lambda doing, _: self._doing.setText(f"{doing}…"))
+        self._job.succeeded.connect(lambda said: self._end(Finding("", Health.GOOD, said)))
+        self._job.failed.connect(lambda why: self._end(Finding("", Health.BROKEN, why, _ADVICE)))
         self._job.cancelled.connect(self._end)
         self._job.start()
 
@@ -98,9 +104,19 @@ class SupportDialog(QDialog):
             self._job.abandon()
             self._job = None
 
-    def _end(self, said: object = "") -> None:
+    def _end(self, found: Finding | None = None) -> None:
         assert self._job is not None
         self._job.wait()
         self._job = None
-        self._said.setText(str(said))
+        self._doing.clear()
         self._write.setEnabled(True)
+        if found is not None:
+            self._said.show_finding(found)
+            self._said.show()
+        self._fit_soon.start()
+
+    def _fit(self) -> None:
+        """Make the dialog higher for what is said: it was cut off, or cut the text above."""
+        layout = self.layout()
+        assert layout is not None
+        self.resize(self.width(), max(self.height(), layout.totalHeightForWidth(self.width())))

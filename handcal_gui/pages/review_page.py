@@ -18,6 +18,7 @@ from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_card import ResultCard
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.session_rows import RESUME_HELP
 from handcal_gui.widgets.times import local_time
 
@@ -161,6 +162,7 @@ def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str, str]]:
     if note:
         yield "Note", tr("Note"), note
     if record.left_out:
-        yield "Damaged", tr("Damaged"), f"{record.left_out[0].upper()}{record.left_out[1:]}."
+        advice = tr("Repair, in All sessions (Ctrl+L), copies what is sound.")
+        yield "Damaged", tr("Damaged"), f"{sentence(record.left_out)}. {advice}"
     if record.torn_bytes:
         yield "Journal", tr("Journal"), tr("The last line is incomplete, as after a crash.")

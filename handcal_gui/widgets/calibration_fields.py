@@ -107,26 +107,26 @@ class CalibrationFields(QWidget):
             self.add_heading(tr("Calibration, from the next one on"))
         for label, field, meaning in (
             (
-                tr("Rotation guard"),
+                tr("&Rotation guard"),
                 self._guard,
                 tr("The hand may be rotated this much from the cursor."),
             ),
             (
-                tr("Depth gate from"),
+                tr("Depth gate &from"),
                 self._near,
                 tr("Nearest distance of the hand from the depth camera."),
             ),
             (
-                tr("Depth gate to"),
+                tr("Depth gate &to"),
                 self._far,
                 tr("Farthest distance of the hand from the depth camera."),
             ),
         ):
             self.add_row(label, field, meaning)
         self.add_line(self.gate_found)
-        self.add_row(tr("Hand found by"), self._roi, tr("Finds the hand in the camera's images."))
+        self.add_row(tr("&Hand found by"), self._roi, tr("Finds the hand in the camera's images."))
         solves = tr("Computes where the eyes are from each alignment.")
-        self.add_row(tr("Solver"), self._method, solves)
+        self.add_row(tr("&Solver"), self._method, solves)
         self._near.valueChanged.connect(self._push_far)
         self._far.valueChanged.connect(self._push_near)
         for field in (self._guard, self._near, self._far):
@@ -157,9 +157,12 @@ class CalibrationFields(QWidget):
         )
 
     def add_row(self, text: str, field: QWidget, meaning: str = "") -> None:
-        """Add a field below, with its meaning beside it if the form explains fields."""
+        """Add a field below, with its meaning beside it if the form explains fields.
+
+        Only then has the label a letter: beside others the letters would not be unique.
+        """
         row = self._grid.rowCount()
-        label = QLabel(text)
+        label = QLabel(text if self._explains else text.replace("&", ""))
         label.setBuddy(field)
         self._grid.addWidget(label, row, 0)
         if not (self._explains and meaning):

@@ -42,6 +42,7 @@ _BESIDE_PX = 80
 _FOUND_PX = 230
 _COLUMNS_PX = 150, 200, 450
 _MOST_FOUND = 200
+_NOTHING = tr("Nothing found: search for fewer or other words")
 _DIMMED = 0.25
 """Share of the light that a picture of the light window loses on a dark page."""
 _PAGES = (".md", ".py", ".proto")
@@ -154,9 +155,9 @@ class Manual(QWidget):
             item.setToolTip(2, line.text)
         for column, width_px in enumerate(_COLUMNS_PX):
             self.found.setColumnWidth(column, width_px)
-        self.found.setVisible(bool(words.split()))
+        self.found.setVisible(bool(found))
         most = tr(", the first {} listed").format(_MOST_FOUND) if len(found) > _MOST_FOUND else ""
-        count = pluralize(len(found), tr("line"), tr("lines"))
+        count = pluralize(len(found), tr("line"), tr("lines")) if found else _NOTHING
         self._count.setText(f"{count}{most}" if words.split() else "")
 
     def _show_next(self) -> None:

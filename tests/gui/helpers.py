@@ -34,6 +34,12 @@ def text(parent: QObject, name: str) -> str:
     return child(parent, QLabel, name).text()
 
 
+def letters(dialog: QWidget) -> list[str]:
+    """Return the letters with which Alt reaches the buttons and fields of a dialog."""
+    texts = [one.text() for kind in (QAbstractButton, QLabel) for one in dialog.findChildren(kind)]
+    return [text.partition("&")[2][0].lower() for text in texts if "&" in text]
+
+
 def button(parent: QObject, kind: type[Button], text: str) -> Button:
     """Return the first button of a kind and a text."""
     return next(found for found in parent.findChildren(kind) if found.text() == text)

@@ -37,9 +37,9 @@ _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
 _LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
 """Width and height from which the guide has larger texts, and their scale."""
-_LOW = 43, 40, 36
-"""Heights of a window below which the guide has smaller gaps, no details, and no small views of the
-eyes; in sizes of the font."""
+_LOW = 36.5, 33.5, 29.5
+"""Heights of the room for the guide, without its messages, below which it has smaller gaps, no
+details, and no small views of the eyes; in sizes of the font."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -169,8 +169,10 @@ class WizardPanel(QWidget):
         self._fit_soon.start()
 
     def _fit(self) -> None:
-        """Leave out what a low window has no room for."""
-        height = self.window().height() / font_px()
+        """Leave out what a low window has no room for, or one with messages."""
+        said = (one for one in (self._fact, self._note) if not one.isHidden())
+        said_px = sum(one.heightForWidth(self._sentence.width()) for one in said)
+        height = ((self.parentWidget() or self).height() - said_px) / font_px()
         has_gaps, has_details, has_eyes = (height >= least for least in _LOW)
         self.picture.fit(has_details=has_details, has_eyes=has_eyes)
         gap_px = SPACING_PX if has_gaps else SPACING_PX // 2
@@ -318,6 +320,7 @@ class WizardPanel(QWidget):
         self._fact.setText(view.fact)
         self._fact.setVisible(bool(view.fact))
         self._note.setVisible(bool(view.note))
+        self._fit_soon.start()
         for action in self._nudges:
             action.setEnabled(view.main.action is Action.VERIFIED)
         self._undo.setEnabled(

@@ -99,3 +99,4 @@ class NotesEditor(QWidget):
             saved = tr("✓ Saved") if self._saved else ""  # nothing is written yet
             text = saved if self.are_saved else tr("Not saved yet")
         self._state.setText(text)
+        self._state.setVisible(bool(text))  # empty, it was a bar below the notes

@@ -17,6 +17,7 @@ from handcal.lab.study.studies import (
     run_method_comparison,
     run_noise_study,
 )
+from handcal.session.journal import JOURNAL
 from handcal_gui.evaluation_entries import CubeEntries, UserEntries
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -127,7 +128,13 @@ def _missing_captures(entries: CubeEntries) -> str:
 
 
 def _missing_sessions(entries: UserEntries) -> str:
-    return _missing_folder(entries.sessions, tr("choose a session, or a folder of sessions"))
+    request = tr("choose a session, or a folder of sessions")
+    if missing := _missing_folder(entries.sessions, request):
+        return missing
+    folder = user_path(entries.sessions)
+    if any(path.is_file() for path in (folder / JOURNAL, *folder.glob(f"*/{JOURNAL}"))):
+        return ""
+    return tr("there is no session in {}: {}").format(entries.sessions, request)
 
 
 def _missing_frames(entries: SegmentationTestSettings) -> str:

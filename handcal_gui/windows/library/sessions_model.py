@@ -116,8 +116,8 @@ def _known_first(value: float | None) -> float:
 COLUMNS = (
     _Column(
         tr("Wearer"),
-        tr("Name or code"),
-        lambda e: e.wearer or NOTHING,
+        tr("Name or code; of a session that cannot be read, its folder"),
+        lambda e: e.wearer or (e.path.name if e.problem else NOTHING),
         lambda e: e.wearer.casefold(),
     ),
     _Column(
@@ -137,10 +137,10 @@ COLUMNS = (
     ),
     _Column(tr("Verdict"), tr("Of the newest results"), _verdicts, _verdicts),
     _Column(
-        tr("Measured ′"),
+        tr("Verified ′"),
         tr(
-            "Error that remains after the wearer's verification, left / right, in arcminutes;\n"
-            "– was not measured"
+            "Error that is expected after the wearer's verification, left / right, in "
+            "arcminutes;\n– was not verified"
         ),
         _errors("measured"),
         lambda e: _known_first(worst_arcmin(e, "measured")),
@@ -148,7 +148,7 @@ COLUMNS = (
     ),
     _Column(
         tr("Expected ′"),
-        tr("Error that the solver expects, left / right, in arcminutes; not a measurement"),
+        tr("Error that the solver expects from all it knows, left / right, in arcminutes"),
         _errors("expected"),
         lambda e: _known_first(worst_arcmin(e, "expected")),
         is_number=True,

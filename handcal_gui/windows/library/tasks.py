@@ -61,7 +61,8 @@ def _require_sound(path: Path) -> None:
     named = "; ".join(one.what if found.state == "none" else str(one) for one in damaged)
     more = len(found.damaged) - _MOST_NAMED
     others = tr(" (and {} more)").format(more) if more > 0 else ""
-    raise FileError(f"{named}{others}")
+    advice = "" if found.state == "none" else tr("; Repair copies what is sound")
+    raise FileError(f"{named}{others}{advice}")
 
 
 def repair_beside(path: Path, progress: Progress) -> str:

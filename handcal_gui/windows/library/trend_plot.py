@@ -18,7 +18,7 @@ _SYMBOLS: dict[Eye, str] = {"left": "o", "right": "t1"}
 
 
 class TrendPlot(Plot):
-    """Shows measured errors by filled symbols, and those only expected by hollow ones."""
+    """Shows errors after a verification by filled symbols, and those expected by hollow ones."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
@@ -31,7 +31,7 @@ class TrendPlot(Plot):
         self.show_legend()
         self._measured = {
             eye: self.add_line(
-                eye, name=tr("{}, measured").format(EYE_NAMES[eye]), symbol=_SYMBOLS[eye]
+                eye, name=tr("{}, verified").format(EYE_NAMES[eye]), symbol=_SYMBOLS[eye]
             )
             for eye in EYES
         }
@@ -69,8 +69,8 @@ class TrendPlot(Plot):
 def trend_text(wearer: str, count: int) -> str:
     """Return what the plot shows, in a sentence."""
     return tr(
-        "{}: {} calibrations, and the error that each left, measured in the wearer's verification "
-        "or only expected"
+        "{}: {} calibrations, and the error that each left, after the wearer's verification or "
+        "only expected"
     ).format(wearer, count)
 
 

@@ -270,7 +270,9 @@ def test_what_is_left_of_a_damaged_session_is_opened(
     damage(record.path)
     program.open_session(record.path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
-    assert "The session is damaged: " in child(program, QLabel, "reviewDamaged").text()
+    said = child(program, QLabel, "reviewDamaged").text()
+    assert "The session is damaged: " in said
+    assert said.endswith("Repair, in All sessions (Ctrl+L), copies what is sound.")
 
 
 def test_a_session_whose_last_line_was_cut_off_is_opened_without_it(

@@ -8,6 +8,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
+from tests.gui.helpers import letters
 
 ALL_SET = RealSenseSettings(
     serial="42",
@@ -70,3 +71,10 @@ def test_only_filters_are_read_out_as_filters(qtbot: QtBot) -> None:
         "temporal",
         "holes",
     ]
+
+
+def test_every_field_has_a_letter_of_its_own(qtbot: QtBot) -> None:
+    dialog = CameraSettingsDialog(RealSenseSettings())
+    qtbot.addWidget(dialog)
+    found = letters(dialog)
+    assert len(set(found)) == len(found) >= 9

@@ -27,7 +27,7 @@ from handcal.rig_types import Rig
 from handcal.types import HeadsetIdentity
 from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.widgets.qr_code import QrCode
-from tests.gui.helpers import child, text
+from tests.gui.helpers import child, letters, text
 
 DEVICE = "00000000000000aa"
 PATIENCE_MS = 10_000
@@ -171,3 +171,8 @@ def test_a_headset_is_renamed_and_revoked(
     assert pairings.all == ()
     assert table.isHidden()
     qtbot.waitUntil(lambda: not client.connected, timeout=PATIENCE_MS)
+
+
+def test_every_button_has_a_letter_of_its_own(dialog: ConnectDialog) -> None:
+    found = letters(dialog)
+    assert len(set(found)) == len(found) >= 6

@@ -151,6 +151,7 @@ def test_a_failure_is_reported_and_can_be_tried_again(
     exporter.may_end.set()
     press(dialog, "export").click()
     qtbot.waitUntil(lambda: "No space left on device" in text(dialog, "exportEndFound"))
+    assert "go back to choose another folder, or to try again" in text(dialog, "exportEndFound")
     assert files(dialog) == []
     exporter.failure = ""
     press(dialog, "back").click()

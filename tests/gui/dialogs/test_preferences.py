@@ -27,7 +27,7 @@ from handcal.station.settings import StationSettings
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.preferences import Preferences
 from handcal_gui.widgets.path_field import PathField
-from tests.gui.helpers import child, show
+from tests.gui.helpers import child, letters, show
 
 BEFORE = Preferences(
     station=StationSettings(source="realsense", port=50_000, sessions="/a"),
@@ -180,3 +180,10 @@ def test_defaults_are_shown_and_taken_only_by_ok(opened: PreferencesDialog) -> N
 def _button(dialog: PreferencesDialog, name: str) -> QPushButton:
     box = child(dialog, QDialogButtonBox)
     return box.button(QDialogButtonBox.StandardButton[name])
+
+
+def test_every_field_has_a_letter_of_its_own(qtbot: QtBot) -> None:
+    dialog = PreferencesDialog(BEFORE)
+    qtbot.addWidget(dialog)
+    found = letters(dialog)
+    assert len(set(found)) == len(found) >= 13

@@ -22,6 +22,19 @@ def test_the_dialog_writes_a_bundle(
     qtbot.addWidget(dialog)
     dialog.show()
     child(dialog, QPushButton, "writeBundle").click()
-    qtbot.waitUntil(lambda: "was written" in text(dialog, "supportSaid"), timeout=10_000)
+    qtbot.waitUntil(lambda: "was written" in text(dialog, "supportFound"), timeout=10_000)
     assert len(list(tmp_path.glob("handcal-support-*.zip"))) == 1
+    dialog.stop()
+
+
+def test_a_failure_says_what_to_do_and_cuts_nothing_off(qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    dialog = SupportDialog(SupportSettings(tmp_path), tmp_path / "file" / "folder")
+    qtbot.addWidget(dialog)
+    dialog.show()
+    child(dialog, QPushButton, "writeBundle").click()
+    qtbot.waitUntil(lambda: "choose another folder" in text(dialog, "supportFound"))
+    layout = dialog.layout()
+    assert layout is not None
+    qtbot.waitUntil(lambda: dialog.height() >= layout.totalHeightForWidth(dialog.width()))
     dialog.stop()

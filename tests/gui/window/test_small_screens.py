@@ -15,6 +15,7 @@ from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.station.states import State
 from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.pages.wizard.picture import OF_THE_RESULT
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.program import Program
@@ -96,6 +97,26 @@ def test_with_larger_texts_no_view_of_a_small_window_needs_scrolling(
         say(program, seen, view)
         picture.show_snapshot(seen)
         assert scrolled_px(viewport.parent()) == [0, 0], view.sentence
+
+
+def test_a_result_below_messages_needs_no_scrolling(
+    program: Program, snapshot: Maker, record: SessionRecord
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.resize(*SMALL_PX[0])
+    window.show_page("live")
+    viewport = guide.parent()
+    assert viewport is not None
+    seen = snapshot(State.APPLIED)
+    for view in all_views(snapshot, record):
+        is_done = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
+        if not is_done or any(one.verdict is None for one in view.preconditions):
+            continue
+        say(program, seen, replace(view, fact=6 * "drawn otherwise "))
+        guide.picture.show_snapshot(seen)
+        for message in (15 * "a message ", ""):
+            window.banner.show_message(message)
+            assert scrolled_px(viewport.parent()) == [0, 0], view.sentence
 
 
 @EACH_TEXT

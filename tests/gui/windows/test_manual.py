@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QTextDocument
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.theme import use_theme
@@ -105,6 +105,9 @@ def test_a_search_lists_lines_of_all_pages_and_return_goes_from_one_to_the_next(
     QTest.keyClick(manual.search, Qt.Key.Key_Escape)
     assert not manual.search.text()
     assert not manual.found.isVisible()
+    QTest.keyClicks(manual.search, "nosuchword")
+    assert not manual.found.isVisible()
+    assert any("Nothing found" in label.text() for label in manual.findChildren(QLabel))
 
 
 def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:

@@ -41,6 +41,8 @@ def test_saves_once_after_the_last_key(
 ) -> None:
     notes.show_saved(ONE, "")
     assert state(notes) == ""  # there is nothing to save
+    [label] = notes.findChildren(QLabel, "notesState")
+    assert label.isHidden()
     asked: list[str] = []
     notes.changed.connect(asked.append)
     QTest.keyClicks(edit, "with glasses")

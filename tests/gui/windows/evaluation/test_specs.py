@@ -63,6 +63,11 @@ def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
     assert not readiness.can_run
     assert readiness.finding.found.startswith(f"there is no folder {tmp_path / 'none'}: choose")
     (tmp_path / "none").mkdir()
+    readiness = evaluation.readiness(entries)
+    assert not readiness.can_run
+    assert readiness.finding.found.startswith("there is no session in")
+    (tmp_path / "none" / "one").mkdir()
+    (tmp_path / "none" / "one" / "journal.jsonl").touch()
     assert evaluation.readiness(entries).can_run
     with pytest.raises(FileError, match=r"no trial .*none"):
         evaluation.run(entries, Progress())

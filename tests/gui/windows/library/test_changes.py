@@ -33,6 +33,7 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
     press(window, "checkSessions")
     wait_for(qtbot, window, "3 sessions sound, every file read.")
     assert "cid: alignments/1.npz" in text(window, "message")
+    assert text(window, "message").endswith("; Repair copies what is sound")
     choose(window, "Cid")
     press(window, "repairSession")
     wait_for(qtbot, window, "cid-repaired: a copy with 0 alignments")
