@@ -108,6 +108,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Choose how the RealSense takes images. Calibrate without filters: they smooth and invent depth.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Keep the camera&apos;s setting</source>
         <translation type="unfinished"></translation>
     </message>
@@ -176,7 +180,15 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>For the whole image</source>
+        <source>For the &amp;whole image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Spatial</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Temporal</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -188,15 +200,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Spatial</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Smooths each depth image, keeping edges.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Temporal</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -204,11 +208,23 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Hole filling</source>
+        <source>Fills in depth where none was measured.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Fills in depth where none was measured.</source>
+        <source>&amp;Hole filling</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Image size</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth &amp;preset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Exposure</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -216,15 +232,19 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Laser power</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Depth filters</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Filters smooth and invent depth: calibrate without them.</source>
+        <source>Restore defaults</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Restore defaults</source>
+        <source>Restore &amp;defaults</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -252,15 +272,15 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>New code</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Invite another headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Close</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;New code</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -292,7 +312,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show to {}</source>
+        <source>Show to &amp;{}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -468,6 +488,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}; go back to choose another folder, or to try again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Cancelling…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -492,15 +516,15 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Rename</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Rename the chosen headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Revoke…</source>
+        <source>Rena&amp;me</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Re&amp;voke…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -591,11 +615,15 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Learn from earlier sessions</source>
+        <source>&amp;Learn from earlier sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Send events</source>
+        <source>Send &amp;events</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tar&amp;get</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -611,7 +639,19 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Port</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Colours of all windows.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The&amp;me</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Session f&amp;older</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -620,10 +660,6 @@ local network can read them.</source>
     </message>
     <message>
         <source>Shows the default of every field; Cancel keeps the former values.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Target</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -643,10 +679,6 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Port</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>TCP port of OpenIGTLink on this computer.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -659,7 +691,11 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>One file to send with a bug report: the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced. It contains nothing from sessions, and camera frames only if you add a recording here.</source>
+        <source>Choose a folder, write one file there, and send it with a bug report. It contains the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced; nothing from sessions, and camera frames only if you add a recording here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>nothing was written; choose another folder or recording, and try again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -679,7 +715,15 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Write</source>
+        <source>&amp;Write</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Recording to add</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -840,6 +884,10 @@ local network can read them.</source>
     </message>
     <message>
         <source>Note</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Repair, in All sessions (Ctrl+L), copies what is sound.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3351,6 +3399,18 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Rotation guard</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth gate &amp;from</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth gate &amp;to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Farthest distance of the hand from the depth camera.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3359,7 +3419,15 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Hand found by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Computes where the eyes are from each alignment.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Solver</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3375,23 +3443,11 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Rotation guard</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The hand may be rotated this much from the cursor.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Depth gate from</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Nearest distance of the hand from the depth camera.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Depth gate to</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3949,6 +4005,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Name or code; of a session that cannot be read, its folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Date</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3969,20 +4029,20 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Measured ′</source>
+        <source>Verified ′</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error that remains after the wearer&apos;s verification, left / right, in arcminutes;
-– was not measured</source>
+        <source>Error that is expected after the wearer&apos;s verification, left / right, in arcminutes;
+– was not verified</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error that the solver expects from all it knows, left / right, in arcminutes</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Expected ′</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Error that the solver expects, left / right, in arcminutes; not a measurement</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4030,15 +4090,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{}, measured</source>
+        <source>{}, verified</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: {} calibrations, and the error that each left, after the wearer&apos;s verification or only expected</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>{}, expected</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{}: {} calibrations, and the error that each left, measured in the wearer&apos;s verification or only expected</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4115,6 +4175,10 @@ one turns out.</source>
     </message>
     <message>
         <source>choose a session, or a folder of sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>there is no session in {}: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4402,6 +4466,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>; Repair copies what is sound</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Repairing {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4475,6 +4543,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Delete the selected sessions (Del)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing found: search for fewer or other words</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
