@@ -5010,19 +5010,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Take grid</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Take board</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Accept the rig</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>For each eye, put the viewpoint camera behind its display. In a dark room, take images of the grid. Do not move camera or headset: switch the display off, and take images of the board with both cameras at {} or more distances, 0.35 to 0.65 m.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take &amp;grid…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take &amp;board…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take g&amp;rid…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Take bo&amp;ard…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -36,7 +36,8 @@ def text(parent: QObject, name: str) -> str:
 
 def letters(dialog: QWidget) -> list[str]:
     """Return the letters with which Alt reaches the buttons and fields of a dialog."""
-    texts = [one.text() for kind in (QAbstractButton, QLabel) for one in dialog.findChildren(kind)]
+    texts = [one.text() for one in dialog.findChildren(QAbstractButton)]
+    texts += [one.text() for one in dialog.findChildren(QLabel)]
     return [text.partition("&")[2][0].lower() for text in texts if "&" in text]
 
 

@@ -47,7 +47,11 @@ _HOW = tr(
     "of the board with both cameras at {} or more distances, 0.35 to 0.65 m."
 ).format(FEWEST_VIEWS)
 _COLUMNS = (tr("Corners"), tr("Mean, ′"), tr("Largest, ′"))
-_TAKE = {"grid": tr("Take grid"), "board": tr("Take board")}
+_TAKE: dict[Eye, dict[str, str]] = {
+    "left": {"grid": tr("Take &grid…"), "board": tr("Take &board…")},
+    "right": {"grid": tr("Take g&rid…"), "board": tr("Take bo&ard…")},
+}
+"""Text of each button; its letter is its own."""
 
 
 class AcceptDialog(QDialog):
@@ -205,8 +209,9 @@ class AcceptDialog(QDialog):
         images.setHorizontalSpacing(2 * SPACING_PX)
         for row, eye in enumerate(EYES):
             images.addWidget(QLabel(EYE_NAMES[eye]), row, 0)
-            for column, (what, text) in enumerate(_TAKE.items(), 1):
-                take = button(f"{eye}-{what}", f"{text}…", f"{text}, {EYE_NAMES[eye].lower()}")
+            for column, (what, text) in enumerate(_TAKE[eye].items(), 1):
+                label = f"{text.replace('&', '').rstrip('…')}, {EYE_NAMES[eye].lower()}"
+                take = button(f"{eye}-{what}", text, label)
                 take.clicked.connect(partial(self._take, eye, what))
                 images.addWidget(take, row, column)
             images.addWidget(self._counts[eye], row, 3)

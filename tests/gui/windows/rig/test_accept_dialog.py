@@ -21,6 +21,7 @@ from handcal_gui.windows.rig.accept_dialog import AcceptDialog
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder, ViewpointEntries
 from handcal_gui.windows.rig.take_dialog import TakeDialog
+from tests.gui.helpers import letters
 
 Kind = TypeVar("Kind", bound=QWidget)
 
@@ -47,6 +48,11 @@ def part(dialog: QWidget, kind: type[Kind], name: str) -> Kind:
     found = dialog.findChild(kind, name)
     assert isinstance(found, kind)
     return found
+
+
+def test_every_button_has_a_letter_of_its_own(dialog: AcceptDialog) -> None:
+    found = letters(dialog)
+    assert len(set(found)) == len(found) >= 6
 
 
 def test_on_a_small_screen_the_drawing_hides_no_button(dialog: AcceptDialog) -> None:
