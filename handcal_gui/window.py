@@ -178,7 +178,7 @@ class MainWindow(QMainWindow):
             dock.toggleViewAction().setEnabled(belongs)
             self._go_to[name].setEnabled(belongs)
         if page not in self._layouts:
-            least_px = self._pages["review"].minimumSizeHint().width() + 8 * SPACING_PX
+            least_px = self._pages["review"].minimumSizeHint().width() + 5 * SPACING_PX
             review_px = max(least_px, self.width() * _REVIEW_PERCENT // 100)
             share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
