@@ -719,7 +719,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Press the button or enter the field of this letter</source>
+        <source>Press its button, or go to its field</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1505,6 +1505,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Make sure that the headset sits well on the wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Close the {} eye. </source>
         <translation type="unfinished"></translation>
     </message>
@@ -1678,10 +1682,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>This session continues where it stopped, with {}.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Let the headset sit well on the wearer</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2910,7 +2910,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The wearer holds the hand up, and looks at the first drawing and at the second. The answers follow once both have been shown.</source>
+        <source>The wearer holds the hand up, and looks at the first drawing and at the second. An answer can be given once both have been shown.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
