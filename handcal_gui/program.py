@@ -282,15 +282,20 @@ class Program(QObject):
     def _may_leave(self) -> bool:
         """Ask before a calibration ends whose newest data could not be written yet."""
         snapshot = self.live.snapshot
-        if snapshot is None or not snapshot.not_stored:
+        if snapshot is None:
+            return True
+        why = snapshot.not_stored
+        if not why and self.window.panels.session.are_notes_refused(snapshot.record):
+            why = tr("the notes in the session panel could not be saved.")
+        if not why:
             return True
         buttons = QMessageBox.StandardButton
         answer = QMessageBox.warning(
             self.window,
             tr("Not saved yet"),
-            sentence(snapshot.not_stored)
+            sentence(why)
             + "\n\n"
-            + tr("They are lost if the calibration ends now. Cancel, and make room for them."),
+            + tr("They are lost if the calibration ends now. Cancel to keep them."),
             buttons.Discard | buttons.Cancel,
             buttons.Cancel,
         )

@@ -3192,7 +3192,11 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>They are lost if the calibration ends now. Cancel, and make room for them.</source>
+        <source>the notes in the session panel could not be saved.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>They are lost if the calibration ends now. Cancel to keep them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -47,8 +47,7 @@ class NotesEditor(QWidget):
 
     def show_saved(self, session: Path, notes: str) -> None:
         """Set the saved notes; the text being edited is replaced only for another session."""
-        # As the editor returns it: with its own line ends, and without no-break spaces.
-        self._saved = QTextDocument(notes).toPlainText()
+        self._saved = _as_shown(notes)
         if session != self._session:
             self._session = session
             self._timer.stop()
@@ -69,6 +68,11 @@ class NotesEditor(QWidget):
         if written != self._saved:
             self._saved = written  # once: the next session begins before it is shown
             self._save()
+
+    def are_refused(self, session: Path, stored: str) -> bool:
+        """Return whether notes on a session could not be saved: those `stored` are others."""
+        is_edited = session == self._session and not self._timer.isActive()
+        return is_edited and self._edit.toPlainText() != _as_shown(stored)
 
     def _begin(self) -> None:
         self._timer.start()
@@ -91,3 +95,8 @@ class NotesEditor(QWidget):
             saved = tr("✓ Saved") if written else ""  # nothing is written yet
             text = saved if written == self._saved else tr("Not saved yet")
         self._state.setText(text)
+
+
+def _as_shown(notes: str) -> str:
+    """Return notes as the editor does: with its own line ends, and without no-break spaces."""
+    return QTextDocument(notes).toPlainText()

@@ -140,6 +140,10 @@ class SessionPanel(QWidget):
         """Save pending changes of the notes now."""
         self._notes.flush()
 
+    def are_notes_refused(self, record: SessionRecord) -> bool:
+        """Return whether the notes shown could not be saved in a session."""
+        return self._notes.are_refused(record.path, record.notes)
+
     def _refresh(self) -> None:
         record = self._record
         self._open_folder.setEnabled(record is not None)

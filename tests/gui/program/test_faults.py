@@ -156,6 +156,32 @@ def test_data_not_written_yet_are_left_only_on_request(
     assert live.program.live.snapshot is None
 
 
+def test_notes_that_were_refused_are_left_only_on_request(
+    live: Technician, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def cancel(_parent: object, _title: str, text: str, *_: object) -> object:
+        asked.append(text)
+        return QMessageBox.StandardButton.Cancel
+
+    monkeypatch.setattr(QMessageBox, "warning", cancel)
+    live.program.window.docks["session"].raise_()
+    live.wait(lambda: live.child(QPlainTextEdit, "").isEnabled())
+    path = live.snapshot.session_path
+    path.rename(path.with_name("away"))
+    live.child(QPlainTextEdit, "").setPlainText("wears glasses")
+    live.wait(lambda: "Could not save the notes" in live.banner)
+    live.program.window.close()
+    assert "The notes in the session panel could not be saved." in asked[0]
+    assert live.program.window.isVisible()
+    path.with_name("away").rename(path)
+    live.program.live.stop()
+    assert Session.open(path).notes == "wears glasses"
+    assert live.program.window.close()
+    assert len(asked) == 1
+
+
 def test_a_signal_ends_the_program_without_a_question(
     live: Technician, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -88,6 +88,20 @@ def test_flush_tries_again_what_could_not_be_saved(
     assert asked == ["b", "b"]
 
 
+def test_notes_are_refused_once_they_should_be_stored(
+    qtbot: QtBot, notes: NotesEditor, edit: QPlainTextEdit
+) -> None:
+    notes.show_saved(ONE, "a")
+    assert not notes.are_refused(ONE, "a")
+    edit.setPlainText("b")
+    assert not notes.are_refused(ONE, "a"), "they are saved soon"
+    with qtbot.waitSignal(notes.changed):
+        pass
+    assert notes.are_refused(ONE, "a")
+    assert not notes.are_refused(ONE, "b")
+    assert not notes.are_refused(ONE.with_name("another"), "a")
+
+
 @pytest.mark.parametrize("stored", ["a\r\nb", "a\u00a0b", "a\u2028b"])
 def test_flush_leaves_notes_that_nobody_edited(
     qtbot: QtBot, notes: NotesEditor, stored: str
