@@ -41,7 +41,7 @@ def vbox(
 def fit_soon(fit: Callable[[], object], parent: QWidget) -> QTimer:
     """Return a timer that calls `fit`, which shows or hides parts, once a resize event has ended.
 
-    Qt crashes where a part is hidden within the event that lays out its page.
+    Qt has crashed where a part was hidden within the event that lays out its page.
     """
     timer = QTimer(parent, interval=0, singleShot=True)
     timer.timeout.connect(fit)
