@@ -19,10 +19,7 @@ _IN_PANEL = tr("a panel; works while it has the keyboard focus")
 _NOT_ACTIONS = {
     _WINDOW: (
         (tr("Return"), tr("Press the button, or open the list, that has the focus")),
-        (
-            tr("Alt+underlined letter"),
-            tr("Press the button or enter the field of this letter"),
-        ),
+        (tr("Alt+underlined letter"), tr("Press its button, or go to its field")),
         (tr("Esc"), tr("Close the message at the top")),
         (tr("Tab"), tr("Move to the next button or field")),
     ),

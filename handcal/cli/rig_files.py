@@ -112,6 +112,7 @@ def depth(arguments: argparse.Namespace) -> None:
     import numpy as np
 
     from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
+    from handcal.report.cells import signed
     from handcal.rig.depth import explain_depth
     from handcal.rig.report import depth_finding
 
@@ -126,8 +127,8 @@ def depth(arguments: argparse.Namespace) -> None:
         measured = run_depth_check(camera, board, settings, progress)
     scale_sigma, offset_sigma_m = np.sqrt(np.diag(measured.covariance))
     console.print(
-        f"Scale {measured.scale:.4f} ± {scale_sigma:.4f}, offset {1e3 * measured.offset_m:+.1f} ± "
-        f"{1e3 * offset_sigma_m:.1f} mm"
+        f"Scale {measured.scale:.4f} ± {scale_sigma:.4f}, offset "
+        f"{signed(1e3 * measured.offset_m, 1)} ± {1e3 * offset_sigma_m:.1f} mm"
     )
     shown = table("range, m", "flatness, mm")
     for (near_m, far_m), flat_m, sigma_m in zip(

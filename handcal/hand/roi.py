@@ -249,7 +249,7 @@ class _CoarseCloud:
         if side_m < settings.side_min_m:
             return (
                 f"a hand at the measured {hand_m:.2f} m would be only {100 * side_m:.0f} cm large: "
-                "depth is in a wrong unit; correct the depth scale of camera or recording"
+                "depth is in a wrong unit; correct the depth scale of the camera or recording"
             )
         if hand_m < near_m:
             back_cm = 100 * (near_m - hand_m)

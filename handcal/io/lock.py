@@ -45,7 +45,7 @@ class FileLock:
             file = path.open("a+b", buffering=0)
         except OSError as error:
             is_gone = isinstance(error, FileNotFoundError)
-            advice = "" if is_gone else "; let it be writable, or use a copy of it elsewhere"
+            advice = "" if is_gone else "; make it writable, or use a copy of it elsewhere"
             why = error.strerror or error
             raise FileError(f"cannot lock {path.parent}: {why}{advice}") from error
         try:

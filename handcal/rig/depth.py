@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from handcal.geometry import image_points, invert, transform
+from handcal.report.cells import signed
 from handcal.rig.board import BoardError, BoardView
 from handcal.rig.check import MAX_RANGES
 from handcal.rig.display import undistort
@@ -149,7 +150,8 @@ def explain_depth(check: DepthCheck) -> str:
     is_scaled, is_offset = (effects_m > _SURE_SIGMAS * sigmas_m) & (
         effects_m > _LEAST_PART * effects_m.max()
     )
-    percent = f"{100.0 * (check.scale - 1.0):+.2f} %"
+    percent = f"{signed(100.0 * (check.scale - 1.0), 2)} %"
+    offset = f"{signed(1e3 * check.offset_m, 1)} mm"
     if is_scaled and not is_offset:
         return (
             f"depth differs by {percent} at every distance: measure the squares of the board, and "
@@ -157,13 +159,13 @@ def explain_depth(check: DepthCheck) -> str:
         )
     if is_offset and not is_scaled:
         return (
-            f"depth differs by {1e3 * check.offset_m:+.1f} mm at every distance: check the pose of "
+            f"depth differs by {offset} at every distance: check the pose of "
             "the depth imager in the colour imager, and calibrate the sensor (a RealSense by its "
             "on-chip calibration)"
         )
     if is_scaled:
         return (
-            f"depth differs by {percent} and {1e3 * check.offset_m:+.1f} mm: calibrate the sensor "
+            f"depth differs by {percent} and {offset}: calibrate the sensor "
             "(a RealSense by its on-chip calibration)"
         )
     return ""

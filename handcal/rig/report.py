@@ -9,6 +9,7 @@ import numpy as np
 
 from handcal.display import arcmin_from_px, view_of_eye
 from handcal.geometry import image_points, invert, transform
+from handcal.report.cells import signed
 from handcal.rig_types import (
     PART_NAMES,
     RIG_PARTS,
@@ -189,8 +190,9 @@ def depth_finding(check: DepthCheck | None) -> RigFinding:
     worst = int(np.argmax(np.abs(bias_m) + 2.0 * sigma_m))
     return RigFinding(
         what,
-        f"{1e3 * bias_m[worst]:+.1f} ± {1e3 * sigma_m[worst]:.1f} mm at {_HAND_DEPTHS_M[worst]} m; "
-        f"flat to {1e3 * check.flatness_m.max():.1f} mm ({check.views} views, {check.made})",
+        f"{signed(1e3 * bias_m[worst], 1)} ± {1e3 * sigma_m[worst]:.1f} mm at "
+        f"{_HAND_DEPTHS_M[worst]} m; flat to {1e3 * check.flatness_m.max():.1f} mm "
+        f"({check.views} views, {check.made})",
         bool(abs(bias_m[worst]) + 2.0 * sigma_m[worst] <= _LARGEST_BIAS_M),
         f"within {1e3 * _LARGEST_BIAS_M:g} mm, including twice its standard deviation",
     )

@@ -79,7 +79,7 @@ def gate_problem(settings: StationSettings) -> Finding | None:
         return _broken(
             f"the depth gate, {gate.depth_min_m:.2f} to {gate.depth_max_m:.2f} m, leaves a hand "
             "too little room",
-            f"let it contain at least {_LEAST_GATE_M:.2f} m of a wearer's reach, which is "
+            f"include at least {_LEAST_GATE_M:.2f} m of a wearer's reach, which is "
             f"{REACH_M[0]:.2f} to {REACH_M[1]:.2f} m from the camera",
         )
     first_m = settings.plan.placement.nearest_m + _HALF_HAND_M
@@ -87,7 +87,7 @@ def gate_problem(settings: StationSettings) -> Finding | None:
         return _broken(
             f"the depth gate ends at {gate.depth_max_m:.2f} m, before the cursors of the "
             "recommended plan",
-            f"let it end at {first_m:.2f} m or beyond, or choose the plan as in the paper",
+            f"end it at {first_m:.2f} m or farther, or choose the plan as in the paper",
         )
     return None
 

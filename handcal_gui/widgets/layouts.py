@@ -39,9 +39,9 @@ def vbox(
 
 
 def fit_soon(fit: Callable[[], object], parent: QWidget) -> QTimer:
-    """Return a timer whose `start` has a widget show and hide parts that fit, after a resize event.
+    """Return a timer that calls `fit`, which shows or hides parts, once a resize event has ended.
 
-    Not within the event: Qt lays out a part that is hidden while its page is laid out within that.
+    Qt has crashed where a part was hidden within the event that lays out its page.
     """
     timer = QTimer(parent, interval=0, singleShot=True)
     timer.timeout.connect(fit)

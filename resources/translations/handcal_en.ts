@@ -763,7 +763,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Press the button or enter the field of this letter</source>
+        <source>Press its button, or go to its field</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1733,7 +1733,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Let the headset sit well on the wearer</source>
+        <source>Make sure that the headset sits well on the wearer</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2962,7 +2962,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The wearer holds the hand up, and looks at the first drawing and at the second. The answers follow once both have been shown.</source>
+        <source>The wearer holds the hand up, and looks at the first drawing and at the second. An answer can be given once both have been shown.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -72,5 +72,5 @@ def test_a_folder_that_cannot_be_written_says_what_to_do(
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(FileError, match="Read-only file system; let it be writable, or use a copy"):
+    with pytest.raises(FileError, match="Read-only file system; make it writable, or use a copy"):
         FileLock(tmp_path / "lock")

@@ -115,7 +115,7 @@ def test_a_wrong_square_size_is_distinguished_from_an_offset() -> None:
 
 
 def test_both_errors_are_told_and_none_is_not() -> None:
-    assert explain_depth(check_of(4, 0.95, 0.02)).startswith("depth differs by -")
+    assert explain_depth(check_of(4, 0.95, 0.02)).startswith("depth differs by −")
     exact = [DepthView(z, z, 0.001) for z in (0.4, 0.5, 0.6, 0.7, 0.8)]
     assert explain_depth(fit_depth(exact)) == ""
 

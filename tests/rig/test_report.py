@@ -67,7 +67,7 @@ def test_the_devices_and_a_small_bias_of_depth_are_told() -> None:
     told = {one.what: one.found for one in report_rig(rig)}
     assert told["Depth camera"] == "Intel RealSense D415, serial number 123"
     assert told["Headset"] == "0a1b, OpenXR"
-    assert told["Depth check"].startswith("-3.0 ± 0.5 mm at 0.4 m; flat to 2.0 mm (9 views, today)")
+    assert told["Depth check"].startswith("−3.0 ± 0.5 mm at 0.4 m; flat to 2.0 mm (9 views, today)")
     assert doubtful(rig) == {}
 
 

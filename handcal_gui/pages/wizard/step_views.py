@@ -68,7 +68,7 @@ def connect_view(snapshot: Snapshot) -> WizardView:
         label = tr("Continue")
         fact = tr("This session continues where it stopped, with {}.").format(begun)
     elif former:
-        puts_on = tr("Let the headset sit well on the wearer")
+        puts_on = tr("Make sure that the headset sits well on the wearer")
         fact = tr(
             "The result of {} is used again: the wearer verifies each eye first, and alignments "
             "follow only if they are needed."

@@ -47,8 +47,7 @@ class NotesEditor(QWidget):
 
     def show_saved(self, session: Path, notes: str) -> None:
         """Set the saved notes; the text being edited is replaced only for another session."""
-        # As the editor returns it: with its own line ends, and without no-break spaces.
-        self._saved = QTextDocument(notes).toPlainText()
+        self._saved = _as_shown(notes)
         if session != self._session:
             self._session = session
             self._timer.stop()
@@ -100,3 +99,8 @@ class NotesEditor(QWidget):
             text = saved if self.are_saved else tr("Not saved yet")
         self._state.setText(text)
         self._state.setVisible(bool(text))  # empty, it was a bar below the notes
+
+
+def _as_shown(notes: str) -> str:
+    """Return notes as the editor does: with its own line ends, and without no-break spaces."""
+    return QTextDocument(notes).toPlainText()
