@@ -90,6 +90,17 @@ def test_flush_tries_again_what_could_not_be_saved(
     assert asked == ["b", "b"]
 
 
+@pytest.mark.parametrize("stored", ["a\r\nb", "a\u00a0b", "a\u2028b"])
+def test_flush_leaves_notes_that_nobody_edited(
+    qtbot: QtBot, notes: NotesEditor, stored: str
+) -> None:
+    notes.show_saved(ONE, stored)
+    with qtbot.assertNotEmitted(notes.changed):
+        notes.flush()
+    notes.show_saved(ONE, stored)
+    assert state(notes) == "✓ Saved"
+
+
 def test_too_long_notes_are_told_and_not_saved(
     qtbot: QtBot, notes: NotesEditor, edit: QPlainTextEdit
 ) -> None:
