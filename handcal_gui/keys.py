@@ -23,7 +23,7 @@ _NOT_ACTIONS = {
             tr("Alt+underlined letter"),
             tr("Press the button or enter the field of this letter"),
         ),
-        (tr("Esc"), tr("Close the message at the top")),
+        (tr("Esc"), tr("Close the message")),
         (tr("Tab"), tr("Move to the next button or field")),
     ),
     tr("Fine-tune"): (

@@ -723,11 +723,11 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Close the message at the top</source>
+        <source>Esc</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Esc</source>
+        <source>Close the message</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1061,6 +1061,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source> · verification begun</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source> · damaged: {} left out</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1265,7 +1269,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>no hand in view</source>
+        <source>No hand in view</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2707,15 +2711,15 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The camera gives no image; the message at the top says why.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The hand is rotated like the cursor.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Rotation</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The camera gives no image; the message below the guide says why.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2946,7 +2950,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>φ of the {} is still the solved one: the error would be 0 px. Press T again if the wearer sees no error.</source>
+        <source>φ of the {} has not been fine-tuned: the error would be 0 px. Press T again if the wearer sees no error.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3642,6 +3646,10 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>learned from {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solved from</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3675,10 +3683,6 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
     </message>
     <message>
         <source>Eye distance measured</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>learned from {} sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
