@@ -1922,10 +1922,6 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The camera image will appear here. Choose a camera on the start page.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>This camera has no colour image.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2593,13 +2589,13 @@ which is less than the RMS in the table.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Nothing is solved yet.
-
-Make a cursor, align the hand with it and solve. Each eye&apos;s position, its uncertainty and the verdict then appear here.</source>
+        <source>Results</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Results</source>
+        <source>Nothing is solved yet.
+
+Each eye&apos;s position, its uncertainty and the verdict appear here after its first alignment or verification.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
