@@ -333,6 +333,7 @@ def _palette(shades: _Shades) -> QPalette:
     for role in (roles.Text, roles.WindowText, roles.ButtonText, roles.ToolTipText):
         palette.setColor(role, QColor(shades.text))
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(shades.disabled))
+    palette.setColor(QPalette.ColorGroup.Disabled, roles.PlaceholderText, QColor(shades.disabled))
     return palette
 
 

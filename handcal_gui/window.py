@@ -105,7 +105,7 @@ class MainWindow(QMainWindow):
         for page in self._pages.values():
             self._stack.addWidget(scrollable(page))
         middle = QWidget()
-        vbox(
+        self._middle = vbox(
             self.banner,
             (self._stack, 1),
             on=middle,
@@ -164,6 +164,9 @@ class MainWindow(QMainWindow):
             self.show_wearer("")
         size_px = self.size()
         self.statusBar().setVisible(page == "live")
+        # Where a message moves nothing that is about to be pressed: the guide's pictures give way
+        # to it, on the start page the space above the buttons.
+        self._middle.insertWidget(int(page == "live"), self.banner)
         self._stack.setCurrentIndex(list(self._pages).index(page))
         is_small = self._is_small()
         is_alone = self._arrangement == "station"

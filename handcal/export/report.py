@@ -167,9 +167,7 @@ def _solution(outcome: SessionOutcome, results: Results) -> Section:
                 eye,
                 results.verdicts[eye].name,
                 f"{expected_error_arcmin(outcome.record.rig.eyes[eye], shift):.1f}",
-                f"{1e3 * shift.rms_m:.2f}",
-                f"{100 * shift.inlier_ratio:.0f}",
-                str(shift.iterations),
+                *_registered(shift),
                 _reason(results.verdicts[eye], shift),
             ]
             for eye, shift in results.eyes.items()
@@ -218,9 +216,7 @@ def _alignments(outcome: SessionOutcome, results: Results) -> Section:
                 f"{np.degrees(np.linalg.norm(alignment.rotation_rad)):.1f}",
                 eye,
                 *_with_sigma(shift),
-                f"{1e3 * shift.rms_m:.2f}",
-                f"{100 * shift.inlier_ratio:.0f}",
-                str(shift.iterations),
+                *_registered(shift),
             ]
             for number, alignment in record.alignments.items()
             for eye, shift in results.alignments[number].items()
@@ -347,6 +343,13 @@ def _with_sigma(shift: EyeShift) -> list[str]:
         f"{length_mm(value)}\u00a0±\u00a0{1e3 * sigma:.2f}"
         for value, sigma in zip(shift.shift_m, sigma_m, strict=True)
     ]
+
+
+def _registered(shift: EyeShift) -> list[str]:
+    """Return RMS, share of inliers and iterations; none without an alignment."""
+    if not shift.residuals_m.size:
+        return ["–"] * 3
+    return [f"{1e3 * shift.rms_m:.2f}", f"{100 * shift.inlier_ratio:.0f}", str(shift.iterations)]
 
 
 def _yes(truth: bool) -> str:

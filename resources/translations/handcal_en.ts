@@ -759,19 +759,19 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Alt+underlined letter</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Press its button, or go to its field</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Close the message at the top</source>
+        <source>Alt+underlined letter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Esc</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Close the message</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1970,10 +1970,6 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The camera image will appear here. Choose a camera on the start page.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>This camera has no colour image.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2641,13 +2637,13 @@ which is less than the RMS in the table.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Nothing is solved yet.
-
-Make a cursor, align the hand with it and solve. Each eye&apos;s position, its uncertainty and the verdict then appear here.</source>
+        <source>Results</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Results</source>
+        <source>Nothing is solved yet.
+
+Each eye&apos;s position, its uncertainty and the verdict appear here after its first alignment or verification.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2759,7 +2755,7 @@ Make a cursor, align the hand with it and solve. Each eye&apos;s position, its u
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The camera gives no image; the message at the top says why.</source>
+        <source>The camera gives no image; the message below the guide says why.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

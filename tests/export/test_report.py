@@ -109,6 +109,13 @@ def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
     assert "Convergence" not in found
 
 
+def test_verifications_alone_have_no_numbers_of_a_registration(verified: SessionRecord) -> None:
+    sections = session_report(load_outcome(verified)).sections
+    tables = (one for section in sections for one in section.items if isinstance(one, Table))
+    (solved,) = (one for one in tables if one.columns[1].title == "verdict")
+    assert [row[3:6] for row in solved.rows] == [["–", "–", "–"]] * 2
+
+
 @pytest.mark.process
 def test_the_file_is_a4_with_its_fonts_and_all_pages(
     tmp_path: Path, outcome: SessionOutcome, pages: list[Figure]

@@ -47,6 +47,10 @@ def test_dark_is_dark_and_gives_way_again() -> None:
     )
     assert text.lightness() - ground.lightness() > 128
     assert middle(icon("check")).lightness() > 128
+    disabled = QPalette.ColorGroup.Disabled
+    assert palette.color(disabled, QPalette.ColorRole.PlaceholderText) == palette.color(
+        disabled, QPalette.ColorRole.Text
+    )
     use_theme("light")
     assert not is_dark()
     assert QGuiApplication.palette() == before

@@ -38,7 +38,7 @@ from handcal_gui.widgets.sentence import sentence
 
 _STATUS_NS = 200_000_000
 """Interval of the numbers below the image; nobody reads faster."""
-_EMPTY = tr("The camera image will appear here. Choose a camera on the start page.")
+_EMPTY = tr("Waiting for the camera's first image…")
 _NO_COLOR = tr("This camera has no colour image.")
 
 

@@ -32,8 +32,8 @@ from handcal_gui.widgets.result_rows import (
 )
 
 _EMPTY = tr(
-    "Nothing is solved yet.\n\nMake a cursor, align the hand with it and solve. Each eye's "
-    "position, its uncertainty and the verdict then appear here."
+    "Nothing is solved yet.\n\nEach eye's position, its uncertainty and the verdict appear here "
+    "after its first alignment or verification."
 )
 _MARGINS_PX = 3 * SPACING_PX // 2
 """Of the tab of the eyes: above the cards, between them and the numbers, and below."""

@@ -34,7 +34,7 @@ _SHAPE_M = 0.0015
 _NO_CURSOR = tr("The hand's rotation from the cursor will be shown here.")
 _TAKEN = tr("The alignment is confirmed.")
 _NO_HAND = tr("Hold the hand in view of the camera.")
-_NO_IMAGE = tr("The camera gives no image; the message at the top says why.")
+_NO_IMAGE = tr("The camera gives no image; the message below the guide says why.")
 _STRAIGHT = tr("The hand is rotated like the cursor.")
 
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QRadioButton, QTabBar, QToolButton
+from PySide6.QtWidgets import QAbstractButton, QApplication, QRadioButton, QTabBar, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
@@ -258,8 +258,15 @@ def test_nothing_moves_the_main_button(
         for one in (view, replace(view, sentence=LONG, note=LONG, preconditions=long)):
             say(program, now, one)
             look()
+    buttons = [one for one in window.findChildren(QAbstractButton) if one.isVisible()]
+    before = [one.mapTo(window, QPoint()) for one in buttons]
     window.banner.show_message(LONG)
     look()
+    QApplication.processEvents()
+    close = window.banner.findChild(QToolButton)
+    assert close is not None
+    assert close.isVisible()
+    assert [one.mapTo(window, QPoint()) for one in buttons] == before
     window.banner.clear()
     for condition in (LONG, ""):
         window.banner.show_condition(condition)

@@ -38,7 +38,7 @@ def picture(panel: CameraPanel, name: str = "colour") -> QImage:
 
 
 def test_an_empty_panel_says_what_will_come(panel: CameraPanel) -> None:
-    assert "start page" in view(panel, "colour").message
+    assert view(panel, "colour").message == "Waiting for the camera's first image…"
     assert text(panel, "camera-age") == "–"
 
 

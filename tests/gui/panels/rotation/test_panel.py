@@ -140,7 +140,8 @@ def test_without_an_image_nothing_is_asked_of_the_hand(
     panel: RotationPanel, snapshot: Make
 ) -> None:
     panel.show_snapshot(snapshot(observation=None, camera={"problem": "the camera is gone"}))
-    assert text(panel, "advice") == "The camera gives no image; the message at the top says why."
+    why = "The camera gives no image; the message below the guide says why."
+    assert text(panel, "advice") == why
 
 
 def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapshot: Make) -> None:
