@@ -133,12 +133,20 @@ def _solved(outcome: SessionOutcome, eye: Eye, shift: EyeShift) -> dict[str, Any
             f"covariance{row + 1}{column + 1}_mm2": float(covariance_mm2[row, column])
             for row, column in zip(*np.triu_indices(3), strict=True)
         },
+        **_registered(shift),
+        "expected_error_arcmin": expected_error_arcmin(outcome.record.rig.eyes[eye], shift),
+    }
+
+
+def _registered(shift: EyeShift) -> dict[str, Any]:
+    if not shift.residuals_m.size:
+        return {}  # of verifications alone
+    return {
         "rms_mm": 1e3 * shift.rms_m,
         "inlier_ratio": shift.inlier_ratio,
         "iterations": shift.iterations,
         "converged": _yes(shift.converged),
         "stop_reason": shift.stop_reason,
-        "expected_error_arcmin": expected_error_arcmin(outcome.record.rig.eyes[eye], shift),
     }
 
 

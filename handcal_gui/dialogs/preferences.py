@@ -16,7 +16,7 @@ from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import choice, number, whole_number, with_name
+from handcal_gui.widgets.fields import choice, number, paragraph, whole_number, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
 from handcal_gui.widgets.path_field import PathField
@@ -208,9 +208,14 @@ class PreferencesDialog(QDialog):
         defaults.setToolTip(tr("Shows the default of every field; Cancel keeps the former values."))
         defaults.clicked.connect(lambda: self._show(Preferences()))
         self._area = area = scrollable(self._calibration)
-        vbox((area, 1), buttons, on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
-        form, foot = self._calibration.sizeHint(), buttons.sizeHint()
+        about = paragraph(
+            "about",
+            tr("Change what you need and press OK. A calibration that runs keeps its settings."),
+        )
+        margin_px = SPACING_PX * 3 // 2  # with it, all fields are in sight on a small screen
+        vbox(about, (area, 1), buttons, on=self, margins=margin_px, spacing=SPACING_PX)
+        form, foot = self._calibration.sizeHint(), about.sizeHint() + buttons.sizeHint()
         self.resize(
             form.width() + area.verticalScrollBar().sizeHint().width() + 4 * SPACING_PX,
-            form.height() + foot.height() + 6 * SPACING_PX,
+            form.height() + foot.height() + 5 * SPACING_PX,
         )

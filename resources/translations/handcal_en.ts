@@ -643,6 +643,10 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Change what you need and press OK. A calibration that runs keeps its settings.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Largest expected error of an accepted eye; 60′ are 1°.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1039,7 +1043,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>These settings are kept for the next wearer.</source>
+        <source>Enter the wearer&apos;s name and start; the settings are kept for the next one.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1557,6 +1561,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The former result is used again ({}): the wearer verifies each eye first, and alignments follow only if they are needed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Close the {} eye. </source>
         <translation type="unfinished"></translation>
     </message>
@@ -1734,10 +1742,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Make sure that the headset sits well on the wearer</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The result of {} is used again: the wearer verifies each eye first, and alignments follow only if they are needed.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4723,6 +4727,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Done</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} Check the entries and press Run.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.export.outcome import SessionOutcome, ShiftOrigin
+from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
 from handcal.export.tables import write_comparisons, write_parameters, write_trials
 from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.journal import Event
+from handcal.session.session import SessionRecord
 from handcal.types import Eye, Float64
 
 
@@ -62,6 +63,16 @@ def test_parameters_hold_each_eye_of_each_alignment_fused_and_tuned(
     assert rows[4]["verdict"] == outcome.results.verdicts["right"].name
     assert triple(rows[5], "phi{}_mm") == (1e3 * outcome.final_shift_m("left")).tolist()
     assert rows[5]["sigma1_mm"] == ""
+
+
+def test_verifications_alone_have_no_numbers_of_a_registration(
+    tmp_path: Path, verified: SessionRecord
+) -> None:
+    write_parameters(tmp_path / "p.csv", load_outcome(verified))
+    rows = read(tmp_path / "p.csv")
+    assert [row["source"] for row in rows] == ["fused", "fused"]
+    assert {row[name] for row in rows for name in ("rms_mm", "inlier_ratio", "converged")} == {""}
+    assert all(float(row["expected_error_arcmin"]) > 0.0 for row in rows)
 
 
 def test_trials_hold_every_corner(tmp_path: Path, outcome: SessionOutcome) -> None:

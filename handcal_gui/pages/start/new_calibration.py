@@ -73,7 +73,7 @@ class NewCalibration(Card):
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
             tr("Start a calibration"),
-            tr("These settings are kept for the next wearer."),
+            tr("Enter the wearer's name and start; the settings are kept for the next one."),
             "hand",
         )
         self.setObjectName("newCalibration")

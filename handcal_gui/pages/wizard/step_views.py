@@ -70,8 +70,8 @@ def connect_view(snapshot: Snapshot) -> WizardView:
     elif former:
         puts_on = tr("Make sure that the headset sits well on the wearer")
         fact = tr(
-            "The result of {} is used again: the wearer verifies each eye first, and alignments "
-            "follow only if they are needed."
+            "The former result is used again ({}): the wearer verifies each eye first, and "
+            "alignments follow only if they are needed."
         ).format(former)
     return WizardView(
         Step.CONNECT,

@@ -189,7 +189,7 @@ class EvaluationPage(QWidget):
 
     def _lay_out(self, question: str) -> None:
         vbox(
-            paragraph("question", question),
+            paragraph("question", tr("{} Check the entries and press Run.").format(question)),
             self.form,
             self._found,
             (self._results, 1),

@@ -90,7 +90,7 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     technician.wait(lambda: technician.snapshot.session_path != path)
     assert technician.record.facts.former == path.name
     assert technician.record.wearer == "Ada"
-    assert f"The result of {path.name} is used again" in fact.text()
+    assert f"The former result is used again ({path.name})" in fact.text()
     begin(technician, studio)
     program.wizard_panel.hold(False)
     technician.wait_for_state(State.VERIFY)

@@ -219,4 +219,4 @@ def test_after_a_slip_the_earlier_result_is_said_to_be_used_again(
     again = replace(record, facts=replace(record.facts, former="ada-1"), alignments={})
     view = connect_view(snapshot(State.SHOW_HAND, record=again))
     assert view.sentence.startswith("Make sure that the headset sits well")
-    assert view.fact.startswith("The result of ada-1 is used again")
+    assert view.fact.startswith("The former result is used again (ada-1)")
