@@ -66,7 +66,7 @@ class NotesEditor(QWidget):
         return self._edit.toPlainText() == self._saved
 
     def save_now(self) -> None:
-        """Save what is written, also what is too long, so that the reason is told."""
+        """Save what is written, also what is too long, so that the reason is shown."""
         self._timer.stop()
         self.changed.emit(self._edit.toPlainText())
 
