@@ -43,6 +43,7 @@ from handcal.station.snapshot import Snapshot, read_procedure
 from handcal.station.states import Observation, ProcedureError, State
 from handcal.station.trials import Trials
 from handcal.station.verifying import skipped_eyes
+from handcal.station.weak import weakly
 from handcal.types import Frame, HeadsetIdentity
 
 _STORE_PERIOD_S = 1.0
@@ -115,10 +116,10 @@ class Station(Closable):
             self._link = stack.enter_context(HeadsetServer(pairings, bind))
             if is_virtual:
                 self._simulation = stack.enter_context(
-                    Simulation(settings.seed, self._start_headset, settings.side)
+                    Simulation(settings.seed, weakly(self._start_headset), settings.side)
                 )
                 self.worn_rig = read_rig(self._worn_rig_path)
-            self._feed = stack.enter_context(CameraFeed(self._open_camera))
+            self._feed = stack.enter_context(CameraFeed(weakly(self._open_camera)))
             facts = self._record.facts
             plan = plan_of_session(self.session, settings.plan, facts, resume is not None)
             if former is not None and resume is None:

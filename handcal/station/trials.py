@@ -11,6 +11,7 @@ from handcal.session.trial import make_trial
 from handcal.station.comparing import Comparing
 from handcal.station.procedure import Calibration
 from handcal.station.states import ProcedureError, State
+from handcal.station.weak import weakly
 from handcal.types import Eye, Float64
 
 
@@ -40,7 +41,7 @@ class Trials:
         self._rig = rig
         self._link = link
         self._session = session
-        self.comparing = Comparing(session, self.show_offline)
+        self.comparing = Comparing(session, weakly(self.show_offline))
         self.target_E_m: dict[Eye, Float64] = {}
         self.is_offline = False
 

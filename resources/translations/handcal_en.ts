@@ -1561,10 +1561,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The former result is used again ({}): the wearer verifies each eye first, and alignments follow only if they are needed.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Close the {} eye. </source>
         <translation type="unfinished"></translation>
     </message>
@@ -1742,6 +1738,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Make sure that the headset sits well on the wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The former result is used again ({}): the wearer verifies each eye first, and alignments follow only if they are needed.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

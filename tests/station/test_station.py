@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -310,3 +312,18 @@ def test_evidence_is_reported_before_anything_is_solved(
         found = step_until(station, "evidence", lambda seen: bool(seen.contradiction), PATIENCE_S)
     assert advice in found.contradiction
     assert not found.problem
+
+
+def test_an_ended_station_leaves_nothing_to_the_garbage_collector(
+    settings: StationSettings,
+) -> None:
+    """A whole collection is so rare beside the window's objects that sessions piled up."""
+    gc.disable()
+    try:
+        with Station(settings, "Ada") as station:
+            step_until(station, "the headset", is_connected, PATIENCE_S)
+            parts = [weakref.ref(part) for part in (station, station.calibration, station.link)]
+        del station
+        assert [part() for part in parts] == [None, None, None]
+    finally:
+        gc.enable()

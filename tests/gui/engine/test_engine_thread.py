@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+import os
+import platform
 import socket
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication
 from pytestqt.qtbot import QtBot
@@ -198,3 +202,23 @@ def test_a_calibration_goes_on_without_a_bridge_that_cannot_be_opened(qtbot: QtB
 def free_tcp_port() -> int:
     with socket.create_server((LOCAL, 0)) as server:
         return int(server.getsockname()[1])
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries keep nothing")
+def test_a_session_begins_with_the_memory_that_others_freed_given_back(qtbot: QtBot) -> None:
+    blocks = [np.ones(12_000) for _ in range(2_000)]  # 96 kB each: less gets no pages of its own
+    full = _memory_mb()
+    kept = blocks[::50]
+    del blocks
+    assert full - _memory_mb() < 100.0
+    station = FakeStation()
+    with streaming(qtbot, station):
+        qtbot.waitUntil(lambda: station.steps > 0)
+        given_back_mb = full - _memory_mb()
+    assert given_back_mb > 100.0
+    assert len(kept) == 40
+
+
+def _memory_mb() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20

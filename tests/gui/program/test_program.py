@@ -16,6 +16,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
+    QComboBox,
     QDoubleSpinBox,
     QLabel,
     QPlainTextEdit,
@@ -272,6 +273,46 @@ def test_an_interrupted_session_is_offered_and_resumed(
     second.wait(lambda: second.snapshot.link.connected)
     solve_and_apply(second)
     assert second.record.is_applied
+
+
+@pytest.mark.parametrize(
+    ("moment", "resumed"),
+    [
+        ("solving", State.SOLVED),
+        ("verifying", State.VERIFY),
+        ("recording a trial", State.APPLIED),
+    ],
+)
+def test_nothing_is_lost_by_closing_at_work(
+    open_program: Callable[[], Technician], studio: Any, moment: str, resumed: State
+) -> None:
+    first = open_program()
+    first.program.start_calibration(studio.settings, "Ada")
+    first.wait_for_page("live")
+    first.wait(lambda: first.snapshot.link.connected)
+    first.child(QComboBox, "wizardPlan").setCurrentText("Left eye only")
+    align(first, studio)
+    if moment == "solving":
+        first.press_space_for(Action.SOLVE)
+    else:
+        solve_and_apply(first)
+    if moment == "verifying":
+        first.press_space_for(Action.VERIFY)
+        first.wait_for_state(State.VERIFY)
+    if moment == "recording a trial":
+        first.program.window.panels.trials.trial_requested.emit("left", 1.0)
+    path = first.snapshot.session_path
+    first.program.window.close()
+
+    stored = Session.open(path)
+    assert len(stored.alignments) == 1
+    assert stored.is_solved
+    assert len(stored.trials) == (moment == "recording a trial")
+    second = open_program()
+    second.program.resume_session(path)
+    second.wait_for_page("live")
+    assert second.snapshot.procedure.state is resumed
+    assert len(second.snapshot.record.alignments) == 1
 
 
 @pytest.mark.parametrize(
