@@ -189,7 +189,7 @@ def test_a_figure_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     error = run_apart(
         "07_plot_a_report_figure.py", "--output", tmp_path / "FILE/figure.png", code=1
     )
-    assert "cannot write" in error
+    assert f"cannot use {tmp_path / 'FILE'}: File exists" in error
     assert error.count("\n") == 1
 
 
