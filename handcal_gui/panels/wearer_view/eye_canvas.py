@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import cv2
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QTransform
@@ -29,9 +28,8 @@ _FEW_POINTS = 120
 _SMOOTHED_POINTS = 5
 """A hand's outline has a point for each of the camera's pixels on it; so many neighbours are
 averaged, which takes away the steps from pixel to pixel and leaves the webs between fingers."""
-_STRAYS_PX = 1.0
-"""Largest deviation, as displayed, of the drawn line from that; Qt takes a microsecond or more
-for each point. Half a pixel of the camera is allowed where that is more."""
+_SPACING_PX = 18.0
+"""Between the points drawn, in pixels of the widget: Qt takes a microsecond or more for each."""
 _MARGIN = 0.12
 _WIDEST_CROP = 1.8
 """A crop is kept while it contains the hand and is at most this many times as wide or high."""
@@ -141,9 +139,9 @@ class EyeCanvas(QWidget):
             outlines += [("drawn", view.drawn.outline_px), ("drawn", view.drawn_target_px)]
         to_widget = self._to_widget()
         painter.setClipRect(to_widget.mapRect(_display(view)))
-        strays_px = _STRAYS_PX / (to_widget.m11() * self.devicePixelRatio())
+        spacing_px = _SPACING_PX / to_widget.m11()
         lines = [
-            (what, to_widget.map(_closed(simplified(px, strays_px))))
+            (what, to_widget.map(_closed(simplified(px, spacing_px))))
             for what, px in outlines
             if len(px)
         ]
@@ -222,14 +220,16 @@ def _is_close(crop: QRectF, hand: QRectF) -> bool:
     return min(wider, higher) < _WIDEST_CROP
 
 
-def simplified(outline_px: Float64, strays_px: float) -> Float64:
+def simplified(outline_px: Float64, spacing_px: float) -> Float64:
     """Return a closed outline without the camera's pixel steps, of as few points as it needs.
+
+    Arrays are small: while NumPy works on large ones the engine runs, and the window waits for it.
 
     Parameters
     ----------
     outline_px : (N, 2) float64
-    strays_px : float
-        Least deviation that is allowed, in the same pixels.
+    spacing_px : float
+        Distance between points, in the same pixels.
 
     Returns
     -------
@@ -237,12 +237,13 @@ def simplified(outline_px: Float64, strays_px: float) -> Float64:
     """
     if len(outline_px) <= _FEW_POINTS:
         return outline_px
-    half = _SMOOTHED_POINTS // 2
-    ring = np.vstack([outline_px[-half:], outline_px, outline_px[:half]]).astype(np.float32)
-    smooth = cv2.blur(ring[:, None], (1, _SMOOTHED_POINTS))[half:-half]
-    step_px = float(np.median(np.linalg.norm(np.diff(outline_px, axis=0), axis=1)))
-    line = cv2.approxPolyDP(smooth, max(strays_px, 0.5 * step_px), closed=True)
-    return line.reshape(-1, 2).astype(np.float64)
+    steps_px = np.diff(outline_px[:_FEW_POINTS], axis=0)
+    step_px = float(np.median(np.linalg.norm(steps_px, axis=1)))
+    every = max(1, int(spacing_px / max(step_px, 1e-9)))
+    end = len(outline_px) - _SMOOTHED_POINTS + 1
+    neighbours_px = [outline_px[k : end + k : every] for k in range(_SMOOTHED_POINTS)]
+    mean_px: Float64 = sum(neighbours_px[1:], neighbours_px[0]) / _SMOOTHED_POINTS
+    return mean_px
 
 
 def _closed(outline_px: Float64) -> QPolygonF:
