@@ -146,7 +146,9 @@ def test_it_starts_where_the_capital_of_i_has_a_dot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = tmp_path / "tr_TR.UTF-8"
-    subprocess.run(["localedef", "-i", "tr_TR", "-f", "UTF-8", made], check=True)
+    subprocess.run(["localedef", "-i", "tr_TR", "-f", "UTF-8", made], check=False)
+    if not made.exists():
+        pytest.skip("no definitions of locales, which Debian's package locales has")
     monkeypatch.setenv("LOCPATH", str(tmp_path))
     monkeypatch.setenv("LC_ALL", made.name)
     start_and_end(tmp_path)
