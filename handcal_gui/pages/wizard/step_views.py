@@ -16,7 +16,6 @@ from handcal_gui.pages.wizard.preconditions import (
     hand_found,
     hand_still,
     is_placed,
-    is_steady,
 )
 from handcal_gui.pages.wizard.view import (
     EYE_WORDS,
@@ -59,7 +58,7 @@ def connect_view(snapshot: Snapshot) -> WizardView:
             link.pose_rate_hz > 0,
         ),
     )
-    is_ready = all(one.holds for one in preconditions)
+    is_ready = _all_hold(preconditions)
     if snapshot.contradiction and not camera.problem:
         preconditions = (Precondition(sentence(snapshot.contradiction), False), *preconditions[1:])
     procedure, former = snapshot.procedure, snapshot.record.facts.former
@@ -85,11 +84,15 @@ def connect_view(snapshot: Snapshot) -> WizardView:
 def align_view(snapshot: Snapshot) -> WizardView:
     """Return the view while the wearer overlays the cursor."""
     procedure, seen = snapshot.procedure, snapshot.observation
-    hand = hand_found(snapshot)
     is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
     limit_deg = round(float(np.degrees(procedure.guard_limit_rad)), 1)
     cursor = procedure.cursor
-    is_due = cursor is not None and snapshot.t_host_ns - cursor.t_host_ns > _LEAST_LOOK_NS
+    seen_ns = snapshot.t_host_ns - cursor.t_host_ns if cursor is not None else 0
+    preconditions = (
+        hand_found(snapshot),
+        Precondition(tr("Hand rotated by less than {:g}°").format(limit_deg), is_straight),
+        _looked(tr("Cursor shown for {:g} s"), seen_ns),
+    )
     close = ""
     if len(procedure.eyes) == 1:
         close = tr("Close the {} eye. ").format(
@@ -100,14 +103,11 @@ def align_view(snapshot: Snapshot) -> WizardView:
         tr("{}Move the hand until it lies under the cursor, then confirm in the headset.").format(
             close
         ),
-        (
-            hand,
-            Precondition(tr("Hand rotated by less than {:g}°").format(limit_deg), is_straight),
-        ),
+        preconditions,
         ButtonSpec(
             Action.CONFIRM,
             tr("Confirm for the wearer"),
-            is_placed(snapshot) and is_due and snapshot.link.connected,
+            _all_hold(preconditions) and is_placed(snapshot) and snapshot.link.connected,
         ),
         (ButtonSpec(Action.REDO, tr("&Make another cursor"), discards=tr("Discards this cursor")),),
         procedure.refusal,
@@ -184,15 +184,20 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     if eye in snapshot.procedure.verifications:
         text = tr("Once more, to be sure. {}").format(text)
     total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
-    is_due = snapshot.t_host_ns - verifying.began_host_ns > _LEAST_LOOK_NS
+    seen_ns = snapshot.t_host_ns - verifying.began_host_ns
+    preconditions = (
+        hand_found(snapshot),
+        hand_still(snapshot),
+        _looked(tr("Outline shown for {:g} s"), seen_ns),
+    )
     return WizardView(
         Step.VERIFY,
         text,
-        (hand_found(snapshot), hand_still(snapshot)),
+        preconditions,
         ButtonSpec(
             Action.VERIFIED,
             tr("It covers the hand"),
-            is_steady(snapshot) and is_due and snapshot.link.connected,
+            _all_hold(preconditions) and snapshot.link.connected,
         ),
         (
             ButtonSpec(Action.UNDO_NUDGE, tr("&Undo"), verifying.can_undo),
@@ -256,6 +261,15 @@ def kept_fact(procedure: Procedure) -> str:
     return tr("The headset uses the offline calibration for {}: φ is 0 there.").format(
         eye_names(kept)
     )
+
+
+def _looked(text: str, shown_ns: int) -> Precondition:
+    """Return whether the wearer has had the time to look at a drawing, as a precondition."""
+    return Precondition(text.format(_LEAST_LOOK_NS / 1e9), shown_ns > _LEAST_LOOK_NS)
+
+
+def _all_hold(preconditions: Sequence[Precondition]) -> bool:
+    return all(one.holds for one in preconditions)
 
 
 def _made(procedure: Procedure) -> str:

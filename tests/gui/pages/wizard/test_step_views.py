@@ -62,6 +62,20 @@ def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot:
     assert Wizard().view(later).main.is_enabled
 
 
+@pytest.mark.parametrize("seen", [{"is_over_limit": True}, {"problem": "no hand", "hand": None}])
+@pytest.mark.parametrize("verifying", [None, NUDGED])
+def test_no_confirmation_is_offered_beside_a_condition_that_is_not_met(
+    snapshot: Maker, verifying: VerifyingView | None, seen: dict[str, Any]
+) -> None:
+    procedure = {"verifying": verifying}
+    state = State.ALIGN if verifying is None else State.VERIFY
+    for changes in ({}, seen):
+        now = snapshot(state, procedure=procedure, observation=changes)
+        for at_ns in (now.t_host_ns, now.t_host_ns + 2_000_000_000):
+            view = Wizard().view(replace(now, t_host_ns=at_ns))
+            assert view.main.is_enabled == all(one.holds for one in view.preconditions)
+
+
 def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> None:
     view = Wizard().view(snapshot(State.SOLVED, problem="the disk is full; free some space"))
     assert [check.text.split(":")[0] for check in view.preconditions[1:]] == [
