@@ -237,8 +237,8 @@ class CalibrationController(QObject):
             self._window.show_wearer(snapshot.record.wearer)
         self._snapshot = snapshot
         panels = self._window.panels
-        # Even while hidden: they may be used before the next snapshot.
-        always = panels.fine_tune, panels.trials
+        # Even while hidden: they may be used before the next snapshot, or have a history.
+        always = panels.fine_tune, panels.trials, panels.link
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
         # Otherwise, on a slow computer, some panels would never have a turn.

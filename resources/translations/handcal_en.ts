@@ -1573,6 +1573,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Cursor shown for {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Make another cursor</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1618,6 +1622,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Once more, to be sure. {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Outline shown for {:g} s</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2539,15 +2547,15 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Not connected. Open a session on the start page.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Restart headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Restart the virtual headset&apos;s program</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Open a session on the start page.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -22,6 +22,7 @@ from handcal_gui.widgets.sentence import sentence
 _PERIOD_S = 0.25
 """Interval of updating the numbers; faster changes cannot be read."""
 _ICON_PX = 24
+_NO_SESSION = tr("Not connected. Open a session on the start page.")
 
 
 class LinkPanel(QWidget):
@@ -68,7 +69,7 @@ class LinkPanel(QWidget):
         self._pairing.new_key_requested.connect(self.new_key_requested)
         self._pairing.hide()
         self._lay_out()
-        self._show_state(is_connected=False, problem=tr("Open a session on the start page."))
+        self._show_state(is_connected=False, problem=_NO_SESSION)
         follow_theme(self, self._draw_sign)
 
     def show_pairing(self, address: str, key: str, *, is_virtual: bool = False) -> None:
@@ -109,7 +110,10 @@ class LinkPanel(QWidget):
             self._is_connected = is_connected
             self._draw_sign()
         word = tr("Connected") if is_connected else tr("Not connected")
-        self._state.setText(f"{word}. {sentence(problem)}" if problem else word)
+        self._sign.setAccessibleName(word)
+        # A problem says by itself that no headset is connected.
+        known = [word] if is_connected or not problem else []
+        self._state.setText(". ".join([*known, sentence(problem)] if problem else known))
 
     def _draw_sign(self) -> None:
         drawn = (

@@ -121,3 +121,10 @@ def test_a_late_frame_is_shown_once_with_the_newest_hand(stream: Stream) -> None
     seen = stream.see(0.1)
     stream.miss(seen)
     assert [one.observation for one in stream.polled] == [seen.observation, seen.observation]
+
+
+def test_a_hidden_link_panel_keeps_its_history(stream: Stream) -> None:
+    stream._controller._visible.clear()
+    stream.see(0.0)
+    assert len(stream.shown["link"]) == 1
+    assert not stream.shown["session"]

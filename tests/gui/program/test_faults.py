@@ -82,7 +82,7 @@ def test_a_silent_headset_is_reported_and_sending_repeated(live: Technician, stu
     assert "acknowledge" in live.child(QLabel, "wizardNote").text()
     live.program.window.docks["link"].raise_()
     state = live.child(QLabel, "link-state")
-    live.wait(lambda: state.text().startswith("Not connected"))
+    live.wait(lambda: state.text().startswith("No headset is connected"))
     studio.headset.come_back()
     live.wait(lambda: state.text() == "Connected")
     live.wait(lambda: not live.snapshot.link_problem)
