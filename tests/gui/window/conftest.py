@@ -79,6 +79,8 @@ def say(program: Program, snapshot: Snapshot, view: WizardView) -> None:
 
 def press(window: MainWindow, key: Qt.Key, modifiers: Qt.KeyboardModifier = _NONE) -> None:
     """Press a key as the window system does."""
+    # A press in the same millisecond as the last release repeats a key that is held down.
+    QTest.qSleep(2)
     QTest.keyClick(window.windowHandle(), key, modifiers)
 
 
