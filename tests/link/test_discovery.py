@@ -14,7 +14,7 @@ def test_a_pc_is_found_while_it_is_announced() -> None:
     except LinkError as error:
         pytest.skip(f"no multicast here: {error}")
     with announcement:
-        assert FoundPC("lab 3", (LOOPBACK, 47811)) in find_pcs(0.3, LOOPBACK)
+        assert FoundPC("lab 3", (LOOPBACK, 47811)) in find_pcs(interface=LOOPBACK)
     names = [one.name for one in find_pcs(0.1, LOOPBACK)]
     assert "lab 3" not in names
 
