@@ -305,7 +305,7 @@ def test_the_keys_are_told_where_there_is_room_for_them(
     body = area.widget()
     assert body is not None
     assert body.toolTip() == keys.text()
-    assert area.verticalScrollBar().maximum() == 0
+    qtbot.waitUntil(lambda: area.verticalScrollBar().maximum() == 0)
 
 
 def test_in_a_high_panel_the_status_stands_below_its_controls(
