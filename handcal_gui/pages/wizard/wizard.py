@@ -9,9 +9,7 @@ from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
-    QHBoxLayout,
     QLabel,
-    QSizePolicy,
     QWidget,
 )
 
@@ -22,14 +20,14 @@ from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.automatic import Automatic
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
 from handcal_gui.pages.wizard.planned import PlannedWizard
+from handcal_gui.pages.wizard.rows import PreconditionRow, StepRail
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
-from handcal_gui.pages.wizard.view import STEPS, WEARERS, Action, Precondition, Step, WizardView
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, icon, scale_font
+from handcal_gui.pages.wizard.view import WEARERS, Action, Step, WizardView
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
-from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 
 _MOST_PRECONDITIONS = 3
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
@@ -111,10 +109,10 @@ class WizardPanel(QWidget):
         self._undo.setObjectName("undo")
         self._undo.setEnabled(False)
         self._go_back = self._go_back_actions()
-        self._rail = _Rail()
+        self._rail = StepRail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
-        self._rows = [_PreconditionRow() for _ in range(_MOST_PRECONDITIONS)]
+        self._rows = [PreconditionRow() for _ in range(_MOST_PRECONDITIONS)]
         self._fact = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._fact.setObjectName("wizardFact")
         self._note = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
@@ -340,61 +338,3 @@ class WizardPanel(QWidget):
         plan: EyePlan = list(PLANS)[index]
         self.wizard.plan = plan
         self.plan_changed.emit(plan)
-
-
-class _Rail(QWidget):
-    """The steps in a row, the current one emphasised."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._row = layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        self._labels = {step: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for step in STEPS}
-        for label in self._labels.values():
-            scale_font(label, 0.85)
-            label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-            layout.addWidget(label)
-
-    def set_gap(self, gap_px: int) -> None:
-        """Set the gap between steps."""
-        self._row.setSpacing(gap_px)
-
-    def show_step(self, view: WizardView) -> None:
-        present = view.step
-        place = STEPS.index(present)
-        for i, (step, label) in enumerate(self._labels.items()):
-            is_done = i < place and step not in view.omitted
-            mark, color = ("✓ ", colors().good) if is_done else ("", colors().muted)
-            if step in view.unearned:
-                mark, color = "– ", colors().warning
-            label.setText(f"{mark}{step.label}")
-            if step is present:
-                label.setText(f"▸ {step.label}")
-                # A change of the theme reaches this widget's own palette only later.
-                color = QApplication.palette().windowText().color().name()
-            weight = "bold" if step is present else "normal"
-            label.setStyleSheet(f"color: {color}; font-weight: {weight}")
-
-
-class _PreconditionRow(QWidget):
-    """One precondition: an icon, and a text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._icon = QLabel()
-        self._text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
-        hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
-        self.setMinimumHeight(3 * SPACING_PX)
-
-    def show_precondition(self, shown: Precondition | None) -> None:
-        self.setVisible(shown is not None)
-        if shown is None:
-            return
-        name, word = ("check", tr("Yes")) if shown.holds else ("wait", tr("Not yet"))
-        shade = colors().good if shown.holds else colors().muted
-        if shown.verdict is not None:
-            name, word = VERDICT_ICONS[shown.verdict], shown.verdict.capitalize()
-            shade = getattr(colors(), VERDICT_COLORS[shown.verdict])
-        self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
-        self._icon.setAccessibleName(word)
-        self._text.setText(shown.text)
