@@ -1,14 +1,24 @@
-"""Rows of the guide: its steps, and a precondition."""
+"""Rows of the guide: its steps, and the preconditions of the present one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import zip_longest
+
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QBoxLayout,
+    QHBoxLayout,
+    QLabel,
+    QSizePolicy,
+    QWidget,
+)
 
 from handcal_gui.pages.wizard.view import STEPS, Precondition, WizardView
 from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.layouts import hbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 
 
@@ -47,7 +57,37 @@ class StepRail(QWidget):
             label.setStyleSheet(f"color: {color}; font-weight: {weight}")
 
 
-class PreconditionRow(QWidget):
+class PreconditionRows(QWidget):
+    """Preconditions, one below the other, or side by side where there is little height.
+
+    Parameters
+    ----------
+    most : int
+        Largest number of preconditions.
+    """
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self._rows = [_Row() for _ in range(most)]
+        self._box = vbox(*self._rows, on=self, margins=0, spacing=SPACING_PX // 2)
+
+    def show_preconditions(self, preconditions: Sequence[Precondition]) -> None:
+        """Replace the preconditions."""
+        for row, shown in zip_longest(self._rows, preconditions):
+            row.show_precondition(shown)
+        self.setVisible(bool(preconditions))
+
+    def fit(self, *, is_low: bool) -> None:
+        """Put the preconditions side by side in a low window, if each has room for its text."""
+        needed_px = [0 if row.isHidden() else row.needed_px for row in self._rows]
+        is_beside = is_low and sum(needed_px) <= self.width()
+        directions = QBoxLayout.Direction
+        self._box.setDirection(directions.LeftToRight if is_beside else directions.TopToBottom)
+        for i, one_px in enumerate(needed_px):
+            self._box.setStretch(i, one_px if is_beside else 0)  # so that no text is wrapped
+
+
+class _Row(QWidget):
     """One precondition: an icon, and a text."""
 
     def __init__(self) -> None:
@@ -56,6 +96,11 @@ class PreconditionRow(QWidget):
         self._text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
         self.setMinimumHeight(3 * SPACING_PX)
+
+    @property
+    def needed_px(self) -> int:
+        """Width with the text in one line, and with a gap to the next precondition."""
+        return 4 * SPACING_PX + self._text.fontMetrics().horizontalAdvance(self._text.text())
 
     def show_precondition(self, shown: Precondition | None) -> None:
         """Show a precondition, with the icon of its verdict if it has one; None hides the row."""
