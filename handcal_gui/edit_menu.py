@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QApplication, QDockWidget, QMenu, QWidget
 
@@ -28,6 +28,9 @@ _OTHERS = {
 }
 """Panels, by object names, whose action an entry triggers if the widget with the focus has none."""
 
+_AGAIN_MS = 100
+"""Period at which an open menu is brought up to date."""
+
 
 def add_edit_menu(window: MainWindow, find: Callable[[], object]) -> None:
     """Fill the Edit menu of a window.
@@ -39,10 +42,14 @@ def add_edit_menu(window: MainWindow, find: Callable[[], object]) -> None:
         Searches the stored sessions.
     """
     menu = window.menus["Edit"]
+    again = QTimer(menu, interval=_AGAIN_MS)  # a wearer's nudge can be undone while it is open
+    menu.aboutToShow.connect(again.start)
+    menu.aboutToHide.connect(again.stop)
     for name in _TITLES:
         entry = window.add_action("Edit", _TITLES[name], "", partial(_trigger, window, name))
         entry.setObjectName(f"edit-{name}")
-        menu.aboutToShow.connect(partial(_show_target, window, entry, name))
+        for due in (menu.aboutToShow, again.timeout):
+            due.connect(partial(_show_target, window, entry, name))
     menu.addSeparator()
     window.add_action("Edit", tr("&Find in sessions…"), "Ctrl+F", find)
 

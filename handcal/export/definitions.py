@@ -38,8 +38,8 @@ DEFINITIONS = {
     "rotation": "Angle between the hand and the cursor at the confirmation.",
     "reprojection error": (
         "In the user test: distance in the display between a corner of the target drawn with the "
-        "calibrated φ and with the φ that was adjusted by hand until the drawn target covered the "
-        "real one."
+        "calibrated φ (the solved one, or 0 for an eye that keeps the offline calibration) and "
+        "with the φ that was adjusted by hand until the drawn target covered the real one."
     ),
     "W, H, D": "Frames: the world, the headset's rig, the depth camera.",
     "C0, C1": "The viewpoint of the offline calibration, and the wearer's eye.",

@@ -44,7 +44,8 @@ from handcal.types import (
 )
 
 RESULTS_VERSION = 2
-_USED: tuple[VerdictName, ...] = ("accept", "repeat")
+USED: tuple[VerdictName, ...] = ("accept", "repeat")
+"""Verdicts of eyes that are drawn with the solved φ; others keep the offline calibration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ class Results:
         A result to be repeated is used, as it is expected to be better than none.
         """
         return {
-            eye: shift.shift_m if self.verdicts[eye].name in _USED else np.zeros(3)
+            eye: shift.shift_m if self.verdicts[eye].name in USED else np.zeros(3)
             for eye, shift in self.eyes.items()
         }
 

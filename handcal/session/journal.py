@@ -262,7 +262,9 @@ def _parse_sound(line: bytes) -> dict[str, Any]:
     is_sound = line + b"\n" == content[:-1] + _ending(content)
     if type(version) is not int or not 1 <= version <= JOURNAL_VERSION:
         problem = f"has version {version!r}, not one of 1 to {JOURNAL_VERSION}"
-        raise (FileError(f"the session's journal {problem}") if is_sound else ValueError(problem))
+        if is_sound:
+            raise FileError(f"the session's journal {problem}; update handcal to read it")
+        raise ValueError(problem)
     if not is_sound and (version == JOURNAL_VERSION or has_checksum):
         raise ValueError("does not have its checksum")
     return fields

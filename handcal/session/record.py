@@ -226,7 +226,10 @@ def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
         try:
             return parse_rig(state.rig.encode())
         except ValueError as worse:
-            raise FileError(f"{file} and its copy in the journal are damaged: {worse}") from worse
+            raise FileError(
+                f"{file} and its copy in the journal are damaged: {worse}; repair the session with "
+                "another copy of the rig file"
+            ) from worse
     if not state.rig_sha256:
         damaged.append(Damage("rig.yaml", None, "its checksum, in the journal, is lost"))
     return rig

@@ -1,9 +1,10 @@
-"""The wearer's views of a running station: each eye's in turn, as often as the frames allow."""
+"""The wearer's views of a running station: both eyes of one moment, one rendered at a time."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,15 +12,29 @@ from handcal.display import view_of_eye
 from handcal.geometry import invert, transform
 from handcal.rig_types import Rig
 from handcal.sim.eyes import TrueEyes
+from handcal.sim.scene import SceneState
 from handcal.sim.simulation import Simulation
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.hands import PlacedHand
 from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import Eye, Float64
+from handcal.types import EYES, Eye, Float64
 
-_PERIOD_S = 0.1
+_PERIOD_S = 0.2
+_STALE_NS = 2_000_000_000
+"""Age of a moment whose second eye is no longer rendered: the hand was out of sight since."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moment:
+    """What the views of both eyes show."""
+
+    hand: PlacedHand
+    cursor: PlacedHand | None
+    targets_E_m: Mapping[Eye, Float64]
+    drawn_shift_m: Mapping[Eye, Float64]
+    scene: SceneState | None
 
 
 class EyeViews:
@@ -36,8 +51,8 @@ class EyeViews:
 
     Attributes
     ----------
-    shown : dict of Eye to EyeView
-        The newest view of each eye.
+    shown : Mapping of Eye to EyeView
+        The newest views, of both eyes at one moment; empty before.
     """
 
     def __init__(
@@ -56,14 +71,17 @@ class EyeViews:
         if simulation is not None and settings.source == "simulator":
             wearer = WearerSettings(slip_m=settings.slip_m)
             self._true_eyes = TrueEyes(simulation.world, worn_rig, settings.seed, wearer)
-        self.shown: dict[Eye, EyeView] = {}
-        self._viewed: Eye = "right"
-        self._next_s = 0.0
+        self.shown: Mapping[Eye, EyeView] = {}
+        self._moment: _Moment | None = None
+        self._seen: dict[Eye, EyeView] = {}
+        self._next_s = self._spent_s = 0.0
 
     def render_next(
         self, hand: PlacedHand, targets_E_m: Mapping[Eye, Float64], is_offline: bool
     ) -> None:
-        """Render the next eye's view if it is time.
+        """Render the next eye's view if it is time; both eyes' are then shown together.
+
+        Each call renders one, as two would delay the frame too much.
 
         Parameters
         ----------
@@ -75,29 +93,44 @@ class EyeViews:
             True while the headset draws with the offline calibration.
         """
         started_s = time.monotonic()
-        if started_s < self._next_s:
-            return
-        eye: Eye = "left" if self._viewed == "right" else "right"
-        self.shown[eye] = self._see(eye, hand, targets_E_m.get(eye), is_offline)
-        self._viewed = eye
+        moment = self._moment
+        if moment is None or hand.t_host_ns - moment.hand.t_host_ns > _STALE_NS:
+            if started_s < self._next_s:
+                return
+            moment = self._moment = self._begin(hand, targets_E_m, is_offline)
+            self._next_s, self._spent_s, self._seen = started_s + _PERIOD_S, 0.0, {}
+        eye = EYES[len(self._seen)]
+        self._seen[eye] = self._see(eye, moment)
         ended_s = time.monotonic()
-        # On a busy computer frames have priority.
-        self._next_s = ended_s + max(_PERIOD_S, 3.0 * (ended_s - started_s))
+        self._spent_s += ended_s - started_s
+        if len(self._seen) == len(EYES):
+            self.shown, self._moment = self._seen, None
+            # On a busy computer frames have priority.
+            self._next_s = max(self._next_s, ended_s + 3.0 * self._spent_s)
 
-    def _see(
-        self, eye: Eye, hand: PlacedHand, target_E_m: Float64 | None, is_offline: bool
-    ) -> EyeView:
+    def _begin(
+        self, hand: PlacedHand, targets_E_m: Mapping[Eye, Float64], is_offline: bool
+    ) -> _Moment:
+        calibration = self._calibration
+        drawn_shift_m = {eye: calibration.applied_shift_m[eye] for eye in EYES}
+        return _Moment(
+            hand,
+            calibration.cursor,
+            dict(targets_E_m),
+            {eye: np.zeros(3) for eye in EYES} if is_offline else drawn_shift_m,
+            self._simulation.scene_at(hand.t_host_ns) if self._simulation is not None else None,
+        )
+
+    def _see(self, eye: Eye, moment: _Moment) -> EyeView:
         calibration, display = self._calibration, self._rig.eyes[eye]
-        drawn_shift_m = np.zeros(3) if is_offline else calibration.applied_shift_m[eye]
-        cursor = calibration.cursor
+        hand, cursor, drawn_shift_m = moment.hand, moment.cursor, moment.drawn_shift_m[eye]
         T_W_H = hand.T_W_D @ invert(self._rig.T_H_D)
         image = None
-        if self._simulation is not None and self._true_eyes is not None:
+        if self._true_eyes is not None:
             eye_shift_m = self._true_eyes.shift_m[eye]
-            scene = self._simulation.scene_at(hand.t_host_ns)
-            if scene is not None:
-                T_W_H = scene.T_W_D @ invert(self._worn_rig.T_H_D)
-                image = self._true_eyes.look(eye, T_W_H, scene.T_W_hand)
+            if moment.scene is not None:
+                T_W_H = moment.scene.T_W_D @ invert(self._worn_rig.T_H_D)
+                image = self._true_eyes.look(eye, T_W_H, moment.scene.T_W_hand)
         elif calibration.results is not None and eye in calibration.results.eyes:
             eye_shift_m = calibration.results.eyes[eye].shift_m
         else:
@@ -110,7 +143,7 @@ class EyeViews:
             drawn_shift_m,
             _outline_E(T_E_W, hand),
             np.empty((0, 3)) if cursor is None else _outline_E(T_E_W, cursor),
-            np.empty((0, 3)) if target_E_m is None else target_E_m,
+            moment.targets_E_m.get(eye, np.empty((0, 3))),
             is_true=image is not None,
             image=image,
         )

@@ -46,7 +46,7 @@ class Trials:
         self.is_offline = False
 
     def save(self, eye: Eye, depth_m: float) -> int:
-        """Save a trial: the solved φ against the one set by hand, for a target at a distance.
+        """Save a trial: the calibrated φ against the one set by hand, for a target at a distance.
 
         Raises
         ------
@@ -68,12 +68,12 @@ class Trials:
         return self._session.save_trial(trial)
 
     def show_target(self, eye: Eye, depth_m: float) -> None:
-        """Show the target of a trial to one eye in the headset, while the solved φ is applied.
+        """Show the target of a trial to one eye in the headset, while the calibrated φ is applied.
 
         Raises
         ------
         ProcedureError
-            Unless the solved φ is applied.
+            Unless the calibrated φ is applied.
         LinkError
             If the link is closed.
         """
@@ -94,7 +94,7 @@ class Trials:
         Raises
         ------
         ProcedureError
-            Unless the solved φ is applied, or if it is the offline one.
+            Unless the calibrated φ is applied, or if it is the offline one.
         LinkError
             If the link is closed.
         """
@@ -107,7 +107,7 @@ class Trials:
         Raises
         ------
         ProcedureError
-            Unless the solved φ is applied.
+            Unless the calibrated φ is applied.
         LinkError
             If the link is closed.
         """
@@ -118,7 +118,7 @@ class Trials:
             self.is_offline = is_shown
 
     def follow_procedure(self) -> None:
-        """End what is shown once the solved φ is no longer applied, or is another one."""
+        """End what is shown once the calibrated φ is no longer applied, or is another one."""
         if self._calibration.state is not State.APPLIED:
             self.hide_target()
             self.comparing.end()

@@ -22,6 +22,7 @@ from handcal.geometry import transform
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
 from handcal.progress import Progress
+from handcal.register.results import USED
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import read_cube
 from handcal.rig.cube_track import TrackedCube, facing_corners_m
@@ -163,11 +164,11 @@ def run_user_trials(
     """
     settings = settings or TrialSettings()
     record = Session.open(session.path)
-    rig, solved_m = record.rig, solved_shifts_m(record, settings.eyes)
+    rig, calibrated_m = record.rig, calibrated_shifts_m(record, settings.eyes)
     drawing = Drawing(rig, server, record.wearer)
     trials: list[Trial] = []
     # A headset draws nothing before it has the projections of both eyes.
-    drawing.send({eye: solved_m.get(eye, np.zeros(3)) for eye in EYES})
+    drawing.send({eye: calibrated_m.get(eye, np.zeros(3)) for eye in EYES})
     drawing.wait_acked(_ACK_S)
     try:
         for round_number, depth_m in enumerate(settings.depths_m):
@@ -181,24 +182,24 @@ def run_user_trials(
                     drawing.send({eye: shift_m})  # noqa: B023 (called before the next eye's turn)
                     drawing.wait_acked(_ACK_S)
 
-                draw(solved_m[eye])
+                draw(calibrated_m[eye])
                 T_E_T = view_of_eye(rig.eyes[eye], _head_now(server)) @ cube.T_W_T
                 corners_W_m = transform(cube.T_W_T, facing_corners_m(tracker.cube, T_E_T))
                 server.wait_acked(server.send_shape(Shape(corners_W_m, (eye,))), _ACK_S)
                 server.wait_acked(server.send_prompt(adjust_prompt(eye), (eye,)), _ACK_S)
-                adjusted_m = adjust(eye, solved_m[eye], draw)
+                adjusted_m = adjust(eye, calibrated_m[eye], draw)
                 T_E_W = view_of_eye(rig.eyes[eye], _head_now(server))
                 trial = make_trial(
                     rig.eyes[eye],
                     eye,
                     depth_m,
-                    solved_m[eye],
+                    calibrated_m[eye],
                     adjusted_m,
                     transform(T_E_W, corners_W_m),
                 )
                 session.save_trial(trial)
                 trials.append(trial)
-                draw(solved_m[eye])
+                draw(calibrated_m[eye])
     finally:
         server.send_shape(None)
         server.send_prompt("")
@@ -214,13 +215,18 @@ def adjust_prompt(eye: Eye) -> str:
     )
 
 
-def solved_shifts_m(record: SessionRecord, eyes: Sequence[Eye]) -> Mapping[Eye, Float64]:
-    """Return φ of each eye as a session has solved it; FileError if one is not solved."""
+def calibrated_shifts_m(record: SessionRecord, eyes: Sequence[Eye]) -> Mapping[Eye, Float64]:
+    """Return the calibrated φ of each eye of a session; FileError if one is not solved."""
     solved = {} if record.results is None else record.results["eyes"]
     missing = [eye for eye in eyes if eye not in solved]
     if missing:
         raise FileError(f"{record.path}: the {missing[0]} eye is not solved; calibrate it first")
-    return {eye: np.array(solved[eye]["shift_m"], np.float64) for eye in eyes}
+    return {
+        eye: np.array(solved[eye]["shift_m"], np.float64)
+        if solved[eye]["verdict"] in USED
+        else np.zeros(3)
+        for eye in eyes
+    }
 
 
 def wait_for_cube(

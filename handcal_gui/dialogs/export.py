@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from handcal.export.export import ExportSettings
@@ -23,7 +24,7 @@ Export = Callable[[Path, ExportSettings, Progress], Exported]
 
 
 class ExportDialog(QDialog):
-    """Exports one or several sessions in a job; closing the dialog cancels it.
+    """Exports one or several sessions in a job; Esc cancels it, and so does closing the dialog.
 
     Parameters
     ----------
@@ -102,6 +103,13 @@ class ExportDialog(QDialog):
             self._job.abandon()
             self._job = None
         self.reject()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Cancel a running export, as its button does, so that the dialog can say so."""
+        if self._job is not None and event.matches(QKeySequence.StandardKey.Cancel):
+            self._cancel()
+        else:
+            super().keyPressEvent(event)
 
     def reject(self) -> None:
         """Close; a running export is cancelled first."""

@@ -108,10 +108,11 @@ QUANTITIES = (
     *PHI,
     EXPECTED_ERROR,
     Quantity(
-        tr("RMS (mm)"),
+        tr("RMS to points (mm)"),
         "",
         tr(
-            "Distance between hand and cursor after registration, root mean square over the inliers"
+            "Distance from the hand's points to their partners on the cursor after registration,\n"
+            "root mean square over the inliers"
         ),
         lambda shift, _: 1e3 * shift.rms_m,
         2,

@@ -37,8 +37,8 @@ ALIGNMENT_COLUMNS = (
     ),
     RecordColumn(tr("φ mm"), _PHI, rank=1),
     RecordColumn(
-        tr("RMS mm"),
-        tr("Distance between hand and cursor after registration, in millimetres"),
+        tr("RMS to points mm"),
+        tr("Distance from the hand's points to their partners on the cursor, in millimetres"),
         rank=3,
     ),
     RecordColumn(

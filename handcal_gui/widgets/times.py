@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import UTC, datetime
+
+_FOLDER = "session-%Y%m%d-%H%M%S-%f"
+"""The name that `Session.create` gives a folder, with the time in UTC."""
 
 
 def local_time(utc: str, form: str = "%d %b %Y, %H:%M") -> str:
@@ -11,3 +14,12 @@ def local_time(utc: str, form: str = "%d %b %Y, %H:%M") -> str:
         return f"{datetime.fromisoformat(utc).astimezone():{form}}"
     except (ValueError, OverflowError):  # overflow: year 1 in another time zone
         return utc
+
+
+def session_time(folder: str) -> str:
+    """Return when a session began, as local time, from its folder's name; other names unchanged."""
+    try:
+        began = datetime.strptime(folder, _FOLDER).replace(tzinfo=UTC)
+    except ValueError:
+        return folder
+    return local_time(began.isoformat())

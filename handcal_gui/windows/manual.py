@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, QUrl
+from PySide6.QtCore import QModelIndex, QSize, Qt, QUrl
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -20,6 +20,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
+    QSplitter,
     QTextBrowser,
     QTreeWidget,
     QTreeWidgetItem,
@@ -37,7 +38,8 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
 
 _FIRST_SIZE = QSize(900, 750)
-_BESIDE_PX = 80
+_CONTENTS_PX = 220
+_BESIDE_PX = 50
 """Room beside the widest picture."""
 _FOUND_PX = 230
 _COLUMNS_PX = 150, 200, 450
@@ -46,6 +48,7 @@ _NOTHING = tr("Nothing found: search for fewer or other words")
 _DIMMED = 0.25
 """Share of the light that a picture of the light window loses on a dark page."""
 _PAGES = (".md", ".py", ".proto")
+_LINK = re.compile(r"\]\(([\w-]+\.md)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,8 @@ class Line:
     text: str
     block: int
     """Number of the line's first block in the page's document."""
+    level: int
+    """Level of a heading, 1 for the page's title; 0 for other lines."""
 
 
 def read_lines(folder: Path) -> list[Line]:
@@ -74,12 +79,27 @@ def find_lines(lines: Iterable[Line], words: str) -> list[Line]:
     return sorted(found, key=lambda line: line.text != line.section)
 
 
+def in_reading_order(lines: Iterable[Line], start: Path) -> list[Line]:
+    """Return lines in the order in which a page links to theirs; after it, and before all others.
+
+    Parameters
+    ----------
+    lines : iterable of Line
+    start : Path
+        The page with the links.
+    """
+    names = [start.name, *_LINK.findall(start.read_text("utf-8"))]
+    return sorted(lines, key=lambda line: [*names, line.page.name].index(line.page.name))
+
+
 class Manual(QWidget):
-    """A window with the pages of the manual, and a search over all of them.
+    """A window with the pages of the manual, their contents, and a search over all of them.
 
     Attributes
     ----------
     page : ManualPage
+    contents : QTreeWidget
+        The pages with their sections, those of the page shown unfolded.
     search : QLineEdit
     found : QTreeWidget
         The lines found; hidden without a search.
@@ -101,13 +121,16 @@ class Manual(QWidget):
         self.found.setHeaderLabels([tr("Page"), tr("Section"), tr("Line")])
         self.found.setMaximumHeight(_FOUND_PX)
         self.found.hide()
+        self.contents = with_name(QTreeWidget(), "manualContents", tr("Contents"))
+        self.contents.setHeaderHidden(True)
+        self._pages: dict[Path, QTreeWidgetItem] = {}
         self._count = QLabel()
         self._lines: list[Line] = []
         self._shown: list[Line] = []
         vbox(
             hbox((self.search, 1), self._count, spacing=SPACING_PX),
             self.found,
-            (self.page, 1),
+            (self._lay_out_pages(), 1),
             on=self,
             margins=SPACING_PX,
             spacing=SPACING_PX,
@@ -116,6 +139,9 @@ class Manual(QWidget):
         self.search.returnPressed.connect(self._show_next)
         self.found.itemClicked.connect(self._show_current)
         self.found.itemActivated.connect(self._show_current)
+        self.contents.itemClicked.connect(self._show_chosen)
+        self.contents.itemActivated.connect(self._show_chosen)
+        self.page.sourceChanged.connect(self._mark_page)
         add_action(self, tr("Search all pages"), "Ctrl+F", self._begin_search)
 
     def open(self, page: str) -> None:
@@ -126,9 +152,11 @@ class Manual(QWidget):
         FileError
             If the installation is damaged.
         """
-        self._lines = self._lines or read_lines(resource_path("docs"))
+        if not self._lines:
+            self._lines = read_lines(resource_path("docs"))
+            self._list_pages()
+        self.show()  # first, as pictures are no wider than the page
         self.page.setSource(QUrl.fromLocalFile(str(resource_path(page))))
-        self.show()
         keep_on_screen(self)
         self.raise_()
         self.activateWindow()
@@ -140,6 +168,42 @@ class Manual(QWidget):
             self.search.clear()
         else:
             super().keyPressEvent(event)
+
+    def _lay_out_pages(self) -> QSplitter:
+        label = QLabel(tr("&Contents"))
+        label.setBuddy(self.contents)
+        beside, parts = QWidget(), QSplitter()
+        vbox(label, (self.contents, 1), on=beside, margins=0, spacing=SPACING_PX // 2)
+        for part in (beside, self.page):
+            parts.addWidget(part)
+        parts.setStretchFactor(1, 1)
+        parts.setSizes([_CONTENTS_PX, _FIRST_SIZE.width() - _CONTENTS_PX])
+        return parts
+
+    def _list_pages(self) -> None:
+        """List the pages and their sections."""
+        for line in in_reading_order(self._lines, resource_path("docs/index.md")):
+            if line.level in (1, 2):
+                parent = self.contents if line.level == 1 else self._pages[line.page]
+                item = QTreeWidgetItem(parent, [line.text])
+                item.setToolTip(0, line.text)
+                item.setData(0, Qt.ItemDataRole.UserRole, line)
+                self._pages.setdefault(line.page, item)
+
+    def _mark_page(self, url: QUrl) -> None:
+        """Mark the page shown in the contents, and unfold its sections only."""
+        shown = self._pages.get(Path(url.toLocalFile()))
+        for item in self._pages.values():
+            item.setExpanded(item is shown)
+        current = self.contents.currentItem()
+        if shown is None:
+            self.contents.setCurrentIndex(QModelIndex())
+        elif current is None or shown not in (current, current.parent()):
+            self.contents.setCurrentItem(shown)
+
+    def _show_chosen(self, item: QTreeWidgetItem) -> None:
+        self._show_line(item.data(0, Qt.ItemDataRole.UserRole))
+        self.page.setFocus()
 
     def _begin_search(self) -> None:
         self.search.setFocus()
@@ -168,7 +232,9 @@ class Manual(QWidget):
             self._show_current()
 
     def _show_current(self) -> None:
-        line = self._shown[self.found.currentIndex().row()]
+        self._show_line(self._shown[self.found.currentIndex().row()])
+
+    def _show_line(self, line: Line) -> None:
         self.page.setSource(QUrl.fromLocalFile(str(line.page)))
         self.page.go_to(self.page.document().findBlockByNumber(line.block))
 
@@ -220,7 +286,7 @@ class ManualPage(QTextBrowser):
         path = Path(self.source().resolved(QUrl(name)).toLocalFile())
         is_drawing = path.suffix == ".svg" and path.is_file()
         image = QImage.fromData(themed_drawing(path)) if is_drawing else QImage(str(path))
-        widest_px = self.window().width() - _BESIDE_PX
+        widest_px = self.width() - _BESIDE_PX
         if image.width() > widest_px:
             image = image.scaledToWidth(widest_px, Qt.TransformationMode.SmoothTransformation)
         is_light = not is_drawing and not image.isNull()
@@ -261,11 +327,11 @@ def _lines(page: Path) -> Iterator[Line]:
     title = section = ""
     for line in blocks.values():
         text = " · ".join(one.text() for one in line if one.text())
-        if line[0].blockFormat().headingLevel():
+        if level := line[0].blockFormat().headingLevel():
             section = text
             title = title or text
         if text:
-            yield Line(page, title, section, text, line[0].blockNumber())
+            yield Line(page, title, section, text, line[0].blockNumber(), level)
 
 
 def _anchor(heading: str) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,12 +12,16 @@ from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
+from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
+from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.window import MainWindow
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.helpers import child
+from tests.gui.views import NUDGED
 
 
 @pytest.fixture
@@ -73,6 +78,29 @@ def test_a_deletion_is_chosen_in_the_table_and_undone_from_anywhere(
     assert asked.args == ["alignment", 2]
     window.show_page("start")
     assert offered(window) == {}
+
+
+def test_an_open_menu_offers_to_undo_the_nudges_made_since(
+    qtbot: QtBot, window: MainWindow, snapshot: Callable[..., Snapshot]
+) -> None:
+    guide = child(window, WizardPanel, "wizard")
+    window.show_page("live")
+
+    def verify(can_undo: bool) -> None:
+        verifying = replace(NUDGED, can_undo=can_undo)
+        guide.show_snapshot(snapshot(State.VERIFY, procedure={"verifying": verifying}))
+
+    def undo() -> str:
+        entry = child(window, QAction, "edit-undo")
+        return entry.text() if entry.isEnabled() else ""
+
+    verify(can_undo=False)
+    assert "edit-undo" not in offered(window)
+    verify(can_undo=True)
+    qtbot.waitUntil(lambda: undo() == "&Undo: Movement of the outline")
+    verify(can_undo=False)
+    qtbot.waitUntil(lambda: not undo())
+    window.menus["Edit"].aboutToHide.emit()
 
 
 def test_results_are_copied_once_there_are_some(

@@ -276,7 +276,7 @@ def test_a_newer_version_is_refused_as_a_whole(
     line = journal_line(happens_now(13, "later", {}))
     monkeypatch.undo()
     journal.write_bytes(journal.read_bytes() + line)
-    with pytest.raises(FileError, match="has version 4, not one of 1 to 3"):
+    with pytest.raises(FileError, match="has version 4, not one of 1 to 3; update handcal"):
         Session.open(path)
 
 

@@ -23,8 +23,8 @@ from handcal.sim.wearer import draw_eyes, draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station import user_test
 from handcal.station.cube_tracking import CubeTracker, run_cube_tracking
-from handcal.station.user_test import TrialSettings, run_user_trials
-from handcal.types import Eye, Float64, HeadsetIdentity, Intrinsics
+from handcal.station.user_test import TrialSettings, calibrated_shifts_m, run_user_trials
+from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Intrinsics
 from tests.helpers import ROOT
 
 TRUE_M: dict[Eye, Float64] = {
@@ -137,6 +137,16 @@ def test_a_cube_elsewhere_and_an_unsolved_session_are_refused(
         run_user_trials(empty, server, cube, room.adjust, room.place, impatient)
 
 
+def test_trials_of_an_eye_that_keeps_the_offline_calibration_judge_that() -> None:
+    record = Session.open(ROOT / "resources" / "example_session")
+    assert record.results is not None
+    eyes = record.results["eyes"]
+    kept = {**record.results, "eyes": {**eyes, "left": {**eyes["left"], "verdict": "keep"}}}
+    shifts_m = calibrated_shifts_m(replace(record, results=kept), EYES)
+    np.testing.assert_array_equal(shifts_m["left"], np.zeros(3))
+    np.testing.assert_array_equal(shifts_m["right"], eyes["right"]["shift_m"])
+
+
 @pytest.mark.campaign
 def test_the_published_procedure_finds_the_true_error(
     session: Session,
@@ -165,7 +175,7 @@ def test_the_published_procedure_finds_the_true_error(
                 )
                 solved = solve_session([alignment], rig, SolveSettings()).eyes["left"].shift_m
                 monkeypatch.setattr(
-                    user_test, "solved_shifts_m", lambda *_, solved=solved: {"left": solved}
+                    user_test, "calibrated_shifts_m", lambda *_, solved=solved: {"left": solved}
                 )
                 for trial in run_user_trials(
                     session,

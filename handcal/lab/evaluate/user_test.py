@@ -15,7 +15,10 @@ from typing import Any, Literal, TypeAlias
 from handcal.errors import FileError
 from handcal.export.tables import corner_rows
 from handcal.progress import Progress
+from handcal.session.journal import JOURNAL
+from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord
+from handcal.session.state import SessionEvent
 from handcal.session.trial import calibration_numbers
 from handcal.statistics import (
     MeanInterval,
@@ -115,6 +118,14 @@ def read_user_test(folders: Iterable[Path], progress: Progress = Progress()) -> 
     return UserTest(sessions, left_out, rows)
 
 
+def holds_trials(folder: Path) -> bool:
+    """Return whether a session, or one in a folder of sessions, holds a trial.
+
+    Reads no further than the first.
+    """
+    return any(map(_holds_trials, _sessions(folder)))
+
+
 def evaluate_user_test(test: UserTest) -> UserTestResult:
     """Return the errors of all trials, and of each wearer, eye and distance.
 
@@ -137,10 +148,21 @@ def evaluate_user_test(test: UserTest) -> UserTestResult:
 
 def _sessions(folder: Path) -> Iterator[Path]:
     """Yield the sessions in a folder, or the folder itself if it is one, or holds none."""
-    inside = sorted(journal.parent for journal in folder.glob("*/journal.jsonl"))
-    if (folder / "journal.jsonl").exists() or not inside:
+    inside = sorted(journal.parent for journal in folder.glob(f"*/{JOURNAL}"))
+    if (folder / JOURNAL).exists() or not inside:
         inside = [folder]
     yield from (path.absolute() for path in inside)
+
+
+def _holds_trials(path: Path) -> bool:
+    try:
+        with (path / JOURNAL).open("rb") as lines:
+            # Long before all events are read and applied.
+            if not any(SessionEvent.TRIAL_SAVED.encode() in line for line in lines):
+                return False
+        return bool(replay(path).state.trials.active)
+    except (FileError, OSError):
+        return False
 
 
 def _reasons(left_out: Mapping[str, str]) -> str:

@@ -75,10 +75,7 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
 
 def _unfinished(session: UnfinishedSession) -> Entry:
     if session.problem:
-        name = session.path.name
-        named = session.problem.replace(str(session.path), name)
-        text = named if name in named else f"{name}: {named}"
-        return Entry(session.path, text, is_enabled=False)
+        return _unreadable(session.path, session.problem)
     counts = _counts(session)
     text = _text(session.wearer, session.started, *counts)
     if not any(counts):
@@ -98,7 +95,7 @@ def _recent(path: Path) -> Entry | None:
     try:
         replayed = replay(path)
     except FileError as error:
-        return Entry(path, f"{path.name}: {error}", is_enabled=False)
+        return _unreadable(path, str(error))
     state, events = replayed.state, replayed.journal.events
     alignments, trials = state.alignments, state.trials
     held = alignments.active, alignments.deleted, trials.active, trials.deleted
@@ -107,6 +104,17 @@ def _recent(path: Path) -> Entry | None:
     counts = len(alignments.active), len(state.facts.verified), len(trials.active)
     text = _text(state.wearer, events[0].time, *counts)
     return Entry(path, text, wearer=state.wearer, eyes=eye_outcomes(path, replayed))
+
+
+def _unreadable(path: Path, why: str) -> Entry:
+    """Return a session that cannot be chosen, with the reason and what to do."""
+    named = why.replace(str(path), path.name)
+    text = named if path.name in named else f"{path.name}: {named}"
+    if "; " not in named:  # which advice follows
+        text = tr(
+            "{}; make it readable, restore it from a backup, or delete it in All sessions"
+        ).format(text)
+    return Entry(path, text, is_enabled=False)
 
 
 def _text(wearer: str, started: str, alignments: int, verified: int, trials: int) -> str:

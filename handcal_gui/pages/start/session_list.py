@@ -93,7 +93,8 @@ class SessionList(QWidget):
         for entry in entries:
             item = QListWidgetItem(entry.text)
             item.setData(Qt.ItemDataRole.UserRole, entry.path)
-            about = "\n".join(filter(None, (str(entry.path), picture_text(entry.eyes))))
+            why = "" if entry.is_enabled else entry.text  # of which a small list shows a part
+            about = "\n".join(filter(None, (str(entry.path), why, picture_text(entry.eyes))))
             item.setToolTip(plain_tooltip(about))
             item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, picture_text(entry.eyes))
             if has_pictures:

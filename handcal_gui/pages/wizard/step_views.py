@@ -28,6 +28,7 @@ from handcal_gui.pages.wizard.view import (
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.times import session_time
 
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
 """Waiting times of automatic steps: for the hand, and to read a text or advice."""
@@ -71,7 +72,7 @@ def connect_view(snapshot: Snapshot) -> WizardView:
         fact = tr(
             "The former result is used again ({}): the wearer verifies each eye first, and "
             "alignments follow only if they are needed."
-        ).format(former)
+        ).format(session_time(former))
     return WizardView(
         Step.CONNECT,
         tr("{} and wait until camera and headset are connected.").format(puts_on),

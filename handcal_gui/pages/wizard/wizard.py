@@ -9,9 +9,7 @@ from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
-    QHBoxLayout,
     QLabel,
-    QSizePolicy,
     QWidget,
 )
 
@@ -22,14 +20,14 @@ from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.automatic import Automatic
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
 from handcal_gui.pages.wizard.planned import PlannedWizard
+from handcal_gui.pages.wizard.rows import PreconditionRows, StepRail
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
-from handcal_gui.pages.wizard.view import STEPS, WEARERS, Action, Precondition, Step, WizardView
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, icon, scale_font
+from handcal_gui.pages.wizard.view import WEARERS, Action, Step, WizardView
+from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
-from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
 
 _MOST_PRECONDITIONS = 3
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
@@ -37,9 +35,12 @@ _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
 _LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
 """Width and height from which the guide has larger texts, and their scale."""
-_LOW = 36.5, 33.5, 29.5
-"""Heights of the room for the guide, without its messages, below which it has smaller gaps, no
-details, and no small views of the eyes; in sizes of the font."""
+_LOW_WINDOW = 43.5
+"""Height of the window, in sizes of the font, below which the guide has smaller gaps, and its
+preconditions are side by side; no message may move its buttons."""
+_LOW = 33.5, 29.5
+"""Heights of the room for the guide, without its messages, below which it has no details, and no
+small views of the eyes; in sizes of the font."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -111,10 +112,10 @@ class WizardPanel(QWidget):
         self._undo.setObjectName("undo")
         self._undo.setEnabled(False)
         self._go_back = self._go_back_actions()
-        self._rail = _Rail()
+        self._rail = StepRail()
         self._title = QLabel()
         self._sentence = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
-        self._rows = [_PreconditionRow() for _ in range(_MOST_PRECONDITIONS)]
+        self._preconditions = PreconditionRows(_MOST_PRECONDITIONS)
         self._fact = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._fact.setObjectName("wizardFact")
         self._note = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
@@ -173,19 +174,21 @@ class WizardPanel(QWidget):
         said = (one for one in (self._fact, self._note) if not one.isHidden())
         said_px = sum(one.heightForWidth(self._sentence.width()) for one in said)
         height = ((self.parentWidget() or self).height() - said_px) / font_px()
-        has_gaps, has_details, has_eyes = (height >= least for least in _LOW)
+        has_details, has_eyes = (height >= least for least in _LOW)
+        is_low = self.window().height() / font_px() < _LOW_WINDOW
         self.picture.fit(has_details=has_details, has_eyes=has_eyes)
-        gap_px = SPACING_PX if has_gaps else SPACING_PX // 2
+        gap_px = SPACING_PX // 2 if is_low else SPACING_PX
         if (layout := self.layout()) is not None:
             layout.setContentsMargins(*4 * (2 * gap_px,))
             layout.setSpacing(gap_px)
         self._rail.set_gap(gap_px // 2)
+        self._preconditions.fit(is_low=is_low)
 
     def _scale_texts(self) -> None:
         larger = _LARGE_SCALE if self._is_large else 1.0
         for texts, scale in (
             ([self._sentence], _SENTENCE_SCALE[self._is_alone]),
-            ([*self._rows, self._fact, self._note], _ROW_SCALE[self._is_alone]),
+            ([self._preconditions, self._fact, self._note], _ROW_SCALE[self._is_alone]),
             ([self.picture.result], 1.0),
         ):
             font = self.font()
@@ -292,9 +295,8 @@ class WizardPanel(QWidget):
         self._ring.setToolTip(
             tr("Alignments made, or eyes verified; a full ring runs the next step")
         )
-        texts = vbox(
-            self._sentence, *self._rows, self._fact, self._note, 0, spacing=SPACING_PX // 2
-        )
+        said = self._sentence, self._preconditions, self._fact, self._note
+        texts = vbox(*said, 0, spacing=SPACING_PX // 2)
         ring = vbox(self._ring, 0)
         layout.addLayout(hbox((texts, 1), ring, spacing=2 * SPACING_PX))
         layout.addWidget(self.picture, 1)
@@ -312,9 +314,9 @@ class WizardPanel(QWidget):
         is_planned = isinstance(self.wizard, PlannedWizard)
         self._choice.setVisible(view.step not in OF_THE_RESULT and not is_planned)
         self.picture.result.buttons.setVisible(has_card)
-        preconditions = [one for one in view.preconditions if not (has_card and one.verdict)]
-        for i, row in enumerate(self._rows):
-            row.show_precondition(preconditions[i] if i < len(preconditions) else None)
+        self._preconditions.show_preconditions(
+            [one for one in view.preconditions if not (has_card and one.verdict)]
+        )
         self._note.setText(view.note)
         self._note.setStyleSheet(f"color: {colors().red}")
         self._fact.setText(view.fact)
@@ -340,61 +342,3 @@ class WizardPanel(QWidget):
         plan: EyePlan = list(PLANS)[index]
         self.wizard.plan = plan
         self.plan_changed.emit(plan)
-
-
-class _Rail(QWidget):
-    """The steps in a row, the current one emphasised."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._row = layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        self._labels = {step: QLabel(alignment=Qt.AlignmentFlag.AlignCenter) for step in STEPS}
-        for label in self._labels.values():
-            scale_font(label, 0.85)
-            label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-            layout.addWidget(label)
-
-    def set_gap(self, gap_px: int) -> None:
-        """Set the gap between steps."""
-        self._row.setSpacing(gap_px)
-
-    def show_step(self, view: WizardView) -> None:
-        present = view.step
-        place = STEPS.index(present)
-        for i, (step, label) in enumerate(self._labels.items()):
-            is_done = i < place and step not in view.omitted
-            mark, color = ("✓ ", colors().good) if is_done else ("", colors().muted)
-            if step in view.unearned:
-                mark, color = "– ", colors().warning
-            label.setText(f"{mark}{step.label}")
-            if step is present:
-                label.setText(f"▸ {step.label}")
-                # A change of the theme reaches this widget's own palette only later.
-                color = QApplication.palette().windowText().color().name()
-            weight = "bold" if step is present else "normal"
-            label.setStyleSheet(f"color: {color}; font-weight: {weight}")
-
-
-class _PreconditionRow(QWidget):
-    """One precondition: an icon, and a text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._icon = QLabel()
-        self._text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
-        hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
-        self.setMinimumHeight(3 * SPACING_PX)
-
-    def show_precondition(self, shown: Precondition | None) -> None:
-        self.setVisible(shown is not None)
-        if shown is None:
-            return
-        name, word = ("check", tr("Yes")) if shown.holds else ("wait", tr("Not yet"))
-        shade = colors().good if shown.holds else colors().muted
-        if shown.verdict is not None:
-            name, word = VERDICT_ICONS[shown.verdict], shown.verdict.capitalize()
-            shade = getattr(colors(), VERDICT_COLORS[shown.verdict])
-        self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
-        self._icon.setAccessibleName(word)
-        self._text.setText(shown.text)

@@ -35,6 +35,10 @@ from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
+_CALIBRATED = tr(
+    "The calibrated φ is the one with which the headset draws after the calibration: the solved "
+    "φ, or 0 for an eye that keeps the offline calibration. A trial records its error."
+)
 _OFFLINE: Shifts = {eye: np.zeros(3) for eye in EYES}
 _STEPS_MM = (0.1, 0.5, 1.0)
 _MOVES: dict[int, tuple[int, int]] = {
@@ -75,6 +79,7 @@ class FineTunePanel(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._rig: Rig | None = None
         self._solved: Shifts = {}
+        self._calibrated: Shifts = {}
         self._obstacle = tr("Fine-tuning starts with a session.")
         self._history = ShiftHistory(_OFFLINE)
         self._burst: object = None
@@ -129,12 +134,14 @@ class FineTunePanel(QWidget):
         """Show the headset's φ, unless it was set here, and whether it has arrived."""
         results = snapshot.procedure.results
         solved = {eye: shift.shift_m for eye, shift in results.eyes.items()} if results else {}
+        calibrated = results.rendered_shift_m if results else {}
         obstacle = find_obstacle(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:
             self._begin(snapshot.procedure.applied_shift_m)
-        if is_new or obstacle != self._obstacle or not same_shifts(solved, self._solved):
-            self._obstacle, self._solved = obstacle, solved
+        is_same = same_shifts(solved, self._solved) and same_shifts(calibrated, self._calibrated)
+        if is_new or obstacle != self._obstacle or not is_same:
+            self._obstacle, self._solved, self._calibrated = obstacle, solved, calibrated
             self._refresh()
         arrival = self._stream.arrival
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
@@ -245,13 +252,13 @@ class FineTunePanel(QWidget):
         can_end = self._show_solved.isChecked()
         self._show_solved.setEnabled(is_ready and (bool(self._solved) or can_end))
         self._against.setText(
-            tr("against the solved φ") if self._solved else tr("against the offline φ")
+            tr("against the calibrated φ") if self._solved else tr("against the offline φ")
         )
 
     def _effect(self, eye: Eye) -> DrawnMove | None:
         if self._rig is None:
             return None
-        before_m = self._solved.get(eye, _OFFLINE[eye])
+        before_m = self._calibrated.get(eye, _OFFLINE[eye])
         after_m, depth_m = self._drawn()[eye], self._depth.currentData()
         return effect_at(self._rig.eyes[eye], before_m, after_m, depth_m)
 
@@ -284,7 +291,9 @@ class FineTunePanel(QWidget):
         self._both = add(tr("Both eyes"), "L", tr("Move both eyes by the same amount"))
         self._both.setCheckable(True)
         self.reset_action = add(
-            tr("Reset to solved"), "", tr("Set φ to the one solved from the alignments")
+            tr("Reset to solved"),
+            "",
+            tr("Set φ to the one solved from the alignments, used or not"),
         )
         self.reset_action.triggered.connect(lambda: self._reset(self._solved))
         self._reset_offline = add(
@@ -297,7 +306,9 @@ class FineTunePanel(QWidget):
         looks.setExclusionPolicy(QActionGroup.ExclusionPolicy.ExclusiveOptional)
         looks.triggered.connect(self._show)
         self._show_solved = add(
-            tr("Show solved"), "S", tr("Show the solved φ in the headset while checked")
+            tr("Show solved"),
+            "S",
+            tr("Show the φ solved from the alignments, used or not, while checked"),
         )
         self._show_offline = add(
             tr("Show offline"), "B", tr("Show φ = 0 in the headset while checked")
@@ -335,6 +346,7 @@ class FineTunePanel(QWidget):
 
     def _lay_out(self) -> None:
         self._against = QLabel()
+        self._against.setToolTip(_CALIBRATED)
         self._sign, self._status = QLabel(), QLabel(wordWrap=True)
         self._status.setObjectName("status")
         self._status.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)

@@ -6,11 +6,24 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from handcal.register.results import Results
+from handcal.types import EyeShift
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
+_TO_POINTS, _TO_SURFACE = tr("RMS to points (mm)"), tr("RMS to surface (mm)")
+_MEANINGS = {
+    _TO_POINTS: tr(
+        "Distance from the hand's points to their partners on the cursor at each iteration\n"
+        "of each alignment, root mean square."
+    ),
+    _TO_SURFACE: tr(
+        "Distance from the hand's points to the cursor's surface, along its normals, at each\n"
+        "iteration of each alignment, root mean square. It is less than the RMS to points\n"
+        "among the numbers of each eye, which is to single points of the cursor."
+    ),
+}
 _SYMBOLS = {"left": "o", "right": "s"}
 _MAX_SYMBOLS = 60
 _MOST_FOR_NAMES = 0.6
@@ -23,16 +36,7 @@ class ConvergencePlot(Plot):
     """Shows the distance between hand and cursor by iteration, for each alignment and eye."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(
-            "convergence", tr("Convergence"), tr("Iteration"), tr("RMS distance (mm)"), parent
-        )
-        self.setToolTip(
-            tr(
-                "RMS distance between matched points of hand and cursor at each iteration\n"
-                "of each alignment. “consistent” measures it along the surface's "
-                "normals,\nwhich is less than the RMS in the table."
-            )
-        )
+        super().__init__("convergence", tr("Convergence"), tr("Iteration"), _TO_POINTS, parent)
         self.show_legend()
         self._longest = 1
         self.item.vb.sigResized.connect(self._leave_room)
@@ -52,7 +56,11 @@ class ConvergencePlot(Plot):
                 )
                 line.setData(np.arange(1, len(rms_mm) + 1), rms_mm)
                 ends.append((float(rms_mm[-1]), number))
-        histories = [s.history_m2 for eyes in results.alignments.values() for s in eyes.values()]
+        solved = [shift for eyes in results.alignments.values() for shift in eyes.values()]
+        measure = _TO_SURFACE if any(map(_is_to_surface, solved)) else _TO_POINTS
+        self.item.setLabel("left", measure)
+        self.setToolTip(_MEANINGS[measure])
+        histories = [shift.history_m2 for shift in solved]
         self._longest = longest = max(map(len, histories), default=1)
         largest_mm = 1e3 * max((float(np.sqrt(max(one))) for one in histories), default=1e-3)
         self._name(sorted(ends), _TEXT_HEIGHT * largest_mm)
@@ -76,6 +84,12 @@ class ConvergencePlot(Plot):
             # Right of all lines, because one that goes on would cross the name.
             self.add_text(text, self._longest, float(np.mean([y_mm for y_mm, _ in beside])))
             ends = ends[len(beside) :]
+
+
+def _is_to_surface(shift: EyeShift) -> bool:
+    """Return whether an alignment's history was measured along normals, unlike its RMS."""
+    is_rms = np.isclose(shift.history_m2[-1], shift.rms_m**2, rtol=1e-6, atol=0.0)
+    return shift.method == "consistent" and not is_rms
 
 
 def _names(numbers: list[int]) -> str:

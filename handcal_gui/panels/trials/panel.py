@@ -43,7 +43,8 @@ from handcal_gui.widgets.undo_strip import UndoStrip
 
 _HOW = tr(
     "Fine-tune φ until the drawn target covers the real one, then record. A trial is the error of "
-    "the solved φ relative to the fine-tuned one."
+    "the calibrated φ relative to the fine-tuned one. The calibrated φ is the solved one, or 0 for "
+    "an eye that keeps the offline calibration."
 )
 
 _UNTOUCHED = tr(
@@ -180,8 +181,8 @@ class TrialsPanel(QWidget):
         if self._obstacle() or procedure is None or procedure.results is None:
             return False
         eye = self._next_eye()
-        solved_m = procedure.results.rendered_shift_m[eye]
-        return bool(np.allclose(procedure.applied_shift_m[eye], solved_m, rtol=0.0, atol=1e-6))
+        calibrated_m = procedure.results.rendered_shift_m[eye]
+        return bool(np.allclose(procedure.applied_shift_m[eye], calibrated_m, rtol=0.0, atol=1e-6))
 
     def _is_untouched(self) -> bool:
         """Return whether the next trial would repeat the last one of its eye and distance."""
@@ -290,7 +291,7 @@ class TrialsPanel(QWidget):
             tr("Record trial"),
             "T",
             self._ask,
-            tooltip=tr("Record the error of the solved φ relative to the φ set by hand (T)"),
+            tooltip=tr("Record the error of the calibrated φ relative to the φ set by hand (T)"),
             # Also from the fine-tune panel, where the study leader works.
             context=Qt.ShortcutContext.WindowShortcut,
         )

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_folder import find_captures
 from handcal.lab.evaluate.run import run_cube_test, run_segmentation_test, run_user_test
+from handcal.lab.evaluate.user_test import holds_trials
 from handcal.lab.settings import SegmentationTestSettings
 from handcal.lab.study.studies import (
     method_cases,
@@ -132,9 +133,14 @@ def _missing_sessions(entries: UserEntries) -> str:
     if missing := _missing_folder(entries.sessions, request):
         return missing
     folder = user_path(entries.sessions)
-    if any(path.is_file() for path in (folder / JOURNAL, *folder.glob(f"*/{JOURNAL}"))):
+    if not any(path.is_file() for path in (folder / JOURNAL, *folder.glob(f"*/{JOURNAL}"))):
+        return tr("there is no session in {}: {}").format(entries.sessions, request)
+    if holds_trials(folder):
         return ""
-    return tr("there is no session in {}: {}").format(entries.sessions, request)
+    return tr(
+        "no session in {} holds a trial: record some in the panel Trials, or choose one session "
+        "and press Record…"
+    ).format(entries.sessions)
 
 
 def _missing_frames(entries: SegmentationTestSettings) -> str:

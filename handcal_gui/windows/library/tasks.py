@@ -61,7 +61,10 @@ def _require_sound(path: Path) -> None:
     named = "; ".join(one.what if found.state == "none" else str(one) for one in damaged)
     more = len(found.damaged) - _MOST_NAMED
     others = tr(" (and {} more)").format(more) if more > 0 else ""
-    advice = "" if found.state == "none" else tr("; Repair copies what is sound")
+    advice = tr("; Repair copies what is sound")
+    if found.state == "none":  # the reason may come with advice
+        unread = tr("; make it readable, or restore it from a backup")
+        advice = "" if "; " in named else unread
     raise FileError(f"{named}{others}{advice}")
 
 

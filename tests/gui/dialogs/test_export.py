@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
@@ -211,6 +212,20 @@ def test_cancel_stops_the_export_and_keeps_the_dialog(
     qtbot.waitUntil(lambda: "Cancelled" in text(dialog, "exportEndFound"))
     assert dialog.isVisible()
     press(dialog, "close").click()
+    assert not dialog.isVisible()
+
+
+def test_esc_cancels_the_export_and_says_so_and_closes_only_then(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter
+) -> None:
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: bool(exporter.folders))
+    for _ in range(2):
+        QTest.keyClick(dialog, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: "Cancelled" in text(dialog, "exportEndFound"))
+    assert dialog.isVisible()
+    assert text(dialog, "doing") == "Nothing was exported."
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
     assert not dialog.isVisible()
 
 

@@ -14,6 +14,7 @@ from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.station.states import State
 from handcal_gui.pages.wizard.view import Action
+from handcal_gui.widgets.times import session_time
 from tests.gui.helpers import button
 from tests.gui.program.technician import Technician, is_turned, shown_preconditions
 
@@ -90,7 +91,8 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     technician.wait(lambda: technician.snapshot.session_path != path)
     assert technician.record.facts.former == path.name
     assert technician.record.wearer == "Ada"
-    assert f"The former result is used again ({path.name})" in fact.text()
+    assert f"The former result is used again ({session_time(path.name)})" in fact.text()
+    assert path.name not in fact.text()
     begin(technician, studio)
     program.wizard_panel.hold(False)
     technician.wait_for_state(State.VERIFY)

@@ -8,7 +8,7 @@ from typing import Literal
 
 import pytest
 from PySide6.QtCore import QObject, QPoint, QRect
-from PySide6.QtWidgets import QApplication, QPushButton, QScrollArea, QTabWidget
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QScrollArea, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
@@ -16,8 +16,10 @@ from handcal.session.session import SessionRecord
 from handcal.station.states import State
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT
-from handcal_gui.pages.wizard.view import Action
+from handcal_gui.pages.wizard.step_views import align_view, verification_view
+from handcal_gui.pages.wizard.view import Action, WizardView
 from handcal_gui.panels.results.compare_tab import CompareTab
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.program import Program
 from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.window import MainWindow
@@ -32,6 +34,10 @@ def scrolled_px(area: QObject | None) -> list[int]:
         QApplication.processEvents()
     assert isinstance(area, QScrollArea)
     return [bar.maximum() for bar in (area.horizontalScrollBar(), area.verticalScrollBar())]
+
+
+def texts_of(view: WizardView) -> list[str]:
+    return [one.text for one in view.preconditions]
 
 
 SMALL_PX = [(960, 510), (1280, 690), (1366, 738)]
@@ -117,6 +123,33 @@ def test_a_result_below_messages_needs_no_scrolling(
         for message in (15 * "a message ", ""):
             window.banner.show_message(message)
             assert scrolled_px(viewport.parent()) == [0, 0], view.sentence
+
+
+@pytest.mark.parametrize(("size_px", "eye_px"), [((960, 510), 220), ((1366, 738), 360)])
+def test_an_eye_that_is_aligned_or_verified_has_room_below_a_message(
+    program: Program, snapshot: Maker, size_px: tuple[int, int], eye_px: int
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.resize(*size_px)
+    window.show_page("live")
+    window.banner.show_message("Frames per second: often below the 8 needed; close other programs")
+    verifying = snapshot(State.VERIFY, procedure={"verifying": NUDGED, "eyes": ("left",)})
+    aligning = snapshot(State.ALIGN)
+    for seen, view in (
+        (verifying, verification_view(verifying, NUDGED)),
+        (aligning, align_view(aligning)),
+    ):
+        say(program, seen, view)
+        guide.picture.show_snapshot(seen)
+        for _ in range(3):
+            QApplication.processEvents()
+        eyes = [one for one in guide.picture.findChildren(EyeCanvas) if one.isVisible()]
+        assert [one.height() >= eye_px for one in eyes] == [True] * len(seen.procedure.eyes)
+        texts = [one for one in guide.findChildren(QLabel) if one.text() in texts_of(view)]
+        rows = {one.mapTo(guide, one.rect().center()).y() for one in texts}
+        assert len(texts) == 3
+        assert len(rows) == (1 if size_px == SMALL_PX[0] else 3)
+        assert all(one.fontMetrics().horizontalAdvance(one.text()) <= one.width() for one in texts)
 
 
 @EACH_TEXT

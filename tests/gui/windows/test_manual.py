@@ -110,6 +110,50 @@ def test_a_search_lists_lines_of_all_pages_and_return_goes_from_one_to_the_next(
     assert any("Nothing found" in label.text() for label in manual.findChildren(QLabel))
 
 
+def test_the_contents_list_every_page_and_open_its_sections_by_keys(
+    qtbot: QtBot, manual: Manual
+) -> None:
+    with qtbot.waitActive(manual):
+        manual.open("docs/guide.md")
+    rows = range(manual.contents.topLevelItemCount())
+    pages = {item.text(0): item for row in rows if (item := manual.contents.topLevelItem(row))}
+    titles = list(pages)
+    assert titles[:2] == ["handcal", "Installing, by platform"]  # as in the first page's table
+    assert len(titles) == len(PAGES)
+    guide = pages["User guide"]
+    assert manual.contents.currentItem() is guide
+    assert guide.isExpanded()
+    manual.page.setSource(manual.page.source().resolved(QUrl("export.md")))  # as a link does
+    assert manual.contents.currentItem() is pages["Export"]
+    assert not guide.isExpanded()
+    QTest.keyClick(manual.page, Qt.Key.Key_C, Qt.KeyboardModifier.AltModifier)
+    assert manual.contents.hasFocus()
+    QTest.keyClick(manual.contents, Qt.Key.Key_Up)
+    assert manual.page.source().fileName() == "export.md"  # until Return is pressed
+    QTest.keyClick(manual.contents, Qt.Key.Key_Return)
+    assert manual.page.source().fileName() == "commands.md"
+    assert manual.page.hasFocus()
+    section = guide.child(2)
+    assert section is not None
+    manual.contents.setCurrentItem(section)
+    QTest.keyClick(manual.contents, Qt.Key.Key_Return)
+    assert manual.page.source().fileName() == "guide.md"
+    assert heading_in_view(manual) == section.text(0) == "Calibrate"
+    assert manual.contents.currentItem() is section
+    manual.open("THIRD-PARTY.md")
+    assert manual.contents.currentItem() is None
+
+
+def test_a_small_window_shows_the_contents_beside_pages_that_fit(
+    qtbot: QtBot, manual: Manual
+) -> None:
+    manual.resize(700, 482)
+    manual.open("docs/guide.md")
+    qtbot.waitUntil(lambda: not manual.page.horizontalScrollBar().isVisible())
+    assert manual.contents.width() > 150
+    assert manual.page.width() > 400
+
+
 def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:
     text = "# Page\n\n## Keys\n\n| key | does |\n|---|---|\n| **F1** | shows *keys* |\n"
     (tmp_path / "page.md").write_text(text)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
+from handcal.io.lock import FileLock
 from handcal.rig.example import example_rig
 from handcal.session.library import EyeOutcome
 from handcal.session.repair import repair_session
@@ -73,6 +74,16 @@ def test_a_damaged_session_is_reported_with_the_reason(
     (entry,) = find_sessions(tmp_path, ()).unfinished
     assert not entry.is_enabled
     assert "does not begin as the journal" in entry.text
+    assert entry.text.endswith(
+        "; make it readable, restore it from a backup, or delete it in All sessions"
+    )
+    (recent,) = find_sessions(tmp_path / "none", (path,)).recent
+    assert recent.text == entry.text
+    lock = FileLock(path / "lock")
+    (entry,) = find_sessions(tmp_path, ()).unfinished
+    lock.release()
+    assert "is in use by process" in entry.text
+    assert "backup" not in entry.text  # it says itself what to do
 
 
 def test_of_a_repaired_session_only_the_copy_is_resumed(

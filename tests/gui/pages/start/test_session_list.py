@@ -19,6 +19,8 @@ def test_pictures_are_explained_by_a_legend_a_tooltip_and_for_screen_readers(qtb
     legend = child(shown, QLabel, "legend")
     shown.show_entries([Entry(Path("a"), "Ada")])
     assert not legend.isVisible()
+    shown.show_entries([Entry(Path("a"), "a: damaged", is_enabled=False)])
+    assert "a: damaged" in child(shown, QListWidget).item(0).toolTip()
     shown.show_entries([Entry(Path("a"), "Ada", eyes={"left": EyeOutcome("accept", 20, 5, None)})])
     assert legend.isVisible()
     assert "the left eye above the right one" in legend.toolTip()

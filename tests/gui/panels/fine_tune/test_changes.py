@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
@@ -11,13 +13,14 @@ from pytestqt.qtbot import QtBot
 from handcal.register.results import Results
 from handcal.rig_types import Rig
 from handcal.station.states import State
-from handcal.types import EYES
+from handcal.types import EYES, Verdict
 from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.fine_tune.stream import PERIOD_MS, SETTLE_MS
 from tests.gui.panels.fine_tune.controls import (
     Show,
     action,
+    editor,
     field,
     fields_mm,
     texts,
@@ -172,3 +175,19 @@ def test_new_projections_start_again(panel: FineTunePanel, show: Show) -> None:
     show(procedure={"applied_shift_m": applied_m})
     assert fields_mm(panel, "left") == [1.0, 2.0, 3.0]
     assert not action(panel, "Undo").isEnabled()
+
+
+def test_the_effect_is_against_the_calibrated_shift_of_an_eye_that_keeps_the_offline_calibration(
+    panel: FineTunePanel, show: Show, results: Results
+) -> None:
+    verdicts = {**results.verdicts, "left": Verdict("keep", "as told")}
+    kept = {
+        "results": replace(results, verdicts=verdicts),
+        "applied_shift_m": {"left": np.zeros(3), "right": results.eyes["right"].shift_m},
+    }
+    show(procedure=kept)
+    assert "against the calibrated φ" in texts(panel)
+    assert "+0.00 %" in texts(editor(panel, "left"))
+    action(panel, "Show solved").trigger()
+    assert "+0.00 %" not in texts(editor(panel, "left"))
+    assert "+0.00 %" in texts(editor(panel, "right"))

@@ -24,6 +24,7 @@ from handcal_gui.panels.results.panel import ResultsPanel
 from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.result_rows import QUANTITIES
 from tests.gui.helpers import child, show
 
 Make = Callable[..., Snapshot]
@@ -148,6 +149,17 @@ def test_convergence_has_a_line_for_each_alignment_and_eye(
     history_m2 = results.alignments[2]["left"].history_m2
     np.testing.assert_array_equal(iterations, np.arange(1, len(history_m2) + 1))
     np.testing.assert_allclose((rms_mm / 1e3) ** 2, history_m2)
+
+
+def test_the_measures_of_fit_have_different_names(solved: ResultsPanel, results: Results) -> None:
+    plot = child(solved, ConvergencePlot)
+    assert plot.item.getAxis("left").labelText == "RMS to surface (mm)"
+    assert "RMS to points (mm)" in [quantity.name for quantity in QUANTITIES]
+    shift = results.alignments[1]["left"]
+    full = replace(shift, method="paper"), replace(shift, history_m2=np.array([shift.rms_m**2]))
+    for one in full:
+        plot.show_results(replace(results, alignments={1: {"left": one}}))
+        assert plot.item.getAxis("left").labelText == "RMS to points (mm)"
 
 
 def test_lines_that_end_together_share_one_name(solved: ResultsPanel, results: Results) -> None:

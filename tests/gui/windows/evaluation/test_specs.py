@@ -19,6 +19,9 @@ from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
 from handcal.lab.study.noise import QUICK_NOISE
 from handcal.lab.study.studies import run_method_comparison, run_noise_study
 from handcal.progress import Progress
+from handcal.rig_types import Rig
+from handcal.session.session import Session, SessionRecord
+from handcal.session.trial import make_trial
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.work import StudyEvaluation
@@ -68,9 +71,33 @@ def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
     assert readiness.finding.found.startswith("there is no session in")
     (tmp_path / "none" / "one").mkdir()
     (tmp_path / "none" / "one" / "journal.jsonl").touch()
-    assert evaluation.readiness(entries).can_run
+    readiness = evaluation.readiness(entries)
+    assert not readiness.can_run
+    assert readiness.finding.found.startswith(f"no session in {tmp_path / 'none'} holds a trial:")
     with pytest.raises(FileError, match=r"no trial .*none"):
         evaluation.run(entries, Progress())
+
+
+def test_a_user_test_is_ready_once_a_session_holds_a_trial(
+    tmp_path: Path, record: SessionRecord, rig: Rig
+) -> None:
+    evaluation = make_specs()["users"].evaluation
+    one, all_of_them = (
+        UserEntries(str(path), str(tmp_path / "results"))
+        for path in (record.path, record.path.parent)
+    )
+    for entries in (one, all_of_them):
+        readiness = evaluation.readiness(entries)
+        assert not readiness.can_run
+        assert "record some in the panel Trials" in readiness.finding.found
+    with Session(record.path) as session:
+        number = session.save_trial(
+            make_trial(rig.eyes["left"], "left", 0.5, [0.0] * 3, [1e-3] * 3)
+        )
+        for entries in (one, all_of_them):
+            assert evaluation.readiness(entries).can_run
+        session.delete("trial", number)
+    assert not evaluation.readiness(one).can_run
 
 
 def test_the_folder_of_no_user_is_said_not_to_be_there() -> None:

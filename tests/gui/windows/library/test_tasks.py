@@ -17,6 +17,7 @@ def test_messages_name_a_few_of_many_sessions(tmp_path: Path) -> None:
     assert first == "0 sessions sound, every file read."
     assert len(lines) == 8
     assert lines[0].startswith(f"s-0: {paths[0] / 'journal.jsonl'} does not begin as the journal")
+    assert lines[0].endswith("; make it readable, or restore it from a backup")
     assert last == "and 12 more"
     gone = [tmp_path / f"gone-{number}" for number in range(20)]
     assert len(delete_sessions(gone, Progress()).splitlines()) == 10
