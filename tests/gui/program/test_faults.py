@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QMessageBox, QPlainTextEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QMessageBox, QPlainTextEdit, QPushButton
 
 from handcal.session.session import Session
 from handcal.station.snapshot import Snapshot
@@ -19,6 +19,7 @@ from handcal.station.station import Station
 from handcal_gui import launch
 from handcal_gui.pages.wizard.view import Action, Step
 from tests.gui.program.technician import (
+    PATIENCE_MS,
     Technician,
     align,
     can_start,
@@ -197,6 +198,31 @@ def test_a_signal_ends_the_program_without_a_question(
     monkeypatch.setattr(live.program.window, "may_close", lambda: False)
     live.program.end()
     assert not live.program.window.isVisible()
+
+
+@pytest.mark.parametrize("leave", ["close", "next wearer"])
+def test_a_signal_ends_the_program_while_it_asks(
+    live: Technician, monkeypatch: pytest.MonkeyPatch, leave: str
+) -> None:
+    program = live.program
+    monkeypatch.setattr(program.live, "save_notes", lambda: "cannot write")
+
+    def end_once_it_asks() -> None:
+        asked = QApplication.activeModalWidget()
+        if isinstance(asked, QMessageBox):
+            asking.stop()
+            QTimer.singleShot(PATIENCE_MS, asked.reject)  # or the test would never end
+            program.end()
+
+    asking = QTimer(program, interval=20)
+    asking.timeout.connect(end_once_it_asks)
+    asking.start()
+    leave_now: Callable[[], object] = (
+        program.window.close if leave == "close" else program.live.next_wearer_requested.emit
+    )
+    leave_now()
+    live.wait(lambda: not program.window.isVisible())
+    assert program.live.snapshot is None
 
 
 def test_notes_outlive_an_engine_that_breaks_down(
