@@ -293,9 +293,7 @@ class Program(QObject):
         told = [sentence(problem) for problem in problems if problem]
         if not told:
             return True
-        told.append(
-            tr("They are lost if the calibration ends now. Cancel, and make room for them.")
-        )
+        told.append(tr("They are lost if the calibration ends now. Cancel, and see to this first."))
         buttons = QMessageBox.StandardButton
         answer = QMessageBox.warning(
             self.window,

@@ -116,7 +116,8 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     studio.headset.confirm()
     live.wait_for_state(State.ALIGNED)
     live.wait(lambda: "cannot write" in live.banner)
-    assert "Make room on the disk" in live.banner
+    assert "moved or deleted. Make room on the disk" in live.banner
+    assert "make the folder writable, or put it back: " in live.banner
     live.press_space_for(Action.SOLVE)
     live.wait_for_state(State.SOLVED)
     assert live.snapshot.record.alignments == {}
