@@ -193,6 +193,25 @@ def test_notes_that_cannot_be_saved_are_left_only_on_request(
     assert Session.open(path).notes == "wears glasses"
 
 
+def test_notes_are_saved_once_they_can_be(
+    open_program: Callable[[], Technician], studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal_gui.control.live._SAVE_AGAIN_MS", 50)
+    technician = open_program()
+    technician.program.start_calibration(studio.settings, "Ada")
+    technician.wait_for_page("live")
+    technician.program.window.docks["session"].raise_()
+    notes = technician.child(QPlainTextEdit, "")
+    technician.wait(notes.isEnabled)
+    path = technician.snapshot.session_path
+    away = path.rename(path.with_name("away"))  # as good as a full disk
+    notes.setPlainText("wears glasses")
+    technician.wait(lambda: "Could not save the notes" in technician.banner)
+    away.rename(path)
+    technician.wait(lambda: technician.banner == "")
+    assert technician.record.notes == "wears glasses"
+
+
 def test_a_signal_ends_the_program_without_a_question(
     live: Technician, monkeypatch: pytest.MonkeyPatch
 ) -> None:
