@@ -6,6 +6,7 @@ Heavy imports follow while that window is shown; the main window then replaces i
 from __future__ import annotations
 
 import argparse
+import gc
 import locale
 import os
 import re
@@ -35,6 +36,7 @@ def main() -> NoReturn:
     _require_display()
     keep_font_list_in_configuration()
     keep_window_quick()
+    gc.disable()  # until everything is imported and made: none of that is garbage
     app = QApplication(sys.argv[:1])
     use_english_capitals()
     app.setApplicationName("handcal")

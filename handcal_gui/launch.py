@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import logging
 import signal
 import sys
@@ -83,6 +84,9 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     field = program.window.focusWidget()
     if typed and isinstance(field, QComboBox) and field.isEditable():
         field.setEditText(typed + field.currentText())
+    # All of this stays. Searching it for garbage held up the window by 0.1 s, also from a job.
+    gc.freeze()
+    gc.enable()
     app.exec()
     program.close()
     if demonstration is not None and demonstration.complaint is not None:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QObject, QSize, Qt
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtWidgets import QApplication, QMessageBox
 
 from handcal.errors import FileError
 from handcal.session.session import Session
@@ -42,6 +42,8 @@ from handcal_gui.widgets.fields import plain_message
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.window import MainWindow, Page
 from handcal_gui.windows.manual import Manual
+
+_AGAIN_MS = 100
 
 
 class Program(QObject):
@@ -163,7 +165,11 @@ class Program(QObject):
     def end(self) -> None:
         """Close the window without asking, as nobody may be there to answer."""
         self.window.may_close = lambda: True
+        if (asked := QApplication.activeModalWidget()) is not None:
+            asked.close()
         self.window.close()
+        if self.window.isVisible():  # it asked whether it may close, and has not gone on yet
+            QTimer.singleShot(_AGAIN_MS, self.end)
 
     def close(self) -> None:
         """Save the window's layout and end all running work; safe to call twice."""
@@ -287,9 +293,7 @@ class Program(QObject):
         told = [sentence(problem) for problem in problems if problem]
         if not told:
             return True
-        told.append(
-            tr("They are lost if the calibration ends now. Cancel, and make room for them.")
-        )
+        told.append(tr("They are lost if the calibration ends now. Cancel, and see to this first."))
         buttons = QMessageBox.StandardButton
         answer = QMessageBox.warning(
             self.window,

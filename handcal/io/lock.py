@@ -66,17 +66,20 @@ class FileLock:
         self._path = path
 
     def require_held(self) -> None:
-        """Raise FileError if the lock's file was removed or replaced, so that others can lock."""
+        """Raise FileError if the folder or the lock's file was removed or replaced."""
         try:
             is_same = os.path.samestat(self._path.stat(), os.fstat(self._file.fileno()))
         except FileNotFoundError:
             is_same = False
         except OSError as error:
             raise FileError(f"cannot read {self._path}: {error.strerror or error}") from error
+        folder = self._path.parent
+        if not is_same and not os.path.exists(folder):
+            raise FileError(f"cannot write to {folder}: it was moved or deleted")
         if not is_same:
             raise FileError(
-                f"cannot write to {self._path.parent}: it was removed, replaced or restored, or "
-                "its lock was deleted, so another program may be writing to it; open it again"
+                f"cannot write to {folder}: it was replaced or restored, or its lock was deleted, "
+                "so another program may be writing to it; open it again"
             )
 
     def release(self) -> None:

@@ -41,4 +41,6 @@ def extremes(summary: Summary) -> str:
 
 def interval_ends(interval: MeanInterval | None) -> str:
     """Return the limits of an interval, or a dash if there is none."""
-    return f"{interval.low:.2f}\u00a0to\u00a0{interval.high:.2f}" if interval else NOTHING
+    if interval is None:
+        return NOTHING
+    return with_minus(f"{interval.low:.2f}\u00a0to\u00a0{interval.high:.2f}")

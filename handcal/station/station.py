@@ -355,6 +355,6 @@ class Station(Closable):
             self._not_stored = ""
         except FileError as error:
             self._not_stored = (
-                f"{error}. Make room on the disk, or connect it again: until then the data are "
-                "kept in memory."
+                f"{error}. Make room on the disk, make the folder writable, or put it back: until "
+                "then the data are kept in memory."
             )

@@ -65,6 +65,7 @@ class Comparison(QObject):
             )
 
         self._job = Job(work)
+        self._job.progressed.connect(self._panel.show_comparison_progress)
         self._job.succeeded.connect(self._panel.show_comparison)
         self._job.failed.connect(self._panel.comparison_failed)
         self._job.start()

@@ -49,6 +49,7 @@ _NO_BRIDGES = BridgeSettings()
 _SAVING = tr("save the notes")
 _SAVING_S = 1.0
 """Longest wait for the notes to be saved before a session is left."""
+_SAVE_AGAIN_MS = 3000
 
 
 class CalibrationController(QObject):
@@ -105,6 +106,8 @@ class CalibrationController(QObject):
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
         self._timer.timeout.connect(self._poll)
+        self._saving = QTimer(self, interval=_SAVE_AGAIN_MS, singleShot=True)
+        self._saving.timeout.connect(self._save_notes_again)
         self._connect()
 
     @property
@@ -159,6 +162,7 @@ class CalibrationController(QObject):
     def stop(self) -> None:
         """End the calibration and wait for it; safe to call twice."""
         self._timer.stop()  # no snapshot that is still on its way is shown
+        self._saving.stop()
         self._comparison.cancel()
         engine = self._engine
         if engine is not None:
@@ -325,10 +329,13 @@ class CalibrationController(QObject):
             self._window.banner.clear()
 
     def _on_command_failed(self, name: str, why: str) -> None:
-        self._failed_command = name
         text = tr("Could not {}: {}").format(ACTION_NAMES.get(name, name), why)
         if name == _SAVING:
+            self._saving.start()
+            if text == self._notes_problem:  # said before, and perhaps closed
+                return
             self._notes_problem = text
+        self._failed_command = name
         self._window.banner.show_message(text)
 
     def _on_doubted(self, name: str, why: str) -> None:
@@ -342,6 +349,12 @@ class CalibrationController(QObject):
                 session.save_notes(text)
         else:
             self._submit(_SAVING, lambda station: station.session.save_notes(text))
+
+    def _save_notes_again(self) -> None:
+        """Try again what could not be saved, as when a disk was full."""
+        session = self._window.panels.session
+        if not session.notes_are_saved:
+            session.save_notes()
 
     def _on_ended(self, why: str) -> None:
         self._timer.stop()

@@ -65,6 +65,18 @@ def test_a_lock_that_was_deleted_or_replaced_is_noticed(tmp_path: Path) -> None:
         one.release()
 
 
+def test_a_folder_that_was_moved_is_no_work_of_another_program(tmp_path: Path) -> None:
+    folder = tmp_path / "session"
+    folder.mkdir()
+    lock = FileLock(folder / "lock")
+    folder.rename(tmp_path / "away")
+    with pytest.raises(FileError, match=r"session: it was moved or deleted$"):
+        lock.require_held()
+    (tmp_path / "away").rename(folder)
+    lock.require_held()
+    lock.release()
+
+
 def test_a_folder_that_cannot_be_written_says_what_to_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

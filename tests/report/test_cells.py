@@ -21,5 +21,5 @@ def test_texts_are_two_decimals_and_never_broken() -> None:
     assert mean_sd(summary) == "2.50\u00a0±\u00a01.29"
     assert median_quartiles(summary) == "2.50\u00a0(1.75–3.25)"
     assert extremes(summary) == "1.00–4.00"
-    assert interval_ends(mean_interval([-1.0, 1.0])) == "-12.71\u00a0to\u00a012.71"
+    assert interval_ends(mean_interval([-1.0, 1.0])) == "−12.71\u00a0to\u00a012.71"
     assert interval_ends(None) == "–"

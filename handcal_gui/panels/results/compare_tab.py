@@ -19,10 +19,12 @@ from handcal.rig_types import Rig
 from handcal.types import METHODS, Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.result_rows import comparison_rows
 
+_WHOLE = 1000
 _MEANINGS: Mapping[Method, str] = {
     "paper": tr("as published by Hu et al. 2021; slow."),
     "linear": tr("the paper's model, solved with all three rows of each pair."),
@@ -64,8 +66,7 @@ class CompareTab(QWidget):
         self._cancel = QPushButton(tr("Cance&l"))
         self._cancel.setObjectName("comparison-cancel")
         self._cancel.clicked.connect(self._request_cancel)
-        self._progress = QProgressBar()
-        self._progress.setRange(0, 0)
+        self._progress = with_name(QProgressBar(), "comparison-progress", tr("Progress"))
         self._progress.setTextVisible(False)
         keep_space(self._progress)
         self._progress.setMaximumHeight(SPACING_PX)
@@ -103,6 +104,11 @@ class CompareTab(QWidget):
             ).format(other.method, self._results.method)
         )
 
+    def show_progress(self, share: float) -> None:
+        """Show the share that is done, 0..1."""
+        self._progress.setRange(0, _WHOLE)
+        self._progress.setValue(round(_WHOLE * share))
+
     def show_failure(self, text: str) -> None:
         """Show the reason why there is no comparison."""
         self._set_busy(False)
@@ -123,6 +129,7 @@ class CompareTab(QWidget):
         self.cancelled.emit()
 
     def _set_busy(self, is_busy: bool) -> None:
+        self._progress.setRange(0, 0)
         self._progress.setVisible(is_busy)
         has_focus = self._compare.hasFocus() or self._cancel.hasFocus()
         for one, is_offered in ((self._cancel, is_busy), (self._compare, not is_busy)):

@@ -125,6 +125,10 @@ class ResultsPanel(QWidget):
         """Show the results of another method for the same alignments."""
         self._compare.show_comparison(other)
 
+    def show_comparison_progress(self, _doing: str, share: float) -> None:
+        """Show the share of the alignments that the other method has solved."""
+        self._compare.show_progress(share)
+
     def comparison_failed(self, text: str) -> None:
         """Show the reason why there is no comparison."""
         self._compare.show_failure(text)

@@ -142,6 +142,9 @@ class CaptureDialog(PreparationDialog):
 
     def start(self) -> None:
         """Show images of the chosen camera."""
+        self._found.show_finding(
+            Finding("", Health.LIMITED, tr("press Take once the image shows this"))
+        )
         self._camera.start()
         self._list.setFocus()  # unlike a text field, it does not consume the space bar
 

@@ -290,6 +290,7 @@ class LibraryWindow(QDialog):
         if not self._jobs.is_busy:
             self._table.setFocus()  # or the search gets it from a button that is disabled
             self._say("")
+            self._table.viewport().repaint()  # or each cell painted waits for the work
             self._jobs.run(tr("Starting"), work, self._end)
 
     def _end(self, said: object) -> None:

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QComboBox, QLabel, QProgressDialog, QPushButton, QWidget
+from PySide6.QtWidgets import (
+    QComboBox,
+    QLabel,
+    QProgressBar,
+    QProgressDialog,
+    QPushButton,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CancelledError
@@ -344,8 +351,12 @@ def test_a_comparison_is_shown_or_cancelled(
     status = child(program, QLabel, "comparison-status")
     start = child(program, QPushButton, "comparison-start")
     cancel = child(program, QPushButton, "comparison-cancel")
+    shares: list[float] = []
+    bar = child(program, QProgressBar, "comparison-progress")
+    bar.valueChanged.connect(lambda value: shares.append(value / bar.maximum()))
     program.window.panels.results.compare_requested.emit("linear")
     qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
+    assert 0.5 in shares  # one of two alignments
 
     solver = Solver()
     monkeypatch.setattr("handcal_gui.control.compare.solve_session", solver)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QMessageBox, QPlainTextEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QMessageBox, QPlainTextEdit, QPushButton
 
 from handcal.session.session import Session
 from handcal.station.snapshot import Snapshot
@@ -19,6 +19,7 @@ from handcal.station.station import Station
 from handcal_gui import launch
 from handcal_gui.pages.wizard.view import Action, Step
 from tests.gui.program.technician import (
+    PATIENCE_MS,
     Technician,
     align,
     can_start,
@@ -115,7 +116,8 @@ def test_a_full_disk_costs_nothing_once_there_is_space(live: Technician, studio:
     studio.headset.confirm()
     live.wait_for_state(State.ALIGNED)
     live.wait(lambda: "cannot write" in live.banner)
-    assert "Make room on the disk" in live.banner
+    assert "moved or deleted. Make room on the disk" in live.banner
+    assert "make the folder writable, or put it back: " in live.banner
     live.press_space_for(Action.SOLVE)
     live.wait_for_state(State.SOLVED)
     assert live.snapshot.record.alignments == {}
@@ -191,12 +193,56 @@ def test_notes_that_cannot_be_saved_are_left_only_on_request(
     assert Session.open(path).notes == "wears glasses"
 
 
+def test_notes_are_saved_once_they_can_be(
+    open_program: Callable[[], Technician], studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal_gui.control.live._SAVE_AGAIN_MS", 50)
+    technician = open_program()
+    technician.program.start_calibration(studio.settings, "Ada")
+    technician.wait_for_page("live")
+    technician.program.window.docks["session"].raise_()
+    notes = technician.child(QPlainTextEdit, "")
+    technician.wait(notes.isEnabled)
+    path = technician.snapshot.session_path
+    away = path.rename(path.with_name("away"))  # as good as a full disk
+    notes.setPlainText("wears glasses")
+    technician.wait(lambda: "Could not save the notes" in technician.banner)
+    away.rename(path)
+    technician.wait(lambda: technician.banner == "")
+    assert technician.record.notes == "wears glasses"
+
+
 def test_a_signal_ends_the_program_without_a_question(
     live: Technician, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(live.program.window, "may_close", lambda: False)
     live.program.end()
     assert not live.program.window.isVisible()
+
+
+@pytest.mark.parametrize("leave", ["close", "next wearer"])
+def test_a_signal_ends_the_program_while_it_asks(
+    live: Technician, monkeypatch: pytest.MonkeyPatch, leave: str
+) -> None:
+    program = live.program
+    monkeypatch.setattr(program.live, "save_notes", lambda: "cannot write")
+
+    def end_once_it_asks() -> None:
+        asked = QApplication.activeModalWidget()
+        if isinstance(asked, QMessageBox):
+            asking.stop()
+            QTimer.singleShot(PATIENCE_MS, asked.reject)  # or the test would never end
+            program.end()
+
+    asking = QTimer(program, interval=20)
+    asking.timeout.connect(end_once_it_asks)
+    asking.start()
+    leave_now: Callable[[], object] = (
+        program.window.close if leave == "close" else program.live.next_wearer_requested.emit
+    )
+    leave_now()
+    live.wait(lambda: not program.window.isVisible())
+    assert program.live.snapshot is None
 
 
 def test_notes_outlive_an_engine_that_breaks_down(

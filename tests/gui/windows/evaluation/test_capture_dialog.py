@@ -133,7 +133,9 @@ def test_captures_are_taken_one_after_the_other(
 ) -> None:
     technician = make(entries)
     folder = Path(entries.captures)
+    assert technician.said == "Choose the camera, and press Show."
     technician.start()
+    assert technician.said == "Press Take once the image shows this."
     assert technician.told == "centre: show the grid on the display, darken the room."
     technician.press_space()
     technician.wait_for_instruction("centre/pose-1: switch the display off.")

@@ -206,6 +206,27 @@ def test_few_calls_of_python_draw_and_choose_many_sessions(
     assert calls.total() < 500
 
 
+def test_what_is_selected_is_painted_before_work_begins(
+    window: LibraryWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    usual = SessionsModel.data
+
+    def data(*args: Any) -> object:
+        done.append("cell")
+        return usual(*args)
+
+    monkeypatch.setattr(SessionsModel, "data", data)
+    monkeypatch.setattr(window._jobs, "run", lambda *_: done.append("work"))
+    QGuiApplication.processEvents()
+    done.clear()
+    table(window).selectAll()
+    window._check.trigger()
+    QGuiApplication.processEvents()
+    assert "cell" in done
+    assert done[-1] == "work"
+
+
 def test_long_names_are_cut_and_nothing_else(window: LibraryWindow) -> None:
     across = table(window).horizontalHeader()
     for width_px in (900, 1600):
