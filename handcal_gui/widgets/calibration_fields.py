@@ -15,7 +15,7 @@ from handcal.station.states import CalibrationSettings
 from handcal.types import Method
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import choice, number
+from handcal_gui.widgets.fields import choice, label_for, number
 from handcal_gui.widgets.finding_line import FindingLine
 
 _METHODS: dict[Method, str] = {
@@ -162,8 +162,7 @@ class CalibrationFields(QWidget):
         Only then has the label a letter: beside others the letters would not be unique.
         """
         row = self._grid.rowCount()
-        label = QLabel(text if self._explains else text.replace("&", ""))
-        label.setBuddy(field)
+        label = label_for(field, text if self._explains else text.replace("&", ""))
         self._grid.addWidget(label, row, 0)
         if not (self._explains and meaning):
             self._grid.addWidget(field, row, 1, 1, 2)

@@ -168,6 +168,17 @@ def paragraph(name: str = "", text: str = "") -> QLabel:
     return label
 
 
+def label_for(field: QWidget, text: str) -> QLabel:
+    """Return the label of a field, whose letter leads to that part of it that takes the keyboard.
+
+    Qt leads to no buddy that only passes the keyboard on.
+    """
+    label = QLabel(text)
+    parts = filter(None, (field, field.focusProxy(), *field.findChildren(QWidget)))
+    label.setBuddy(next(one for one in parts if one.focusPolicy() != Qt.FocusPolicy.NoFocus))
+    return label
+
+
 def fill_row(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:
     """Lay out widgets in a row without margins, from the left; one of them may stretch."""
     items = [(widget, 1 if widget is grows else 0) for widget in widgets]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QAbstractButton, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -37,7 +37,11 @@ def text(parent: QObject, name: str) -> str:
 def letters(dialog: QWidget) -> list[str]:
     """Return the letters with which Alt reaches the buttons and fields of a dialog."""
     texts = [one.text() for one in dialog.findChildren(QAbstractButton)]
-    texts += [one.text() for one in dialog.findChildren(QLabel)]
+    for label in dialog.findChildren(QLabel):
+        texts.append(label.text())
+        # Qt leads to no buddy without a focus of its own.
+        if "&" in label.text():
+            assert label.buddy().focusPolicy() != Qt.FocusPolicy.NoFocus, label.text()
     return [text.partition("&")[2][0].lower() for text in texts if "&" in text]
 
 
