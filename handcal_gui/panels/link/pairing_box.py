@@ -37,7 +37,7 @@ class PairingBox(QWidget):
         )
         self._address.setToolTip(tr("Host and port that the headset must connect to, by UDP"))
         self._key = KeyField()
-        renew = button("newKey", tr("New key…"), tr("Make a new pairing key"), _RENEWING)
+        renew = button("newKey", tr("&New key…"), tr("Make a new pairing key"), _RENEWING)
         renew.clicked.connect(self.new_key_requested)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -45,7 +45,7 @@ class PairingBox(QWidget):
         grid.setVerticalSpacing(SPACING_PX // 2)
         grid.addWidget(QLabel(tr("Address")), 0, 0)
         grid.addLayout(hbox((self._address, 1), renew, spacing=SPACING_PX), 0, 1)
-        grid.addWidget(label_for(self._key, tr("&Key")), 1, 0)
+        grid.addWidget(label_for(self._key, tr("Key")), 1, 0)
         grid.addWidget(self._key, 1, 1)
         grid.setColumnStretch(1, 1)
 

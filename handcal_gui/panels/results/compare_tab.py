@@ -61,7 +61,7 @@ class CompareTab(QWidget):
         self._compare = QPushButton(tr("&Compare"))
         self._compare.setObjectName("comparison-start")
         self._compare.clicked.connect(self._ask)
-        self._cancel = QPushButton(tr("Cance&l"))
+        self._cancel = QPushButton(tr("Ca&ncel"))
         self._cancel.setObjectName("comparison-cancel")
         self._cancel.clicked.connect(self._request_cancel)
         self._progress = QProgressBar()

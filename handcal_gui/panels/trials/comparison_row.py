@@ -12,11 +12,11 @@ from handcal_gui.widgets.fields import button, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 
-_SHOW: dict[Place, str] = {"first": tr("Show first"), "second": tr("Show second")}
+_SHOW: dict[Place, str] = {"first": tr("Sho&w first"), "second": tr("Sh&ow second")}
 _ANSWERS: dict[Answer, str] = {
-    "first": tr("First is better"),
-    "second": tr("Second is better"),
-    "neither": tr("Neither"),
+    "first": tr("First is b&etter"),
+    "second": tr("Se&cond is better"),
+    "neither": tr("&Neither"),
 }
 _COMPARE_HELP = tr(
     "Show the wearer the drawing without and with the calibration, in a hidden random order,\n"
@@ -53,11 +53,11 @@ class ComparisonRow(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._begin = button("compare", tr("Blinded comparison"), help_text=_COMPARE_HELP)
+        self._begin = button("compare", tr("Blinded &comparison"), help_text=_COMPARE_HELP)
         self._count = paragraph("compared")
         self._show = {place: button(f"show-{place}", text) for place, text in _SHOW.items()}
         self._answers = {one: button(f"answer-{one}", text) for one, text in _ANSWERS.items()}
-        self._end = button("compareEnd", tr("Cancel"))
+        self._end = button("compareEnd", tr("Stop com&paring"))
         self._shown: Place | None = None
         self._begin.clicked.connect(self.begun)
         self._end.clicked.connect(self.ended)

@@ -98,7 +98,7 @@ class TrialsPanel(QWidget):
         self._record: SessionRecord | None = None
         self._is_read_only = self._is_doubtful = False
         self._eyes, self._depth = QComboBox(), QComboBox()
-        self._shows_target = QCheckBox(tr("Show the target in the headset"))
+        self._shows_target = QCheckBox(tr("Show the tar&get in the headset"))
         self._eye: Eye | None = None  # of the next trial, as said last
         self._target: tuple[Eye, float] | None = None  # requested
         self._compared = 0

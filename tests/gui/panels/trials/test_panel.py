@@ -334,7 +334,7 @@ def test_a_blinded_comparison_is_asked_for_step_by_step(
         better.click()
     assert answered.args == ["second"]
     with qtbot.waitSignal(panel.end_comparison_requested):
-        button(panel, QPushButton, "Cancel").click()
+        button(panel, QPushButton, "Stop comparing").click()
     panel.show_snapshot(applied)
     assert begin.isVisible()
 
