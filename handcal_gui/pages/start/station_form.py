@@ -116,7 +116,7 @@ class StationForm(QWidget):
             mend: Callable[[], object] = partial(self._change, changes)
             is_awaited = finding.health is Health.LIMITED and self.settings.headset == "network"
             if part == "headset" and is_awaited and not fix:
-                fix, mend = tr("Connect…"), self.connect_wanted.emit
+                fix, mend = tr("Co&nnect…"), self.connect_wanted.emit
             self._findings[part].show_finding(finding, fix, mend)
 
     def _change(self, changes: Mapping[str, Any]) -> None:

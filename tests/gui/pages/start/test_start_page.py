@@ -30,6 +30,7 @@ from handcal_gui.pages.start.session_entries import Entry, KnownSessions
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX, icon
+from tests.gui.helpers import letters
 from tests.gui.pages.start.conftest import (
     NETWORK,
     Inspector,
@@ -46,7 +47,7 @@ def test_a_headset_that_is_awaited_can_be_connected(
 ) -> None:
     inspector.healths["headset"] = Health.LIMITED
     page = open_page(source="realsense", headset="network")
-    qtbot.waitUntil(lambda: button(page, "headsetFix").text() == "Connect…")
+    qtbot.waitUntil(lambda: button(page, "headsetFix").text() == "Co&nnect…")
     with qtbot.waitSignal(page.connect_wanted):
         button(page, "headsetFix").click()
 
@@ -124,6 +125,16 @@ def test_fields_are_reached_by_letters(qtbot: QtBot, open_page: Callable[..., St
         "Rig file",
         "Session folder",
     }
+
+
+def test_each_letter_leads_to_one_place(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    inspector.healths["headset"] = Health.LIMITED
+    page = open_page(source="realsense", headset="network")
+    qtbot.waitUntil(lambda: button(page, "headsetFix").text() != "")
+    found = [*"ftvh", *letters(page)]  # of the window's menus, and of hidden buttons, too
+    assert len(set(found)) == len(found) >= 22
 
 
 def test_the_next_wearer_finds_everything_as_it_was(open_page: Callable[..., StartPage]) -> None:
