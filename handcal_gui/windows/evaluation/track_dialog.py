@@ -67,7 +67,7 @@ class TrackDialog(PreparationDialog):
         self.form = EntriesForm(
             {
                 "tracked_by": (
-                    tr("Tracked by"),
+                    tr("Tracked &by"),
                     choice(
                         "trackedBy",
                         tr("Tracked by"),
@@ -89,7 +89,7 @@ class TrackDialog(PreparationDialog):
         self._pose.setMinimumWidth(44 * SPACING_PX)
         self._pose.hide()
         self._found = FindingLine("track")
-        self._bar = JobBar(tr("Stop"))
+        self._bar = JobBar(tr("S&top"))
         self._start = main_button("start", tr("Start"))
         self._close = button("close", tr("&Close"))
         self._timer = QTimer(self, interval=_POLL_MS)
