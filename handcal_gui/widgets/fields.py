@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QPushButton,
     QSizePolicy,
     QSpinBox,
+    QStackedWidget,
     QToolButton,
     QToolTip,
     QWidget,
@@ -166,6 +167,17 @@ def paragraph(name: str = "", text: str = "") -> QLabel:
     policy.setHeightForWidth(True)
     label.setSizePolicy(policy)
     return label
+
+
+def one_of(texts: Mapping[str, str]) -> QStackedWidget:
+    """Return paragraphs by their names, one of which is shown; as high as the highest of them.
+
+    Nothing beside them moves when another is shown.
+    """
+    stack = QStackedWidget()
+    for name, text in texts.items():
+        stack.addWidget(paragraph(name, text))
+    return stack
 
 
 def label_for(field: QWidget, text: str) -> QLabel:

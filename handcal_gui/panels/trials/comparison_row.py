@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QStackedWidget, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.session.comparison import Answer, Place
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, paragraph
+from handcal_gui.widgets.fields import button, one_of, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 
@@ -66,10 +66,7 @@ class ComparisonRow(QWidget):
             one.clicked.connect(lambda _=False, place=place: self._ask(place))
         for answer, one in self._answers.items():
             one.clicked.connect(lambda _=False, answer=answer: self.answered.emit(answer))
-        # As high as the longer text: no button moves between the drawings and the answer.
-        self._how = QStackedWidget()
-        for name, text in (("compareLook", _LOOK), ("compareAsk", _ASK)):
-            self._how.addWidget(paragraph(name, text))
+        self._how = one_of({"compareLook": _LOOK, "compareAsk": _ASK})
         self._running = QWidget()
         vbox(
             self._how,

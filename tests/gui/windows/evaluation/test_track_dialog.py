@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 
@@ -66,7 +67,13 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
 
     dialog = make("virtual", track)
     start, stop = button(dialog, "start"), button(dialog, "cancel")
+    first, move = (child(dialog, QLabel, name) for name in ("trackStart", "trackMove"))
+    assert first.isVisible()
+    assert first.mapTo(dialog, QPoint()).y() < dialog.form.y(), "at the top"
+    top_px = dialog.form.y()
     start.click()
+    assert move.isVisible()
+    assert dialog.form.y() == top_px
     assert not start.isEnabled()
     assert stop.text() == "S&top"
     table = dialog.findChild(QTableWidget, "pose-of-the-cube")
