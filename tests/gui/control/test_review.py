@@ -333,7 +333,7 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     assert program.windows.export() is not None
     program.window.panels.results.compare_requested.emit("linear")
     status = child(program, QLabel, "comparison-status")
-    qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)
 
 
 def test_a_comparison_is_shown_or_cancelled(
@@ -345,7 +345,7 @@ def test_a_comparison_is_shown_or_cancelled(
     start = child(program, QPushButton, "comparison-start")
     cancel = child(program, QPushButton, "comparison-cancel")
     program.window.panels.results.compare_requested.emit("linear")
-    qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)
 
     solver = Solver()
     monkeypatch.setattr("handcal_gui.control.compare.solve_session", solver)
