@@ -57,7 +57,7 @@ _REVIEW_PERCENT = 36
 """Of a large window's width, for the page of a stored session with its residual map."""
 _MENUS = {
     "File": tr("&File"),
-    "Edit": tr("Edi&t"),  # Alt+E is of panels
+    "Edit": tr("Edi&t"),  # Alt+E is taken by panels
     "View": tr("&View"),
     "Help": tr("&Help"),
 }
