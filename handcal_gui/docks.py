@@ -7,11 +7,12 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Protocol
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QIcon
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QIcon, QKeySequence, QShortcutEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QDockWidget,
+    QLabel,
     QMainWindow,
     QTabBar,
     QTabWidget,
@@ -106,6 +107,53 @@ def make_docks(window: QMainWindow, panels: Panels) -> Docks:
         dock.setWidget(getattr(panels, name))
         docks[name] = dock
     return docks
+
+
+def is_in_sight(dock: QDockWidget) -> bool:
+    """Return whether no tab hides a dock: Qt moves it out of the window then."""
+    window = dock.parentWidget()
+    return window is None or dock.isFloating() or dock.geometry().intersects(window.rect())
+
+
+class PanelLetters(QObject):
+    """Leads letters to panels in sight: Qt takes those behind tabs for visible, too.
+
+    Parameters
+    ----------
+    docks : mapping of str to QDockWidget
+        With the panels, whose letters can be those of other panels in the same tabs.
+    """
+
+    def __init__(self, docks: Docks, parent: QObject) -> None:
+        super().__init__(parent)
+        self._docks: dict[QAbstractButton | QLabel, QDockWidget] = {}
+        for dock in docks.values():
+            parts: list[QAbstractButton | QLabel] = [*dock.findChildren(QAbstractButton)]
+            parts += [label for label in dock.findChildren(QLabel) if label.buddy()]
+            self._docks |= {part: dock for part in parts if "&" in part.text()}
+        for part in self._docks:
+            part.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Press the button, or go to the field, whose letter it is."""
+        if not isinstance(event, QShortcutEvent):
+            return super().eventFilter(watched, event)
+        found = [
+            part
+            for part, dock in self._docks.items()
+            if QKeySequence.mnemonic(part.text()) == event.key()
+            and part.isVisible()
+            and part.isEnabled()
+            and is_in_sight(dock)
+        ]
+        if len(found) > 1:  # side by side by the user: each has the focus in turn
+            return False
+        for part in found:
+            if isinstance(part, QLabel):
+                part.buddy().setFocus(Qt.FocusReason.ShortcutFocusReason)
+            else:
+                part.animateClick()
+        return True
 
 
 def arrange_docks(window: QMainWindow, docks: Docks, *, is_small: bool) -> None:

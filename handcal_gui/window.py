@@ -31,6 +31,7 @@ from PySide6.QtWidgets import (
 from handcal_gui.docks import (
     TITLES,
     Docks,
+    PanelLetters,
     Panels,
     arrange_docks,
     draw_title_buttons,
@@ -56,7 +57,7 @@ _REVIEW_PERCENT = 36
 """Of a large window's width, for the page of a stored session with its residual map."""
 _MENUS = {
     "File": tr("&File"),
-    "Edit": tr("Edi&t"),  # Alt+E adds the left eye, or exports
+    "Edit": tr("Edi&t"),  # Alt+E is taken by panels
     "View": tr("&View"),
     "Help": tr("&Help"),
 }
@@ -115,6 +116,7 @@ class MainWindow(QMainWindow):
         self._bar = wizard.bar
         self.setStatusBar(_Strip(self._bar))
         self._docks = make_docks(self, panels)
+        PanelLetters(self._docks, self)
         self._titles_timer = QTimer(self, interval=0, singleShot=True)
         self._titles_timer.timeout.connect(self._leave_titles_to_tabs)
         for dock in self._docks.values():

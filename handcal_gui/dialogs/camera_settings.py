@@ -17,7 +17,14 @@ from PySide6.QtWidgets import (
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import choice, fill_row, paragraph, whole_number, with_name
+from handcal_gui.widgets.fields import (
+    choice,
+    fill_row,
+    label_for,
+    paragraph,
+    whole_number,
+    with_name,
+)
 from handcal_gui.widgets.layouts import vbox
 
 _ABOUT = tr(
@@ -134,12 +141,15 @@ class CameraSettingsDialog(QDialog):
         fill_row(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
         form = QFormLayout()
         form.setSpacing(SPACING_PX)
-        form.addRow(tr("&Image size"), self._profile)
-        form.addRow(tr("Depth &preset"), self._preset)
-        form.addRow(tr("&Exposure"), self._exposure)
-        form.addRow(tr("Exposure of colour"), self._whole)
-        form.addRow(tr("&Laser power"), self._laser)
-        form.addRow(tr("Depth filters"), filters)
+        for title, field in (
+            (tr("&Image size"), self._profile),
+            (tr("Depth &preset"), self._preset),
+            (tr("&Exposure"), self._exposure),
+            (tr("Exposure of colour"), self._whole),
+            (tr("&Laser power"), self._laser),
+            (tr("Depth filters"), filters),
+        ):
+            form.addRow(label_for(field, title), field)
         standard = QDialogButtonBox.StandardButton
         buttons = QDialogButtonBox(standard.Ok | standard.Cancel | standard.RestoreDefaults)
         for one in buttons.buttons():

@@ -13,7 +13,7 @@ from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.io.files import user_path
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import number, paragraph, with_name
+from handcal_gui.widgets.fields import label_for, number, paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
@@ -30,6 +30,20 @@ _PURPOSES: dict[Format, str] = {
     "northstar": tr("The final calibration for Monado's North Star driver"),
     "slicer": tr("The eyes as transforms and the clouds as models"),
 }
+_LETTERS: dict[Format, str] = {
+    "report": "R",
+    "html": "H",
+    "csv": "V",
+    "yaml": "Y",
+    "json": "J",
+    "ply": "P",
+    "zip": "Z",
+    "unity": "U",
+    "openxr": "X",
+    "northstar": "N",
+    "slicer": "S",
+}
+"""Letter in the title of each format that ticks it."""
 _WITH_PLANES: tuple[Format, ...] = ("json", "unity")
 """Formats with clipping distances."""
 
@@ -58,7 +72,7 @@ class ExportChoices(QWidget):
         super().__init__(parent)
         self._settings, self._name = settings, name
         self._boxes = {
-            kind: with_name(QCheckBox(info.title), kind)
+            kind: with_name(QCheckBox(_lettered(info.title, _LETTERS[kind])), kind)
             for kind, info in {**FORMATS, **TOOL_FORMATS}.items()
         }
         self._near = number("near", 0.01, 1.0, 0.05, " m", tr("Anything nearer is not drawn."))
@@ -129,8 +143,16 @@ class ExportChoices(QWidget):
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
-        form.addRow(tr("Near plane (OpenGL, Unity)"), self._near)
-        form.addRow(tr("Far plane (OpenGL, Unity)"), self._far)
-        form.addRow(tr("Export to"), self._folder)
+        for title, field in (
+            (tr("Ne&ar plane (OpenGL, Unity)"), self._near),
+            (tr("&Far plane (OpenGL, Unity)"), self._far),
+            (tr("Export &to"), self._folder),
+        ):
+            form.addRow(label_for(field, title), field)
         form.addRow("", QLabel(tr("The folder {} is created there.").format(self._name)))
         vbox(self._task, formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)
+
+
+def _lettered(title: str, letter: str) -> str:
+    """Return a title in which & precedes a letter."""
+    return title.replace(letter, f"&{letter}", 1)

@@ -15,7 +15,7 @@ from handcal.station.support import SupportSettings, run_support
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, main_button, paragraph
+from handcal_gui.widgets.fields import button, label_for, main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.path_field import PathField
@@ -62,8 +62,8 @@ class SupportDialog(QDialog):
         close.clicked.connect(self.reject)
         self.finished.connect(self.stop)
         form = QFormLayout()
-        form.addRow(tr("&Folder"), self._folder)
-        form.addRow(tr("&Recording to add"), self._frames)
+        form.addRow(label_for(self._folder, tr("&Folder")), self._folder)
+        form.addRow(label_for(self._frames, tr("&Recording to add")), self._frames)
         vbox(
             paragraph("supportAbout", _ABOUT),
             form,

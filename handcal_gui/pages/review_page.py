@@ -59,10 +59,10 @@ class ReviewPage(QWidget):
         self._facts.setVerticalSpacing(SPACING_PX)
         self._card = ResultCard()
         self.residuals = ResidualsTab()
-        self._export = main_button("reviewExport", tr("&Export…"))
+        self._export = main_button("reviewExport", tr("E&xport…"))
         self._resume = button("reviewResume", tr("&Resume"))
         self._resume.setToolTip(RESUME_HELP)
-        self._again = button("reviewAgain", tr("Calibrate a&gain"))
+        self._again = button("reviewAgain", tr("Calibrate &again"))
         self._again.setToolTip(
             tr(
                 "For the same wearer again, or after the headset has slipped: starts from "

@@ -15,7 +15,7 @@ from handcal.station.states import CalibrationSettings
 from handcal.types import Method
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import choice, number
+from handcal_gui.widgets.fields import choice, label_for, number
 from handcal_gui.widgets.finding_line import FindingLine
 
 _METHODS: dict[Method, str] = {
@@ -59,7 +59,7 @@ class CalibrationFields(QWidget):
     ----------
     changed : Signal()
     gate_found : FindingLine
-        The problem of the depth gate, hidden while there is none.
+        The problem of the depth gate beside it, hidden while there is none.
     """
 
     changed = Signal()
@@ -97,6 +97,8 @@ class CalibrationFields(QWidget):
         self._roi = choice("roi", tr("Hand found by"), _ROIS, _ROI_HELP)
         self._method = choice("method", tr("Solver"), _METHODS, _METHOD_HELP)
         self.gate_found = FindingLine("gate")
+        if (layout := self.gate_found.layout()) is not None:
+            layout.setContentsMargins(0, 0, 0, 0)  # no higher than two rows of fields
         self.gate_found.hide()
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
@@ -105,25 +107,16 @@ class CalibrationFields(QWidget):
         self._grid.setColumnStretch(2, 1)
         if explains:
             self.add_heading(tr("Calibration, from the next one on"))
-        for label, field, meaning in (
-            (
-                tr("&Rotation guard"),
-                self._guard,
-                tr("The hand may be rotated this much from the cursor."),
-            ),
-            (
-                tr("Depth gate &from"),
-                self._near,
-                tr("Nearest distance of the hand from the depth camera."),
-            ),
-            (
-                tr("Depth gate &to"),
-                self._far,
-                tr("Farthest distance of the hand from the depth camera."),
-            ),
-        ):
-            self.add_row(label, field, meaning)
-        self.add_line(self.gate_found)
+        turned = tr("The hand may be rotated this much from the cursor.")
+        self.add_row(tr("&Rotation guard"), self._guard, turned)
+        gate_row = self._grid.rowCount()
+        nearest = tr("Nearest distance of the hand from the depth camera.")
+        farthest = tr("Farthest distance of the hand from the depth camera.")
+        self._gate_meanings = (
+            self.add_row(tr("Depth gate &from"), self._near, nearest),
+            self.add_row(tr("Depth gate &to"), self._far, farthest),
+        )
+        self._grid.addWidget(self.gate_found, gate_row, 2, 2, 1)  # in place of both meanings
         self.add_row(tr("&Hand found by"), self._roi, tr("Finds the hand in the camera's images."))
         solves = tr("Computes where the eyes are from each alignment.")
         self.add_row(tr("&Solver"), self._method, solves)
@@ -156,30 +149,32 @@ class CalibrationFields(QWidget):
             solve=replace(settings.solve, method=self._method.currentData()),
         )
 
-    def add_row(self, text: str, field: QWidget, meaning: str = "") -> None:
-        """Add a field below, with its meaning beside it if the form explains fields.
+    def add_row(self, text: str, field: QWidget, meaning: str = "") -> QLabel | None:
+        """Add a field below, and return its meaning beside it if the form explains fields.
 
         Only then has the label a letter: beside others the letters would not be unique.
         """
         row = self._grid.rowCount()
-        label = QLabel(text if self._explains else text.replace("&", ""))
-        label.setBuddy(field)
+        label = label_for(field, text if self._explains else text.replace("&", ""))
         self._grid.addWidget(label, row, 0)
         if not (self._explains and meaning):
             self._grid.addWidget(field, row, 1, 1, 2)
-            return
+            return None
         self._grid.addWidget(field, row, 1)
         explained = QLabel(meaning)
         explained.setForegroundRole(QPalette.ColorRole.PlaceholderText)
         self._grid.addWidget(explained, row, 2)
+        return explained
 
     def add_line(self, line: QWidget) -> None:
         """Add a widget below that takes the whole width beside the labels."""
         self._grid.addWidget(line, self._grid.rowCount(), 1, 1, 2)
 
     def show_gate_problem(self, problem: Finding | None) -> None:
-        """Show what is wrong with the depth gate, below it."""
+        """Show what is wrong with the depth gate in place of what it means."""
         self.gate_found.setVisible(problem is not None)
+        for meaning in filter(None, self._gate_meanings):
+            meaning.setVisible(problem is None)
         if problem is not None:
             self.gate_found.show_finding(problem)
 

@@ -11,13 +11,13 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QGridLayout,
-    QLabel,
     QLineEdit,
     QSpinBox,
     QWidget,
 )
 
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.fields import label_for
 from handcal_gui.widgets.path_field import PathField
 
 Entries = TypeVar("Entries")
@@ -50,9 +50,7 @@ class EntriesForm(QWidget):
         half = (len(fields) + 1) // 2
         for number, (text, field) in enumerate(fields.values()):
             row, column = number % half, 3 * (number // half)
-            label = QLabel(text)
-            label.setBuddy(field)
-            grid.addWidget(label, row, column)
+            grid.addWidget(label_for(field, text), row, column)
             grid.addWidget(field, row, column + 1)
             grid.setColumnStretch(column + 1, 1)
             _change_of(field).connect(self.changed)

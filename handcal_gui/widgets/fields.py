@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QPushButton,
     QSizePolicy,
     QSpinBox,
+    QStackedWidget,
     QToolButton,
     QToolTip,
     QWidget,
@@ -165,6 +166,28 @@ def paragraph(name: str = "", text: str = "") -> QLabel:
     policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
     policy.setHeightForWidth(True)
     label.setSizePolicy(policy)
+    return label
+
+
+def one_of(texts: Mapping[str, str]) -> QStackedWidget:
+    """Return paragraphs by their names, one of which is shown; as high as the highest of them.
+
+    Nothing beside them moves when another is shown.
+    """
+    stack = QStackedWidget()
+    for name, text in texts.items():
+        stack.addWidget(paragraph(name, text))
+    return stack
+
+
+def label_for(field: QWidget, text: str) -> QLabel:
+    """Return the label of a field, whose letter leads to that part of it that takes the keyboard.
+
+    Qt leads to no buddy that only passes the keyboard on.
+    """
+    label = QLabel(text)
+    parts = filter(None, (field, field.focusProxy(), *field.findChildren(QWidget)))
+    label.setBuddy(next(one for one in parts if one.focusPolicy() != Qt.FocusPolicy.NoFocus))
     return label
 
 

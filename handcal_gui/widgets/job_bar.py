@@ -43,7 +43,7 @@ class JobBar(QWidget):
         self._doing: QLabel = with_name(ElidedLabel(), "doing")
         self._bar = with_name(QProgressBar(), "progress", tr("Progress"))
         self._bar.setFixedWidth(20 * SPACING_PX)
-        self._cancel = button("cancel", end or tr("Cancel"))
+        self._cancel = button("cancel", end or tr("Cance&l"))
         self._cancel.clicked.connect(self.cancel)
         fill_row(self, self._bar, self._doing, self._cancel, grows=self._doing)
         self._refresh()

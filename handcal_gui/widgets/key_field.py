@@ -10,9 +10,15 @@ from handcal_gui.widgets.fields import button, fill_row, with_name
 
 
 class KeyField(QWidget):
-    """The pairing key, hidden until requested."""
+    """The pairing key, hidden until requested.
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    Parameters
+    ----------
+    copy : str
+        Text of the button that copies it, so that its letter can be its own.
+    """
+
+    def __init__(self, copy: str = tr("Co&py"), parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._key = with_name(
             QLineEdit(readOnly=True),
@@ -20,14 +26,15 @@ class KeyField(QWidget):
             tr("Pairing key"),
             tr("Enter this key in the headset and nowhere else: any device with it can connect."),
         )
-        self._reveal = button("showKey", tr("Show"), tr("Show the pairing key"))
+        self._reveal = button("showKey", tr("Show &key"), tr("Show the pairing key"))
+        self._reveal.setMinimumWidth(self._reveal.sizeHint().width())
         self._reveal.setCheckable(True)
-        copy = button("copyKey", tr("Copy"), tr("Copy the pairing key"))
-        fill_row(self, self._key, self._reveal, copy, grows=self._key)
+        copies = button("copyKey", copy, tr("Copy the pairing key"))
+        fill_row(self, self._key, self._reveal, copies, grows=self._key)
         self.setFocusProxy(self._key)
         self._reveal.toggled.connect(self._show)
         copied = tr("Copied: the pairing key")
-        copy.clicked.connect(lambda: copy_text(copy, self._key.text(), copied))
+        copies.clicked.connect(lambda: copy_text(copies, self._key.text(), copied))
         self._show(False)
 
     def set_key(self, key: str) -> None:
@@ -39,4 +46,4 @@ class KeyField(QWidget):
     def _show(self, is_shown: bool) -> None:
         modes = QLineEdit.EchoMode
         self._key.setEchoMode(modes.Normal if is_shown else modes.Password)
-        self._reveal.setText(tr("Hide") if is_shown else tr("Show"))
+        self._reveal.setText(tr("Hide &key") if is_shown else tr("Show &key"))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
@@ -15,7 +15,7 @@ from handcal.camera.viewpoint import ViewpointCamera
 from handcal.types import CameraIdentity, Frame, UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import choice
+from handcal_gui.widgets.fields import choice, label_for
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_images import Images, LiveImages
 from handcal_gui.widgets.path_field import PathField
@@ -168,7 +168,7 @@ class LiveCameras(QWidget):
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(SPACING_PX)
-        self._labels = [QLabel(title) for title in self._sources]
+        self._labels = [label_for(source, f"&{title}") for title, source in self._sources.items()]
         for column, (title, source) in enumerate(self._sources.items()):
             row = QHBoxLayout()
             row.setSpacing(SPACING_PX)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
@@ -17,6 +18,9 @@ from PySide6.QtWidgets import (
 )
 
 from handcal_gui.theme import flat_header, number_font, set_style
+
+_PARTS = re.compile(" (?=±|mm)")
+"""Between the parts of a cell that can have their own lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +45,21 @@ class NumberTable(QTableWidget):
     hides : bool
         Where not all columns fit, the last ones are hidden and are in the tooltips; otherwise the
         table scrolls.
+    wraps : bool
+        Where not all columns fit, uncertainties, units and parts of headings have their own lines.
     """
 
     def __init__(
-        self, name: str, label: str, parent: QWidget | None = None, *, hides: bool = False
+        self,
+        name: str,
+        label: str,
+        parent: QWidget | None = None,
+        *,
+        hides: bool = False,
+        wraps: bool = False,
     ) -> None:
         super().__init__(parent)
-        self._hides = hides
+        self._hides, self._wraps = hides, wraps
         self.setObjectName(name)
         self.setAccessibleName(label)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -103,14 +115,15 @@ class NumberTable(QTableWidget):
 
     def _fit_columns(self) -> None:
         """Give each column the width of its contents, and an equal share of the rest."""
-        header, columns = self.horizontalHeader(), range(self.columnCount())
+        columns, room_px = range(self.columnCount()), self.viewport().width()
         for column in columns:
             self.showColumn(column)  # a hidden one has no width
-        needed_px = [
-            max(self.sizeHintForColumn(column), header.sectionSizeHint(column))
-            for column in columns
-        ]
-        room_px = self.viewport().width()
+        for is_wrapped in (False, True) if self._wraps else (False,):
+            if self._wraps:
+                self._wrap(is_wrapped)
+            needed_px = self._needed_px()
+            if sum(needed_px) <= room_px:
+                break
         fits = [c == 0 or sum(needed_px[: c + 1]) <= room_px for c in columns]
         shown = [column for column in columns if fits[column] or not self._hides]
         spare_px = max(0, room_px - sum(needed_px[column] for column in shown))
@@ -118,6 +131,27 @@ class NumberTable(QTableWidget):
             self.setColumnWidth(column, needed_px[column] + spare_px // len(shown))
             self.setColumnHidden(column, column not in shown)
         self._explain(hidden=range(len(shown), len(columns)))
+
+    def _needed_px(self) -> list[int]:
+        header = self.horizontalHeader()
+        return [
+            max(self.sizeHintForColumn(column), header.sectionSizeHint(column))
+            for column in range(self.columnCount())
+        ]
+
+    def _wrap(self, is_wrapped: bool) -> None:
+        """Break the lines of cells and headings, or join them."""
+        line_px = QFontMetrics(number_font()).lineSpacing()
+        for column, title in enumerate(self._columns):
+            if (heading := self.horizontalHeaderItem(column)) is not None:
+                heading.setText(title.replace("-", "-\n") if is_wrapped else title)
+        for number, row in enumerate(self._rows):
+            texts = [_PARTS.sub("\n", cell) if is_wrapped else cell for cell in row.cells]
+            for column, text in enumerate(texts):
+                if (item := self.item(number, column)) is not None:
+                    item.setText(text)
+            more_px = line_px * any("\n" in text for text in texts)
+            self.setRowHeight(number, self.verticalHeader().defaultSectionSize() + more_px)
 
     def _explain(self, hidden: Sequence[int]) -> None:
         """Set the tooltips, with the cells of hidden columns."""

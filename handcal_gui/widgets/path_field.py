@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Literal
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QPaintEvent
+from PySide6.QtGui import QKeySequence, QPaintEvent, QShortcut
 from PySide6.QtWidgets import (
     QFileDialog,
     QLineEdit,
+    QPushButton,
     QStyle,
     QStyleOptionFrame,
     QStylePainter,
@@ -16,11 +17,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal_gui.keys import native
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, fill_row, plain_tooltip
 
 INTRINSICS_FILES = tr("Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)")
 """File filter for a camera's intrinsics."""
+_KEY = "F4"
+"""Opens the dialog of the field that has the focus, as it opens a list."""
 _INSET_PX = 2
 """Between the frame of a line edit and its text, as in Qt."""
 
@@ -61,15 +65,21 @@ class PathField(QWidget):
         self._line.setAccessibleName(name)
         self._line.textChanged.connect(self._show_whole_path)
         self._line.textChanged.connect(self.changed)
-        buttons = []
+        buttons: list[QPushButton] = []
         for one, title, ask in (
             ("file", tr("File…"), self.choose_file),
             ("folder", tr("Folder…"), self.choose_folder),
         ):
             if kind in (one, "either"):
                 text = title if kind == "either" else tr("Choose…")
-                buttons.append(button(f"{one}Choice", text, tr("Choose {}").format(name.lower())))
+                keys = f"Shift+{_KEY}" if buttons else _KEY
+                chosen = tr("Choose {}").format(name.lower())
+                help_text = tr("{} ({} in the field)").format(chosen, native(keys))
+                buttons.append(button(f"{one}Choice", text, chosen, help_text))
                 buttons[-1].clicked.connect(ask)
+                shortcut = QShortcut(QKeySequence(keys), self)
+                shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+                shortcut.activated.connect(ask)
         fill_row(self, self._line, *buttons, grows=self._line)
         self.setFocusProxy(self._line)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QAbstractButton, QLabel, QWidget
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtWidgets import QAbstractButton, QLabel, QMenuBar, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
 
 Child = TypeVar("Child", bound=QObject)
@@ -34,13 +34,29 @@ def text(parent: QObject, name: str) -> str:
     return child(parent, QLabel, name).text()
 
 
-def letters(dialog: QWidget) -> list[str]:
-    """Return the letters with which Alt reaches the buttons and fields of a dialog."""
-    texts = [one.text() for one in dialog.findChildren(QAbstractButton)]
-    texts += [one.text() for one in dialog.findChildren(QLabel)]
+def letters(window: QWidget, *, is_shown: bool = False) -> list[str]:
+    """Return the letters with which Alt reaches the menus, buttons, fields and tabs of a window.
+
+    By default those of hidden widgets, too.
+    """
+    texts: list[str] = []
+    for bar in window.findChildren(QMenuBar):
+        texts += [action.text() for action in bar.actions()]
+    for button in window.findChildren(QAbstractButton):
+        texts += [button.text()] * (button.isVisible() or not is_shown)
+    for tabs in window.findChildren(QTabBar):
+        if tabs.isVisible() or not is_shown:
+            texts += [tabs.tabText(place) for place in range(tabs.count())]
+    for label in window.findChildren(QLabel):
+        buddy = label.buddy()
+        if buddy and "&" in label.text() and (label.isVisible() or not is_shown):
+            texts.append(label.text())
+            # Qt leads to no buddy without a focus of its own.
+            assert buddy.focusPolicy() != Qt.FocusPolicy.NoFocus, label.text()
     return [text.partition("&")[2][0].lower() for text in texts if "&" in text]
 
 
 def button(parent: QObject, kind: type[Button], text: str) -> Button:
-    """Return the first button of a kind and a text."""
-    return next(found for found in parent.findChildren(kind) if found.text() == text)
+    """Return the first button of a kind and a text, regardless of its letter."""
+    found = parent.findChildren(kind)
+    return next(one for one in found if one.text().replace("&", "") == text.replace("&", ""))

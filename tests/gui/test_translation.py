@@ -29,7 +29,7 @@ SOURCES = [
 SETTERS = {
     "Finding", "ImageView", "NumberTable", "PathField", "QAction", "QCheckBox", "QGroupBox",
     "QLabel", "QPushButton", "QRadioButton", "Row", "addAction", "addButton", "addItem", "addMenu",
-    "addRow", "addTab", "button", "choice", "main_button", "number", "paragraph",
+    "addRow", "addTab", "button", "choice", "label_for", "main_button", "number", "paragraph",
     "setAccessibleDescription", "setAccessibleName", "setHeaderLabels", "setLabelText",
     "setPlaceholderText", "setStatusTip", "setTabText", "setText", "setTitle", "setToolTip",
     "setWhatsThis", "setWindowTitle", "show_message", "show_text", "whole_number", "with_name",

@@ -49,7 +49,7 @@ class CameraField(QWidget):
         self._realsense = RealSenseSettings()
         edit = button(
             "editRealSense",
-            tr("Settings…"),
+            tr("Settin&gs…"),
             tr("Camera settings"),
             tr("Image size, preset, exposure, laser power and filters."),
         )

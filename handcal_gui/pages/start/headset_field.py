@@ -47,7 +47,7 @@ class HeadsetField(QWidget):
         self._address = QWidget()
         address = (QLabel(tr("at")), self._host, QLabel(tr("port")), self._port)
         fill_row(self._address, *address, grows=self._host)
-        self._key = KeyField()
+        self._key = KeyField(tr("Cop&y"))
         self._key.set_key(pairing_key)
         self._pairing = QWidget()
         fill_row(self._pairing, QLabel(tr("Pairing key")), self._key, grows=self._key)

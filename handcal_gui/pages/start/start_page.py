@@ -95,9 +95,9 @@ class StartPage(QWidget):
         )
         example = button("example", tr("E&xample"), tr("Open the example session"))
         example.setToolTip(tr("A simulated wearer's session, copied to the session folder"))
-        browse = button("browse", tr("Choose folder…"))
+        browse = button("browse", tr("Choose fo&lder…"))
         library = button(
-            "library", tr("A&ll sessions…"), tr("Search, compare, export and repair sessions")
+            "library", tr("All sess&ions…"), tr("Search, compare, export and repair sessions")
         )
         for added in (browse, example):
             self._opened.add_button(added)
@@ -107,7 +107,7 @@ class StartPage(QWidget):
             tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "results"
         )
         evaluate = button(
-            "evaluate", tr("Evalua&te…"), help_text=tr("Measure the accuracy of calibrations")
+            "evaluate", tr("&Evaluate…"), help_text=tr("Measure the accuracy of calibrations")
         )
         self._evaluate.add_to_head(evaluate)
         self._fit_soon = fit_soon(self._fit, self)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
 from handcal.hand.settings import SegmentSettings
 from handcal.station.doctor import Finding, Health
@@ -20,7 +20,7 @@ from handcal_gui.pages.start.headset_field import HeadsetField
 from handcal_gui.pages.start.plan_field import PlanField
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, fill_row
+from handcal_gui.widgets.fields import button, fill_row, label_for
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.path_field import PathField
 
@@ -116,7 +116,7 @@ class StationForm(QWidget):
             mend: Callable[[], object] = partial(self._change, changes)
             is_awaited = finding.health is Health.LIMITED and self.settings.headset == "network"
             if part == "headset" and is_awaited and not fix:
-                fix, mend = tr("Connect…"), self.connect_wanted.emit
+                fix, mend = tr("Co&nnect…"), self.connect_wanted.emit
             self._findings[part].show_finding(finding, fix, mend)
 
     def _change(self, changes: Mapping[str, Any]) -> None:
@@ -148,9 +148,8 @@ class StationForm(QWidget):
 
 def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:
     """Add a field, with its title aligned with the field's first line."""
-    label = QLabel(title)
+    label = label_for(field, title)
     label.setMinimumHeight(QComboBox().sizeHint().height())
-    label.setBuddy(field)
     row = grid.rowCount()
     grid.addWidget(label, row, 0, Qt.AlignmentFlag.AlignTop)
     grid.addWidget(field, row, 1)

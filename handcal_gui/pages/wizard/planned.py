@@ -53,7 +53,7 @@ _OMITTED = frozenset({Step.MAKE_CURSOR, Step.ALIGN, Step.SOLVE})
 """Steps that a session which begins with a stored result does without."""
 _WAITS_FOR_HAND, _SENDING = tr("Waiting for the hand…"), tr("Sending…")
 _VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
-    "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify l&eft eye")),
+    "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify &left eye")),
     "right": ButtonSpec(Action.VERIFY_RIGHT, tr("Verify &right eye")),
 }
 

@@ -212,11 +212,11 @@ class Wizard:
                 tr("Now repeat this with {}.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("Finish with &one eye")),),
+                (ButtonSpec(Action.NEXT, tr("F&inish with one eye")),),
                 runs_after_s=READ_S,
             )
         each = (
-            ButtonSpec(Action.REPEAT_LEFT, tr("Add l&eft eye")),
+            ButtonSpec(Action.REPEAT_LEFT, tr("Add &left eye")),
             ButtonSpec(Action.REPEAT_RIGHT, tr("Add &right eye")),
         )
         is_usable = not any(one.verdict in UNUSABLE for one in preconditions)

@@ -69,6 +69,7 @@ class CameraPanel(QWidget):
         self._freeze = QAction(tr("Freeze"), self, checkable=True, autoRepeat=False)
         self._freeze.setToolTip(tr("Freeze the image (F)"))
         self._freeze.setShortcut("F")
+        self._freeze.setIconText(tr("Freeze (F)"))
         self._mode = QComboBox()
         self._mode.setAccessibleName(tr("Displayed image"))
         self._mode.setToolTip(tr("Show the colour image, the depth image or both"))

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button
+from handcal_gui.widgets.fields import button, label_for
 from handcal_gui.widgets.key_field import KeyField
 from handcal_gui.widgets.layouts import hbox
 
@@ -37,17 +37,15 @@ class PairingBox(QWidget):
         )
         self._address.setToolTip(tr("Host and port that the headset must connect to, by UDP"))
         self._key = KeyField()
-        renew = button("newKey", tr("New key…"), tr("Make a new pairing key"), _RENEWING)
+        renew = button("newKey", tr("&New key…"), tr("Make a new pairing key"), _RENEWING)
         renew.clicked.connect(self.new_key_requested)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(SPACING_PX)
         grid.setVerticalSpacing(SPACING_PX // 2)
-        key_label = QLabel(tr("&Key"))
-        key_label.setBuddy(self._key)
         grid.addWidget(QLabel(tr("Address")), 0, 0)
         grid.addLayout(hbox((self._address, 1), renew, spacing=SPACING_PX), 0, 1)
-        grid.addWidget(key_label, 1, 0)
+        grid.addWidget(label_for(self._key, tr("Key")), 1, 0)
         grid.addWidget(self._key, 1, 1)
         grid.setColumnStretch(1, 1)
 

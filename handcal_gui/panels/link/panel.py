@@ -52,13 +52,13 @@ class LinkPanel(QWidget):
         self._state.setObjectName("link-state")
         self._state.setWordWrap(True)
         self._connect = button(
-            "connect", tr("Connect…"), tr("Pair a headset by QR code, and try it")
+            "connect", tr("&Connect…"), tr("Pair a headset by QR code, and try it")
         )
         self._connect.hide()
         self._connect.clicked.connect(self.connect_requested)
         self._restart = button(
             "restartHeadset",
-            tr("Restart headset"),
+            tr("R&estart headset"),
             help_text=tr("Restart the virtual headset's program"),
         )
         self._restart.clicked.connect(self.restart_headset_requested)

@@ -54,7 +54,7 @@ class CompareTab(QWidget):
         self.setObjectName("comparison")
         self._results: Results | None = None
         self._rig: Rig | None = None
-        self.table = NumberTable("comparison-of-methods", tr("Comparison of methods"))
+        self.table = NumberTable("comparison-of-methods", tr("Comparison of methods"), wraps=True)
         keep_space(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")
@@ -63,7 +63,7 @@ class CompareTab(QWidget):
         self._compare = QPushButton(tr("&Compare"))
         self._compare.setObjectName("comparison-start")
         self._compare.clicked.connect(self._ask)
-        self._cancel = QPushButton(tr("Cance&l"))
+        self._cancel = QPushButton(tr("Ca&ncel"))
         self._cancel.setObjectName("comparison-cancel")
         self._cancel.clicked.connect(self._request_cancel)
         self._progress = with_name(QProgressBar(), "comparison-progress", tr("Progress"))
@@ -94,12 +94,12 @@ class CompareTab(QWidget):
         self._set_busy(False)
         if self._results is None or self._rig is None:
             return
-        columns = self._results.method, other.method, tr("Difference")
+        columns = self._results.method, other.method, "Δ"
         self.table.show_rows(columns, comparison_rows(self._results, other, self._rig))
         self.table.show()
         self._status.setText(
             tr(
-                "Difference: {} minus {}. σ and expected error are realistic only for "
+                "Δ: {} minus {}. σ and expected error are realistic only for "
                 "“consistent”; the other methods' are too small."
             ).format(other.method, self._results.method)
         )
@@ -143,4 +143,12 @@ class CompareTab(QWidget):
         label = QLabel(tr("Compare &with"))
         label.setBuddy(self._methods)
         row = hbox(label, (self._methods, 1), self._compare, self._cancel, spacing=SPACING_PX)
-        vbox(row, self._progress, self._status, (self.table, 1), on=self, spacing=SPACING_PX)
+        vbox(
+            row,
+            self._progress,
+            self._status,
+            (self.table, 1),
+            on=self,
+            margins=SPACING_PX // 2,
+            spacing=SPACING_PX,
+        )

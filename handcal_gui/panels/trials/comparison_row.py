@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QStackedWidget, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.session.comparison import Answer, Place
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, paragraph
+from handcal_gui.widgets.fields import button, one_of, paragraph
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 
-_SHOW: dict[Place, str] = {"first": tr("Show first"), "second": tr("Show second")}
+_SHOW: dict[Place, str] = {"first": tr("Sho&w first"), "second": tr("Sh&ow second")}
 _ANSWERS: dict[Answer, str] = {
-    "first": tr("First is better"),
-    "second": tr("Second is better"),
-    "neither": tr("Neither"),
+    "first": tr("First is b&etter"),
+    "second": tr("Se&cond is better"),
+    "neither": tr("&Neither"),
 }
 _COMPARE_HELP = tr(
     "Show the wearer the drawing without and with the calibration, in a hidden random order,\n"
@@ -53,11 +53,11 @@ class ComparisonRow(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._begin = button("compare", tr("Blinded comparison"), help_text=_COMPARE_HELP)
+        self._begin = button("compare", tr("Blinded &comparison"), help_text=_COMPARE_HELP)
         self._count = paragraph("compared")
         self._show = {place: button(f"show-{place}", text) for place, text in _SHOW.items()}
         self._answers = {one: button(f"answer-{one}", text) for one, text in _ANSWERS.items()}
-        self._end = button("compareEnd", tr("Cancel"))
+        self._end = button("compareEnd", tr("Stop com&paring"))
         self._shown: Place | None = None
         self._begin.clicked.connect(self.begun)
         self._end.clicked.connect(self.ended)
@@ -66,10 +66,7 @@ class ComparisonRow(QWidget):
             one.clicked.connect(lambda _=False, place=place: self._ask(place))
         for answer, one in self._answers.items():
             one.clicked.connect(lambda _=False, answer=answer: self.answered.emit(answer))
-        # As high as the longer text: no button moves between the drawings and the answer.
-        self._how = QStackedWidget()
-        for name, text in (("compareLook", _LOOK), ("compareAsk", _ASK)):
-            self._how.addWidget(paragraph(name, text))
+        self._how = one_of({"compareLook": _LOOK, "compareAsk": _ASK})
         self._running = QWidget()
         vbox(
             self._how,

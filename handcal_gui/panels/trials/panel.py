@@ -25,6 +25,7 @@ from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph
+from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
@@ -41,12 +42,11 @@ from handcal_gui.widgets.session_rows import (
 )
 from handcal_gui.widgets.undo_strip import UndoStrip
 
-_HOW = tr(
-    "Fine-tune φ until the drawn target covers the real one, then record. A trial is the error of "
-    "the calibrated φ relative to the fine-tuned one. The calibrated φ is the solved one, or 0 for "
-    "an eye that keeps the offline calibration."
+_WHAT = tr(
+    "A trial is the error of the calibrated φ relative to the φ with which the drawn target covers "
+    "the real one. The calibrated φ is the solved one, or 0 for an eye that keeps the offline "
+    "calibration."
 )
-
 _UNTOUCHED = tr(
     "φ of the {} has not been touched since its last trial at this distance. "
     "Press T again if this is a separate trial."
@@ -99,7 +99,7 @@ class TrialsPanel(QWidget):
         self._record: SessionRecord | None = None
         self._is_read_only = self._is_doubtful = False
         self._eyes, self._depth = QComboBox(), QComboBox()
-        self._shows_target = QCheckBox(tr("Show the target in the headset"))
+        self._shows_target = QCheckBox(tr("Show the tar&get in the headset"))
         self._eye: Eye | None = None  # of the next trial, as said last
         self._target: tuple[Eye, float] | None = None  # requested
         self._compared = 0
@@ -110,7 +110,7 @@ class TrialsPanel(QWidget):
         self._comparison.answered.connect(self.comparison_answered)
         self._fill_choices()
         self._make_record_action()
-        self._hint = paragraph("trialsHint", _HOW)
+        self._hint = paragraph("trialsHint", _WHAT)
         self._message = paragraph("message")
         self._summary = paragraph("summary")
         self._table = RecordTable(
@@ -210,7 +210,8 @@ class TrialsPanel(QWidget):
         self._is_doubtful = self._is_doubtful and bool(self._doubt())
         self.record_action.setEnabled(not obstacle)
         self._message.setText(
-            obstacle or tr("Next: {}").format(EYE_NAMES[self._next_eye()].lower())
+            obstacle
+            or tr("Fine-tune φ of the {}, then record.").format(EYE_NAMES[self._next_eye()].lower())
         )
         can_show = not (obstacle or (self._record and self._record.is_finished))
         if not obstacle and self._eye != self._next_eye():
@@ -299,7 +300,8 @@ class TrialsPanel(QWidget):
     def _lay_out(self) -> None:
         record = QToolButton()
         record.setDefaultAction(self.record_action)
-        choices = hbox(self._eyes, self._depth, record, 1, spacing=SPACING_PX)
+        key = KeyCap("recordKey", "T")
+        choices = hbox(self._eyes, self._depth, key, record, 1, spacing=SPACING_PX)
         tabs = RecordTabs()
         for page, title in (
             (self._table, tr("Trials")),
@@ -308,8 +310,9 @@ class TrialsPanel(QWidget):
         ):
             tabs.addTab(page, title)
         vbox(
+            self._message,
             choices,
-            hbox(self._shows_target, (self._message, 1), spacing=2 * SPACING_PX),
+            self._shows_target,
             self._comparison,
             self._hint,  # below the buttons, which stay in place when it goes
             (tabs, 1),

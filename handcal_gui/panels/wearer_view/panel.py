@@ -56,7 +56,7 @@ class WearerViewPanel(QWidget):
             what: LegendEntry(what, QLabel(name), LINES[what][0], tooltip, LINES[what][1])
             for what, (name, tooltip) in _LEGEND.items()
         }
-        whole, before = QCheckBox(tr("Whole display")), QCheckBox(tr("Before calibration"))
+        whole, before = QCheckBox(tr("&Whole display")), QCheckBox(tr("Before &calibration"))
         whole.setObjectName("wearer-view-whole")
         whole.setToolTip(tr("Show each whole display instead of the part with the hand"))
         before.setObjectName("wearer-view-before")

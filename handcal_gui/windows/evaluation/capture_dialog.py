@@ -99,13 +99,13 @@ class CaptureDialog(PreparationDialog):
             ),
         )
         self._large = with_name(
-            QCheckBox(tr("&Large view")),
+            QCheckBox(tr("Lar&ge view")),
             "largeView",
             help_text=tr(
                 "Fill the screen with the live image, to align a hand with it. Escape goes back."
             ),
         )
-        self._close = button("close", tr("&Close"))
+        self._close = button("close", tr("Cl&ose"))
         self._watch: RestWatch | None = None
         self._is_watching = False
         self._warp: tuple[str, RotationWarp | None] = "", None
@@ -369,9 +369,9 @@ def _plan_form() -> EntriesForm:
     )
     return EntriesForm(
         {
-            "positions": (tr("Positions"), positions),
-            "poses": (tr("Poses at each"), poses),
-            "drawn": (tr("Renderings"), drawn),
+            "positions": (tr("&Positions"), positions),
+            "poses": (tr("Poses &at each"), poses),
+            "drawn": (tr("&Renderings"), drawn),
             "with_grid": (tr("Display's grid"), with_grid),
         }
     )

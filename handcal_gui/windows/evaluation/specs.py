@@ -163,14 +163,14 @@ def _noise_form() -> EntriesForm:
         {"full": tr("Full"), "quick": tr("Quick")},
         tr("A quick run uses few trials; do not report its numbers."),
     )
-    return EntriesForm({"size": (tr("Size"), size), **_study_fields()})
+    return EntriesForm({"size": (tr("Si&ze"), size), **_study_fields()})
 
 
 def _methods_form() -> EntriesForm:
     wearers = whole_number(
         "wearers", 2, _MOST_WEARERS, tr("Simulated wearers; each uses every method.")
     )
-    return EntriesForm({"wearers": (tr("Wearers"), wearers), **_study_fields()})
+    return EntriesForm({"wearers": (tr("&Wearers"), wearers), **_study_fields()})
 
 
 def _cube_form() -> EntriesForm:
@@ -195,13 +195,13 @@ def _cube_form() -> EntriesForm:
     )
     return EntriesForm(
         {
-            "captures": (tr("Captures"), captures),
-            "cube": (tr("Cube"), cube),
-            "camera": (tr("Camera intrinsics"), camera),
+            "captures": (tr("Ca&ptures"), captures),
+            "cube": (tr("C&ube"), cube),
+            "camera": (tr("Camera &intrinsics"), camera),
             **_output(),
-            "rig": (tr("Rig file"), rig),
+            "rig": (tr("Ri&g file"), rig),
             "eye": (
-                tr("Display"),
+                tr("&Display"),
                 choice(
                     "eye",
                     tr("Display"),
@@ -209,10 +209,10 @@ def _cube_form() -> EntriesForm:
                     tr("The display in front of the camera."),
                 ),
             ),
-            "square_px": (tr("Grid squares"), square),
-            "seed": (tr("Seed of the rendering"), _seed()),
-            "poses": (tr("Poses at each position"), poses),
-            "alignments": (tr("Alignments at each"), alignments),
+            "square_px": (tr("Grid s&quares"), square),
+            "seed": (tr("&Seed of the rendering"), _seed()),
+            "poses": (tr("Poses &at each position"), poses),
+            "alignments": (tr("Align&ments at each"), alignments),
         }
     )
 
@@ -220,7 +220,7 @@ def _cube_form() -> EntriesForm:
 def _users_form() -> EntriesForm:
     sessions = PathField(tr("Sessions"), "folder")
     sessions.setToolTip(tr("Folder of one session, or a folder that contains sessions."))
-    return EntriesForm({"sessions": (tr("Sessions"), sessions), **_output()})
+    return EntriesForm({"sessions": (tr("&Sessions"), sessions), **_output()})
 
 
 def _segmentation_form() -> EntriesForm:
@@ -232,9 +232,9 @@ def _segmentation_form() -> EntriesForm:
     }
     return EntriesForm(
         {
-            "folder": (tr("Frames"), folder),
+            "folder": (tr("Fra&mes"), folder),
             "roi": (
-                tr("Hand"),
+                tr("&Hand"),
                 choice("roi", tr("Hand"), ways, tr("Where the hand is looked for in a frame.")),
             ),
             **_output(),
@@ -258,9 +258,9 @@ def _study_fields() -> dict[str, tuple[str, QWidget]]:
         tr("Address of a Dask cluster that does the work instead, such as tcp://HOST:PORT."),
     )
     return {
-        "seed": (tr("Seed"), _seed()),
-        "processes": (tr("Processes"), processes),
-        "scheduler": (tr("Dask scheduler"), scheduler),
+        "seed": (tr("&Seed"), _seed()),
+        "processes": (tr("&Processes"), processes),
+        "scheduler": (tr("&Dask scheduler"), scheduler),
         **_output(),
     }
 
@@ -276,4 +276,4 @@ def _seed() -> QSpinBox:
 def _output() -> dict[str, tuple[str, QWidget]]:
     output = PathField(tr("Results folder"), "folder")
     output.setToolTip(tr("Report, figures and raw numbers; an unfinished study there is resumed."))
-    return {"output": (tr("Results folder"), output)}
+    return {"output": (tr("Results fold&er"), output)}

@@ -23,7 +23,7 @@ from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice, main_button
+from handcal_gui.widgets.fields import button, choice, main_button, one_of
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.job_bar import JobBar
@@ -67,7 +67,7 @@ class TrackDialog(PreparationDialog):
         self.form = EntriesForm(
             {
                 "tracked_by": (
-                    tr("Tracked by"),
+                    tr("Tracked &by"),
                     choice(
                         "trackedBy",
                         tr("Tracked by"),
@@ -88,8 +88,14 @@ class TrackDialog(PreparationDialog):
         self._pose = NumberTable("pose-of-the-cube", tr("Pose of the cube"))
         self._pose.setMinimumWidth(44 * SPACING_PX)
         self._pose.hide()
+        self._task = one_of(
+            {
+                "trackStart": tr("Choose what tracks the cube and press Start."),
+                "trackMove": tr("Put the cube where the depth camera sees it. Press Stop to end."),
+            }
+        )
         self._found = FindingLine("track")
-        self._bar = JobBar(tr("Stop"))
+        self._bar = JobBar(tr("S&top"))
         self._start = main_button("start", tr("Start"))
         self._close = button("close", tr("&Close"))
         self._timer = QTimer(self, interval=_POLL_MS)
@@ -100,9 +106,6 @@ class TrackDialog(PreparationDialog):
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
-        self._found.show_finding(
-            Finding("", Health.LIMITED, tr("choose what tracks the cube, and press Start"))
-        )
 
     def start(self) -> None:
         """Track until stopped."""
@@ -153,6 +156,7 @@ class TrackDialog(PreparationDialog):
 
     def _refresh(self) -> None:
         is_busy = self._bar.is_busy
+        self._task.setCurrentIndex(int(is_busy))
         self.form.setEnabled(not is_busy)
         self._start.setEnabled(not is_busy)
         if is_busy:
@@ -167,6 +171,7 @@ class TrackDialog(PreparationDialog):
         middle = hbox((self._view, 2), (self._pose, 1), spacing=2 * SPACING_PX)
         foot = action_strip(self._start, self._close, bar=self._bar)
         vbox(
+            self._task,
             self.form,
             (middle, 1),
             self._found,

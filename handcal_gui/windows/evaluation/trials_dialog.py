@@ -144,7 +144,7 @@ class TrialsDialog(PreparationDialog):
         self.form = EntriesForm(
             {
                 "headset": (
-                    tr("Headset"),
+                    tr("&Headset"),
                     choice(
                         "headset",
                         tr("Headset"),
@@ -153,7 +153,7 @@ class TrialsDialog(PreparationDialog):
                     ),
                 ),
                 "cube": (
-                    tr("Cube"),
+                    tr("C&ube"),
                     PathField(tr("Cube"), "file", tr("Cubes (*.json)"), tr("60 mm cube")),
                 ),
             }

@@ -31,6 +31,7 @@ from handcal_gui.widgets.fields import (
     button,
     choice,
     fill_row,
+    label_for,
     main_button,
     number,
     paragraph,
@@ -80,7 +81,7 @@ class BoardPage(QWidget):
             tr("Dictionary of the markers."),
         )
         self._legacy = with_name(
-            QCheckBox(tr("Printed by OpenCV before 4.6")),
+            QCheckBox(tr("Print&ed by OpenCV before 4.6")),
             "legacy",
             help_text=tr("Boards with an even number of rows started with a white square."),
         )
@@ -233,15 +234,15 @@ class BoardPage(QWidget):
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
         for label, field in (
-            (tr("Board"), self._kind),
-            (tr("Squares"), squares),
-            (tr("Square"), self._square),
-            (tr("Marker"), self._marker),
-            (tr("Dictionary"), self._dictionary),
+            (tr("Boar&d"), self._kind),
+            (tr("S&quares"), squares),
+            (tr("&Square"), self._square),
+            (tr("&Marker"), self._marker),
+            (tr("Di&ctionary"), self._dictionary),
             ("", self._legacy),
-            (tr("Paper"), paper),
+            (tr("P&aper"), paper),
         ):
-            form.addRow(label, field)
+            form.addRow(label_for(field, label), field)
         left = vbox(form, self._found, spacing=SPACING_PX)
         left.addWidget(
             paragraph(

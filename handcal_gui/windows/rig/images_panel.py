@@ -97,7 +97,7 @@ class ImagesPanel(QWidget):
         self._take = button("take", take, help_text=tr("Take images with cameras of this computer"))
         self._again.clicked.connect(self._search_again)
         self._take.clicked.connect(self.take_requested)
-        self.bar = JobBar()
+        self.bar = JobBar(tr("Cancel"))  # without a letter: two panels may search at once
         self.bar.failed.connect(self.show_trouble)
         self.bar.busy_changed.connect(self.bar.setVisible)
         self.bar.hide()

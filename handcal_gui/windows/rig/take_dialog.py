@@ -20,7 +20,7 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
-from handcal_gui.widgets.fields import button, main_button, with_name
+from handcal_gui.widgets.fields import button, main_button, one_of, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import vbox
@@ -69,6 +69,14 @@ class TakeDialog(QDialog):
             lambda title, frame, identity: keep_imager(folders[title], frame, identity),
             open_source,
         )
+        both = tr("Choose the cameras and press Show.")
+        self._task = one_of(
+            {
+                "takeShow": both if len(folders) > 1 else tr("Choose the camera and press Show."),
+                "takeTake": tr("Press Take while nothing moves. Close when there are enough."),
+                "takeWait": tr("Images are taken automatically. Close when there are enough."),
+            }
+        )
         self._found = FindingLine("taken")
         self._bar = JobBar()
         self._start = button("startCameras", tr("&Show"))
@@ -90,14 +98,12 @@ class TakeDialog(QDialog):
         self._start.clicked.connect(self.start)
         self._take.clicked.connect(self.take)
         self._by_itself.toggled.connect(self._reset)
+        self._by_itself.toggled.connect(self._refresh)
         self._close.clicked.connect(self.accept)
         self._bar.busy_changed.connect(self._refresh)
         self._bar.failed.connect(self._show_failure)
         self._lay_out()
         self._refresh()
-        self._found.show_finding(
-            Finding("", Health.LIMITED, tr("choose the cameras, and press Show"))
-        )
         self._bar.run(
             tr("Looking for cameras"), lambda *_: list_cameras(), self._cameras.add_cameras
         )
@@ -185,12 +191,15 @@ class TakeDialog(QDialog):
         self._found.show_finding(found)
 
     def _refresh(self) -> None:
-        self._take.setEnabled(self.shown_images is not None and not self._bar.is_busy)
+        is_shown = self.shown_images is not None
+        self._task.setCurrentIndex(1 + self._by_itself.isChecked() if is_shown else 0)
+        self._take.setEnabled(is_shown and not self._bar.is_busy)
 
     def _lay_out(self) -> None:
         others = self._close, self._start, self._by_itself
         foot = action_strip(self._take, *others, bar=self._bar, keys="Space")
         vbox(
+            self._task,
             (self._cameras, 1),
             self._found,
             foot,

@@ -340,7 +340,7 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     assert program.windows.export() is not None
     program.window.panels.results.compare_requested.emit("linear")
     status = child(program, QLabel, "comparison-status")
-    qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)
 
 
 def test_a_comparison_is_shown_or_cancelled(
@@ -355,7 +355,7 @@ def test_a_comparison_is_shown_or_cancelled(
     bar = child(program, QProgressBar, "comparison-progress")
     bar.valueChanged.connect(lambda value: shares.append(value / bar.maximum()))
     program.window.panels.results.compare_requested.emit("linear")
-    qtbot.waitUntil(lambda: status.text().startswith("Difference"), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)
     assert 0.5 in shares  # one of two alignments
 
     solver = Solver()

@@ -27,7 +27,7 @@ from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.widgets.path_field import PathField
-from tests.gui.helpers import text
+from tests.gui.helpers import letters, text
 
 
 class Exporter:
@@ -237,6 +237,13 @@ def test_closing_while_it_runs_cancels_and_then_closes(
     with qtbot.waitSignal(dialog.rejected):
         dialog.close()
     assert not [t for t in threading.enumerate() if t.name == "handcal job"]
+
+
+def test_every_choice_has_a_letter_of_its_own(dialog: ExportDialog) -> None:
+    found = letters(dialog, is_shown=True)
+    boxes = dialog.findChildren(QCheckBox)
+    assert all("&" in box.text() for box in boxes)
+    assert len(set(found)) == len(found) == len(boxes) + 5
 
 
 def test_a_real_session_is_exported(qtbot: QtBot, record: SessionRecord, tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QApplication,
     QCheckBox,
     QComboBox,
     QDialog,
@@ -122,11 +124,18 @@ def opened(qtbot: QtBot, tmp_path: Path) -> PreferencesDialog:
 def test_a_gate_without_room_for_a_hand_is_refused_beside_it(opened: PreferencesDialog) -> None:
     near, far = (child(opened, QDoubleSpinBox, name) for name in ("gateNear", "gateFar"))
     found, ok = child(opened, QLabel, "gateFound"), _button(opened, "Ok")
+    fields = [one for one in opened.findChildren(QAbstractSpinBox) if one.isVisible()]
     assert ok.isEnabled()
     assert not found.isVisible()
+    QApplication.processEvents()
+    before = [_middle(one, opened) for one in fields], opened.height()
     near.setValue(0.9)
     far.setValue(0.95)
     assert found.isVisible()
+    for _ in range(3):  # a layout may ask for another
+        QApplication.processEvents()
+    assert ([_middle(one, opened) for one in fields], opened.height()) == before, "moved"
+    assert found.height() >= found.heightForWidth(found.width()), "cut off"
     assert "0.90 to 0.95 m, leaves a hand too little room" in found.text()
     assert not ok.isEnabled()
     _button(opened, "RestoreDefaults").click()

@@ -5,12 +5,40 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage, QTextDocument
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, show
+
+
+def test_a_key_in_the_field_presses_its_buttons(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: ("/a/file.db3", ""))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: "/a/folder")
+    page = QWidget()
+    fields = PathField("Recording", "either"), PathField("Results", "folder")
+    vbox(*fields, on=page)
+    show(qtbot, page, 400, 100)
+    page.activateWindow()
+    qtbot.waitActive(page)
+    none, shift = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier
+    for field, modifier, name, path in (
+        (fields[0], none, "F4", "/a/file.db3"),
+        (fields[0], shift, "Shift+F4", "/a/folder"),
+        (fields[1], none, "F4", "/a/folder"),
+    ):
+        field.setFocus()
+        qtbot.waitUntil(child(field, QLineEdit).hasFocus)
+        QTest.keyClick(page.windowHandle(), Qt.Key.Key_F4, modifier)
+        assert field.path == path
+        tooltips = [one.toolTip() for one in field.findChildren(QPushButton)]
+        assert any(f"({name} in the field)" in tooltip for tooltip in tooltips)
 
 
 @pytest.mark.parametrize("path", ["/a/<b>x</b>", "/a/&lt;b&gt;"])

@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.station.states import State
+from handcal.types import Method
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT
 from handcal_gui.pages.wizard.step_views import align_view, verification_view
@@ -191,7 +192,7 @@ def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
 
 @EACH_TEXT
 def test_the_panels_of_a_stored_session_have_the_room_that_its_page_leaves(
-    program: Program, record: SessionRecord, results: Results, text_scale: float
+    program: Program, record: SessionRecord, results: Results
 ) -> None:
     window, panel = program.window, program.window.panels.results
     window.resize(*SMALL_PX[0])
@@ -204,8 +205,31 @@ def test_the_panels_of_a_stored_session_have_the_room_that_its_page_leaves(
         QApplication.processEvents()
     bar = tabs.tabBar()
     assert all(bar.tabRect(i).width() >= bar.tabSizeHint(i).width() for i in range(bar.count()))
-    if text_scale == 1.0:  # larger texts make all columns as wide as the window
-        assert compare.table.horizontalScrollBar().maximum() == 0
+    assert compare.table.horizontalScrollBar().maximum() == 0
+
+
+@EACH_TEXT
+@pytest.mark.parametrize("size_px", SMALL_PX)
+@pytest.mark.parametrize("method", ["paper", "icp-open3d"])
+def test_a_comparison_of_methods_needs_no_scrolling_aside(
+    program: Program, snapshot: Maker, results: Results, size_px: tuple[int, int], method: Method
+) -> None:
+    window, panel = program.window, program.window.panels.results
+    window.resize(*size_px)
+    window.show_page("live")
+    window.panels.link.show_pairing("192.168.178.105:50123", "a pairing key", is_virtual=True)
+    for one in window.panels.all():
+        one.show_snapshot(snapshot(State.APPLIED))
+    window.docks["results"].raise_()
+    compare = child(panel, CompareTab)
+    child(panel, QTabWidget, "results-tabs").setCurrentWidget(compare)
+    panel.show_comparison(replace(results, method=method))
+    for _ in range(3):
+        QApplication.processEvents()
+    table = compare.table
+    assert table.horizontalScrollBar().maximum() == 0
+    shown = [table.item(1, column).text() for column in range(3)]  # type: ignore[union-attr]
+    assert all(" ".join(text.split()) in table.as_text() for text in shown)
 
 
 @pytest.mark.parametrize("text_scale", [1.25, 1.5], indirect=True)

@@ -11,6 +11,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QApplication,
     QFileDialog,
     QLabel,
     QListWidget,
@@ -29,6 +30,7 @@ from handcal_gui.pages.start.session_entries import Entry, KnownSessions
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX, icon
+from tests.gui.helpers import letters
 from tests.gui.pages.start.conftest import (
     NETWORK,
     Inspector,
@@ -45,7 +47,7 @@ def test_a_headset_that_is_awaited_can_be_connected(
 ) -> None:
     inspector.healths["headset"] = Health.LIMITED
     page = open_page(source="realsense", headset="network")
-    qtbot.waitUntil(lambda: button(page, "headsetFix").text() == "Connect…")
+    qtbot.waitUntil(lambda: button(page, "headsetFix").text() == "Co&nnect…")
     with qtbot.waitSignal(page.connect_wanted):
         button(page, "headsetFix").click()
 
@@ -105,12 +107,34 @@ def test_the_key_that_starts_is_shown_where_it_does(
     assert key.text() == "Return"
 
 
-def test_fields_are_reached_by_letters(open_page: Callable[..., StartPage]) -> None:
-    labels = open_page().findChildren(QLabel)
-    letters = [one.text().partition("&")[2][:1].upper() for one in labels if one.buddy()]
-    found = [letter for letter in letters if letter]
-    assert set(found) == set("WPCDRS")
-    assert len(found) == len(set(found))
+def test_fields_are_reached_by_letters(qtbot: QtBot, open_page: Callable[..., StartPage]) -> None:
+    page = open_page()
+    page.activateWindow()
+    qtbot.waitActive(page)
+    alt, reached = Qt.KeyboardModifier.AltModifier, set()
+    for letter in "WPCDRS":
+        QTest.keyClick(page.windowHandle(), Qt.Key[f"Key_{letter}"], alt)
+        field = QApplication.focusWidget()
+        assert field is not None
+        reached.add(field.accessibleName())
+    assert reached == {
+        "Wearer's name or code",
+        "Plan",
+        "Camera",
+        "Headset",
+        "Rig file",
+        "Session folder",
+    }
+
+
+def test_each_letter_leads_to_one_place(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    inspector.healths["headset"] = Health.LIMITED
+    page = open_page(source="realsense", headset="network")
+    qtbot.waitUntil(lambda: button(page, "headsetFix").text() != "")
+    found = [*"ftvh", *letters(page)]  # of the window's menus, and of hidden buttons, too
+    assert len(set(found)) == len(found) >= 22
 
 
 def test_the_next_wearer_finds_everything_as_it_was(open_page: Callable[..., StartPage]) -> None:

@@ -49,7 +49,7 @@ def later(snapshot: Maker, seconds: float, **link: Any) -> Snapshot:
 def test_an_empty_panel_says_how_to_begin(panel: LinkPanel) -> None:
     assert text(panel, "state") == "Not connected. Open a session on the start page."
     assert {label.text() for label in panel.findChildren(NumberLabel) if label.isVisible()} == {"–"}
-    assert not button(panel, QPushButton, "Show").isVisible()
+    assert not button(panel, QPushButton, "Show key").isVisible()
 
 
 def test_it_shows_if_the_headset_is_connected_and_the_problem(
@@ -162,7 +162,7 @@ def test_the_key_is_hidden_until_asked_for(panel: LinkPanel) -> None:
     assert address is not None
     assert address.text() == "192.168.1.5:50123"
     assert key.displayText() != KEY
-    button(panel, QPushButton, "Show").click()
+    button(panel, QPushButton, "Show key").click()
     assert key.displayText() == KEY
     panel.show_pairing("192.168.1.5:50124", "another key of the tests")
     assert key.displayText() != "another key of the tests"

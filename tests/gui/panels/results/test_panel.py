@@ -248,7 +248,7 @@ def test_a_comparison_is_asked_for_and_shown(
     solved.show_comparison(other)
     assert button(solved, "start").isEnabled()
     table = child(solved, CompareTab).table
-    assert table.as_text().startswith("\tconsistent\ticp\tDifference\n")
+    assert table.as_text().startswith("\tconsistent\ticp\tΔ\n")
     apart_mm = 1e3 * (other.eyes["left"].shift_m - results.eyes["left"].shift_m)[0]
     shown_mm = float(cell(table, 1, 2).replace("−", "-"))
     assert shown_mm == pytest.approx(apart_mm, abs=0.005)
@@ -300,7 +300,7 @@ def test_everything_is_copied_as_text(
     assert results.verdicts["left"].reason in text
     assert "\nφ1 (mm)\t" in text
     assert "\n2 right\t" in text
-    assert "\tconsistent\ticp\tDifference\n" in text
+    assert "\tconsistent\ticp\tΔ\n" in text
 
 
 def test_it_fits_a_small_dock(solved: ResultsPanel) -> None:

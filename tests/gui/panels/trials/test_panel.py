@@ -29,6 +29,8 @@ from handcal.types import Eye
 from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.trials.trial_plot import TrialPlot
+from handcal_gui.theme import SPACING_PX
+from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
 from tests.gui.helpers import button, child, show, text
@@ -154,10 +156,10 @@ def test_takes_the_eyes_in_turn(
     eyes: list[str] = []
     panel.eye_changed.connect(eyes.append)
     panel.show_snapshot(tuned(snapshot))
-    assert text(panel, "message") == "Next: left eye"
+    assert text(panel, "message") == "Fine-tune φ of the left eye, then record."
     panel.show_snapshot(replace(tuned(snapshot), record=tried))
     panel.show_snapshot(replace(tuned(snapshot), record=tried))
-    assert text(panel, "message") == "Next: right eye"
+    assert text(panel, "message") == "Fine-tune φ of the right eye, then record."
     assert eyes == ["left", "right"]
     with qtbot.waitSignal(panel.trial_requested) as asked:
         button(panel, QToolButton, "Record trial").click()
@@ -174,6 +176,26 @@ def test_the_button_stays_under_the_mouse(
     panel.show_snapshot(replace(tuned(snapshot), record=tried))
     QApplication.processEvents()
     assert record.geometry() == before
+
+
+def test_what_to_do_and_its_key_are_in_sight_beside_trials_too(
+    panel: TrialsPanel, snapshot: Callable[..., Snapshot], tried: SessionRecord
+) -> None:
+    panel.resize(360, 290)
+    record, message = button(panel, QToolButton, "Record trial"), child(panel, QLabel, "message")
+    places = set()
+    for seen in (snapshot(State.SHOW_HAND), replace(tuned(snapshot), record=tried)):
+        panel.show_snapshot(seen)
+        for _ in range(3):  # a layout may ask for another
+            QApplication.processEvents()
+        assert message.isVisible()
+        assert message.geometry().bottom() < record.geometry().top(), "at the top"
+        places.add(record.geometry().getRect())
+    assert message.text() == "Fine-tune φ of the right eye, then record."
+    assert len(places) == 1, "no button moves with it"
+    key = child(panel, KeyCap)
+    assert (key.text(), key.isVisible()) == ("T", True)
+    assert 0 < record.x() - key.geometry().right() < SPACING_PX + 2
 
 
 def test_the_target_in_the_headset_follows_the_choices(
@@ -334,7 +356,7 @@ def test_a_blinded_comparison_is_asked_for_step_by_step(
         better.click()
     assert answered.args == ["second"]
     with qtbot.waitSignal(panel.end_comparison_requested):
-        button(panel, QPushButton, "Cancel").click()
+        button(panel, QPushButton, "Stop comparing").click()
     panel.show_snapshot(applied)
     assert begin.isVisible()
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 
@@ -18,7 +19,7 @@ from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset
 from handcal_gui.windows.evaluation.track_dialog import TrackDialog
-from tests.gui.helpers import child
+from tests.gui.helpers import child, letters
 
 Make = Callable[[str, Any], TrackDialog]
 
@@ -66,9 +67,15 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
 
     dialog = make("virtual", track)
     start, stop = button(dialog, "start"), button(dialog, "cancel")
+    first, move = (child(dialog, QLabel, name) for name in ("trackStart", "trackMove"))
+    assert first.isVisible()
+    assert first.mapTo(dialog, QPoint()).y() < dialog.form.y(), "at the top"
+    top_px = dialog.form.y()
     start.click()
+    assert move.isVisible()
+    assert dialog.form.y() == top_px
     assert not start.isEnabled()
-    assert stop.text() == "Stop"
+    assert stop.text() == "S&top"
     table = dialog.findChild(QTableWidget, "pose-of-the-cube")
     assert isinstance(table, QTableWidget)
     qtbot.waitUntil(lambda: table.rowCount() == 3, timeout=60_000)
@@ -115,6 +122,11 @@ def test_the_failure_of_a_camera_is_shown_and_it_can_be_started_again(
     button(dialog, "start").click()
     qtbot.waitUntil(lambda: "RealSense camera is connected" in finding(dialog), timeout=60_000)
     qtbot.waitUntil(button(dialog, "start").isEnabled, timeout=60_000)
+
+
+def test_every_field_has_a_letter_of_its_own(make: Make) -> None:
+    found = letters(make("virtual", track_cube))
+    assert len(set(found)) == len(found) == 3
 
 
 def test_closing_stops_a_tracker_that_does_not_end_by_itself(qtbot: QtBot, make: Make) -> None:

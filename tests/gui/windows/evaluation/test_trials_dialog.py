@@ -25,6 +25,7 @@ from handcal.station.user_test import StudyLeader, TrialOrder
 from handcal.types import Float64
 from handcal_gui.evaluation_entries import UserEntries
 from handcal_gui.windows.evaluation.trials_dialog import STEP_M, TrialsDialog
+from tests.gui.helpers import letters
 from tests.helpers import ROOT
 
 Kind = TypeVar("Kind", bound=QWidget)
@@ -124,6 +125,13 @@ def test_a_failure_is_shown_and_trials_can_be_started_again(
     found = part(dialog, QLabel, "trialsFound")
     qtbot.waitUntil(lambda: "did not come to rest" in found.text(), timeout=20_000)
     qtbot.waitUntil(start.isEnabled, timeout=20_000)
+
+
+def test_every_field_has_a_letter_of_its_own(
+    make: Callable[[Recorder], TrialsDialog],
+) -> None:
+    found = letters(make(Recorder()))
+    assert len(set(found)) == len(found) == 4
 
 
 def test_closing_ends_a_running_trial(

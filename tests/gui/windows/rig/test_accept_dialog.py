@@ -67,7 +67,7 @@ def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> Non
     assert not part(dialog, QPushButton, "runAcceptance").isEnabled()
     part(dialog, QPushButton, "left-board").click()
     taking = part(dialog, TakeDialog, "takeDialog")
-    assert {"Viewpoint camera", "Depth camera"} <= {
+    assert {"&Viewpoint camera", "&Depth camera"} <= {
         label.text() for label in taking.findChildren(QLabel)
     }
     taking.reject()

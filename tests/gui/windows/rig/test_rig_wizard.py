@@ -36,6 +36,7 @@ from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from handcal_gui.windows.rig.wizard import RigWizard
+from tests.gui.helpers import letters
 
 BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
 
@@ -366,13 +367,8 @@ def test_each_step_has_one_main_button_which_its_key_presses(
         (main,) = (one for one in wizard.findChildren(MainButton) if one.isVisible())
         buttons = [one for one in wizard.findChildren(QPushButton) if one.isVisible()]
         assert [one for one in buttons if one.isDefault()] == [main]
-        letters = [found[1] for one in buttons if (found := re.search("&(.)", one.text()))]
-        for tabs in wizard.findChildren(QTabWidget):
-            if tabs.isVisible():
-                texts = [tabs.tabText(place) for place in range(tabs.count())]
-                letters += [found[1] for text in texts if (found := re.search("&(.)", text))]
-        letters = [letter.lower() for letter in letters]
-        assert len(letters) == len(set(letters)) >= 4
+        found = letters(wizard, is_shown=True)
+        assert len(found) == len(set(found)) >= (13 if step == 0 else 4)
         (key,) = (one for one in wizard.findChildren(QLabel, "mainKey") if one.isVisible())
         assert key.text() == "Ctrl+Return"
         main.clicked.disconnect()

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton
+from PySide6.QtWidgets import QAbstractButton, QCheckBox, QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.playback import PlaybackSettings
@@ -18,8 +18,10 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraError
 from handcal.rig.choose import ChooseSettings
+from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.windows.rig.shots import read_color
 from handcal_gui.windows.rig.take_dialog import TakeDialog
+from tests.gui.helpers import child
 
 REALSENSE_SETTINGS = RealSenseSettings(serial="42")
 
@@ -90,6 +92,30 @@ def test_both_cameras_images_are_taken(
     np.testing.assert_array_equal(depth, cameras["0"].image)
     dialog.accept()
     assert not any(camera.is_open for camera in cameras.values())
+
+
+def test_what_to_do_stands_above_and_moves_no_button(qtbot: QtBot, dialog: TakeDialog) -> None:
+    def places() -> list[object]:
+        buttons = (one for one in dialog.findChildren(QAbstractButton) if one.isVisible())
+        return [one.mapTo(dialog, QPoint()).toTuple() for one in buttons]
+
+    def told() -> str:
+        (task,) = (one for one in tasks if one.isVisible())
+        assert task.mapTo(dialog, QPoint()).y() < child(dialog, LiveCameras).y(), "at the top"
+        return task.text()
+
+    tasks = [child(dialog, QLabel, name) for name in ("takeShow", "takeTake", "takeWait")]
+    before = places()
+    assert told() == "Choose the cameras and press Show."
+    start(qtbot, dialog)
+    assert told() == "Press Take while nothing moves. Close when there are enough."
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: "corners" in said(dialog))
+    assert places() == before
+    child(dialog, QCheckBox, "byItself").click()
+    assert told() == "Images are taken automatically. Close when there are enough."
+    qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
+    assert places() == before
 
 
 def test_a_failing_camera_is_reported_and_can_be_shown_again(

@@ -1,0 +1,152 @@
+"""Letters with Alt, and keys of panels: each leads to one place, and every button has one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import partial
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QLineEdit,
+    QPushButton,
+    QTabWidget,
+    QToolButton,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+from handcal.register.results import Results
+from handcal.session.session import SessionRecord
+from handcal.station.states import State
+from handcal_gui.docks import is_in_sight
+from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.program import Program
+from handcal_gui.widgets.legend import LegendEntry
+from tests.gui.helpers import button, child, letters
+from tests.gui.views import all_views
+from tests.gui.window.conftest import Maker, press, say
+
+EACH_SIZE = pytest.mark.parametrize("size_px", [(960, 510), (1920, 1050)])
+
+
+def raised(qtbot: QtBot, program: Program) -> Iterator[list[QWidget]]:
+    """Raise each dock and each of its tabs in turn, and yield the docks then in sight."""
+    docks = [dock for dock in program.window.docks.values() if not dock.isHidden()]
+    for dock in docks:
+        dock.raise_()
+        qtbot.waitUntil(partial(is_in_sight, dock))
+        tabs = dock.findChildren(QTabWidget)
+        for i in range(max([1, *(tab.count() for tab in tabs)])):
+            for tab in tabs:
+                tab.setCurrentIndex(i)
+            QApplication.processEvents()
+            yield [one.widget() for one in docks if is_in_sight(one)]
+
+
+def of_docks(qtbot: QtBot, program: Program) -> list[list[str]]:
+    """Return the letters of the docks that can be in sight together."""
+    return [
+        [letter for dock in docks for letter in letters(dock, is_shown=True)]
+        for docks in raised(qtbot, program)
+    ]
+
+
+def begin(program: Program, snapshot: Maker, size_px: tuple[int, int], **changes: object) -> None:
+    window, seen = program.window, snapshot(State.APPLIED, **changes)
+    window.resize(*size_px)
+    window.show_page("live")
+    window.panels.link.show_pairing("192.168.178.105:50123", "a pairing key", is_virtual=True)
+    for panel in window.panels.all():
+        panel.show_snapshot(seen)
+
+
+@EACH_SIZE
+def test_each_letter_of_a_calibration_leads_to_one_place(
+    qtbot: QtBot, program: Program, snapshot: Maker, record: SessionRecord, size_px: tuple[int, int]
+) -> None:
+    window, guide = program.window, program.wizard_panel
+    panels = []
+    for changes in ({}, {"comparing": "first", "has_compared_both": True}):
+        begin(program, snapshot, size_px, **changes)
+        child(window, QPushButton, "comparison-cancel").show()  # while it is solved
+        panels += of_docks(qtbot, program)
+    assert {letter for shown in panels for letter in shown} == {*"wcenkpog"}
+    menus = letters(window, is_shown=True)[:4]
+    assert menus == [*"ftvh"]
+    for view in all_views(snapshot, record):
+        say(program, snapshot(State.APPLIED), view)
+        around = [letter for one in (guide, guide.bar) for letter in letters(one, is_shown=True)]
+        for shown in panels:
+            found = [*menus, *around, *shown]
+            assert len(set(found)) == len(found), (view.sentence, "".join(found))
+
+
+def test_a_letter_leads_to_the_panel_in_sight_and_to_none_behind_tabs(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    begin(program, snapshot, (1920, 1050))
+    window, panels = program.window, program.window.panels
+    window.activateWindow()
+    qtbot.waitActive(window)
+    alt = Qt.KeyboardModifier.AltModifier
+    whole = child(panels.wearer_view, QCheckBox, "wearer-view-whole")
+    shown = button(panels.link, QPushButton, "Show key")
+    eye_distance = child(panels.session, QLineEdit, "eyeDistance")
+    window.docks["link"].raise_()
+    for key in (Qt.Key.Key_W, Qt.Key.Key_O, Qt.Key.Key_G):  # of panels behind it
+        press(window, key, alt)
+    press(window, Qt.Key.Key_K, alt)
+    qtbot.waitUntil(shown.isChecked)
+    assert not whole.isChecked()
+    window.docks["wearer_view"].raise_()
+    press(window, Qt.Key.Key_W, alt)
+    qtbot.waitUntil(whole.isChecked)
+    window.docks["session"].raise_()
+    press(window, Qt.Key.Key_E, alt)
+    qtbot.waitUntil(eye_distance.hasFocus)
+    window.docks["trials"].raise_()
+    with qtbot.waitSignal(panels.trials.compare_requested):
+        press(window, Qt.Key.Key_C, alt)  # also of two panels behind it
+
+
+@EACH_SIZE
+def test_each_letter_of_a_stored_session_leads_to_one_place(
+    qtbot: QtBot,
+    program: Program,
+    record: SessionRecord,
+    results: Results,
+    size_px: tuple[int, int],
+) -> None:
+    window = program.window
+    window.resize(*size_px)
+    review = child(window, ReviewPage)
+    review.show_session(record, results, 8.0)
+    window.panels.session.show_record(record, results)
+    window.panels.results.show_results(results, record.alignments, record.rig)
+    window.show_page("review")
+    around = letters(review, is_shown=True)
+    assert len(around) == 4
+    for shown in of_docks(qtbot, program):
+        found = [*"ftvh", *around, *shown]
+        assert len(set(found)) == len(found), found
+
+
+def test_every_button_of_a_panel_has_a_letter_or_names_its_key(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    for changes in ({}, {"comparing": "first", "has_compared_both": True}):
+        begin(program, snapshot, (1920, 1050), **changes)
+        for docks in raised(qtbot, program):
+            for dock in docks:
+                if dock.objectName() in ("fineTune", "results-panel"):
+                    continue
+                kinds = (QCheckBox, QPushButton, QToolButton)
+                for one in (found for kind in kinds for found in dock.findChildren(kind)):
+                    entry = one.parentWidget()
+                    told = entry.toolTip() if isinstance(entry, LegendEntry) else one.toolTip()
+                    has_key = "&" in one.text() or re.search(r"\(.+\)", told)
+                    assert has_key or not one.isVisible(), (one.text(), told)
