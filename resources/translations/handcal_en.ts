@@ -416,15 +416,15 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Near plane (OpenGL, Unity)</source>
+        <source>Ne&amp;ar plane (OpenGL, Unity)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Far plane (OpenGL, Unity)</source>
+        <source>&amp;Far plane (OpenGL, Unity)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Export to</source>
+        <source>Export &amp;to</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -477,10 +477,6 @@
     </message>
     <message>
         <source>{} not exported, see below.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Open folder</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -771,6 +767,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>F4</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open the list, or choose the file or folder, of the field</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Esc</source>
         <translation type="unfinished"></translation>
     </message>
@@ -827,7 +831,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Calibrate a&amp;gain</source>
+        <source>Calibrate &amp;again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -987,6 +991,10 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Settin&amp;gs…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Camera</source>
         <translation type="unfinished"></translation>
     </message>
@@ -996,10 +1004,6 @@ local network can read them.</source>
     </message>
     <message>
         <source>Serial number</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Settings…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1032,6 +1036,10 @@ local network can read them.</source>
     </message>
     <message>
         <source>at</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cop&amp;y</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1129,6 +1137,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}; make it readable, restore it from a backup, or delete it in All sessions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Resume</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1177,15 +1189,19 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Choose folder…</source>
+        <source>Choose fo&amp;lder…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>All sess&amp;ions…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Evaluate…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Search, compare, export and repair sessions</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>A&amp;ll sessions…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1198,10 +1214,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Measure the accuracy of calibrations</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Evalua&amp;te…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1241,6 +1253,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Co&amp;nnect…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Wearer</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1262,10 +1278,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Each calibration gets its own folder in this folder.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Connect…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1441,6 +1453,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Verify &amp;left eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solving…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1458,10 +1474,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>&amp;Add alignment</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Verify l&amp;eft eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1657,14 +1669,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Finish with &amp;one eye</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Add l&amp;eft eye</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Add &amp;right eye</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1674,6 +1678,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>&amp;Skip</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>F&amp;inish with one eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Add &amp;left eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2006,6 +2018,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Freeze (F)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Displayed image</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2275,10 +2291,6 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>against the solved φ</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>against the offline φ</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2303,10 +2315,6 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Set φ to the one solved from the alignments</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Reset to offline</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2327,7 +2335,19 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show the solved φ in the headset while checked</source>
+        <source>The calibrated φ is the one with which the headset draws after the calibration: the solved φ, or 0 for an eye that keeps the offline calibration. A trial records its error.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>against the calibrated φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Set φ to the one solved from the alignments, used or not</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the φ solved from the alignments, used or not, while checked</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2527,7 +2547,7 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>New key…</source>
+        <source>&amp;New key…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2539,10 +2559,6 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Key</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Address</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2551,7 +2567,11 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Restart headset</source>
+        <source>&amp;Connect…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>R&amp;estart headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2599,15 +2619,19 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Ca&amp;ncel</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Δ: {} minus {}. σ and expected error are realistic only for “consistent”; the other methods&apos; are too small.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Cance&amp;l</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Difference</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Difference: {} minus {}. σ and expected error are realistic only for “consistent”; the other methods&apos; are too small.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2623,21 +2647,30 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>RMS to points (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS to surface (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance from the hand&apos;s points to their partners on the cursor at each iteration
+of each alignment, root mean square.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance from the hand&apos;s points to the cursor&apos;s surface, along its normals, at each
+iteration of each alignment, root mean square. It is less than the RMS to points
+among the numbers of each eye, which is to single points of the cursor.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Convergence</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Iteration</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>RMS distance (mm)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>RMS distance between matched points of hand and cursor at each iteration
-of each alignment. “consistent” measures it along the surface&apos;s normals,
-which is less than the RMS in the table.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2881,11 +2914,11 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Inspect in 3D</source>
+        <source>I&amp;nspect in 3D</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Export…</source>
+        <source>Ex&amp;port…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2929,7 +2962,7 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Eye distance (mm)</source>
+        <source>&amp;Eye distance (mm)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2945,23 +2978,23 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show first</source>
+        <source>Sho&amp;w first</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show second</source>
+        <source>Sh&amp;ow second</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>First is better</source>
+        <source>First is b&amp;etter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Second is better</source>
+        <source>Se&amp;cond is better</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Neither</source>
+        <source>&amp;Neither</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2982,7 +3015,11 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Blinded comparison</source>
+        <source>Blinded &amp;comparison</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Stop com&amp;paring</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2998,15 +3035,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Fine-tune φ until the drawn target covers the real one, then record. A trial is the error of the solved φ relative to the fine-tuned one.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>φ of the {} has not been touched since its last trial at this distance. Press T again if this is a separate trial.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Show the target in the headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3019,6 +3048,14 @@ and record which fits the hand better. The report says which was which.</source>
     </message>
     <message>
         <source>φ of the {} has not been fine-tuned: the error would be 0 px. Press T again if the wearer sees no error.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A trial is the error of the calibrated φ relative to the φ with which the drawn target covers the real one. The calibrated φ is the solved one, or 0 for an eye that keeps the offline calibration.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the tar&amp;get in the headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3038,7 +3075,11 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Next: {}</source>
+        <source>Fine-tune φ of the {}, then record.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Record the error of the calibrated φ relative to the φ set by hand (T)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3059,10 +3100,6 @@ and record which fits the hand better. The report says which was which.</source>
     </message>
     <message>
         <source>Record trial</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Record the error of the solved φ relative to the φ set by hand (T)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3144,11 +3181,11 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Whole display</source>
+        <source>&amp;Whole display</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Before calibration</source>
+        <source>Before &amp;calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3252,7 +3289,7 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>They are lost if the calibration ends now. Cancel, and make room for them.</source>
+        <source>They are lost if the calibration ends now. Cancel, and see to this first.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3479,7 +3516,15 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Co&amp;py</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Show the pairing key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show &amp;key</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3491,7 +3536,7 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Hide</source>
+        <source>Hide &amp;key</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3552,6 +3597,10 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>Choose {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} ({} in the field)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3682,11 +3731,8 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>RMS (mm)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Distance between hand and cursor after registration, root mean square over the inliers</source>
+        <source>Distance from the hand&apos;s points to their partners on the cursor after registration,
+root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3778,14 +3824,6 @@ in arcminutes. 1′ is 0.15 mm at 0.5 m.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>RMS mm</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Distance between hand and cursor after registration, in millimetres</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Inliers %</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3852,6 +3890,14 @@ and in front of the rig&apos;s viewpoint, in millimetres; the left eye above the
     </message>
     <message>
         <source>φ mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>RMS to points mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance from the hand&apos;s points to their partners on the cursor, in millimetres</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4194,6 +4240,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>no session in {} holds a trial: record some in the panel Trials, or choose one session and press Record…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>choose a folder of frames with true masks</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4214,11 +4264,67 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Si&amp;ze</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Simulated wearers; each uses every method.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Wearers</source>
+        <source>&amp;Wearers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ca&amp;ptures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>C&amp;ube</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Camera &amp;intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ri&amp;g file</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Grid s&amp;quares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Seed of the rendering</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses &amp;at each position</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Align&amp;ments at each</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Seed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Processes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Dask scheduler</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Results fold&amp;er</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4270,10 +4376,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Camera intrinsics</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Display</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4286,23 +4388,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Seed of the rendering</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Poses at each position</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Alignments at each</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Folder of one session, or a folder that contains sessions.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4319,6 +4413,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Nearest object, by depth alone</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fra&amp;mes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Hand</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4343,14 +4445,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Address of a Dask cluster that does the work instead, such as tcp://HOST:PORT.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Seed</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Processes</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4482,6 +4576,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>; make it readable, or restore it from a backup</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Repairing {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4590,6 +4688,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Contents</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>, the first {} listed</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4634,7 +4736,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Large view</source>
+        <source>Lar&amp;ge view</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4647,6 +4749,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Looking for cameras</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>press Take once the image shows this</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4718,7 +4824,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Poses at each</source>
+        <source>&amp;Positions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Poses &amp;at each</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Renderings</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4826,6 +4940,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Paired headset, RealSense</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4839,6 +4957,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Track the cube</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Tracked &amp;by</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4866,15 +4988,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Stop</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Start</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>choose what tracks the cube, and press Start</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4907,6 +5021,18 @@ one turns out.</source>
     </message>
     <message>
         <source>the cube is at rest</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose what tracks the cube and press Start.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Put the cube where the depth camera sees it. Press Stop to end.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>S&amp;top</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5130,10 +5256,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Printed by OpenCV before 4.6</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Boards with an even number of rows started with a white square.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5163,6 +5285,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Save as &amp;PDF…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print&amp;ed by OpenCV before 4.6</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5230,19 +5356,31 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Boar&amp;d</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>S&amp;quares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Square</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Marker</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Di&amp;ctionary</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>P&amp;aper</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Board</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Squares</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Square</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Marker</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5910,15 +6048,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Choose the cameras and press Show.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose the camera and press Show.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press Take while nothing moves. Close when there are enough.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Images are taken automatically. Close when there are enough.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Automatically</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Take an image whenever the board is at rest, sharp, and at a position not covered by earlier images.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>choose the cameras, and press Show</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
