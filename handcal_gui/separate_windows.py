@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QWidget
 
 from handcal.errors import FileError, HandcalError
 from handcal.export.export import ExportSettings, export_session
@@ -135,7 +136,8 @@ class SeparateWindows(QObject):
     def show_library(self, folder: Path | None = None) -> LibraryWindow:
         """Show the sessions of a folder, by default of the session folder."""
         folder = folder or self._start.new.settings.sessions_path
-        from handcal_gui.windows.library.window import LibraryWindow
+        with _wait_cursor():
+            from handcal_gui.windows.library.window import LibraryWindow
 
         window = LibraryWindow(folder, self._window)
         window.open_requested.connect(self.open_requested)
@@ -184,8 +186,9 @@ class SeparateWindows(QObject):
 
     def calibrate_rig(self) -> RigWizard | None:
         """Open the wizard of the offline calibration; return None if its folder cannot be used."""
-        from handcal_gui.windows.rig.project_folder import ProjectFolder
-        from handcal_gui.windows.rig.wizard import RigWizard
+        with _wait_cursor():
+            from handcal_gui.windows.rig.project_folder import ProjectFolder
+            from handcal_gui.windows.rig.wizard import RigWizard
 
         try:
             folder = ProjectFolder(self._current.folder / "rig")
@@ -199,8 +202,9 @@ class SeparateWindows(QObject):
 
     def evaluate(self) -> EvaluationWindow:
         """Show the evaluation window; there is at most one."""
-        from handcal_gui.windows.evaluation.specs import make_specs
-        from handcal_gui.windows.evaluation.window import EvaluationWindow
+        with _wait_cursor():
+            from handcal_gui.windows.evaluation.specs import make_specs
+            from handcal_gui.windows.evaluation.window import EvaluationWindow
 
         opened = [one for one in self._window.findChildren(EvaluationWindow) if one.isVisible()]
         if opened:
@@ -268,3 +272,13 @@ class SeparateWindows(QObject):
 
     def _remember_evaluation(self, entries: EvaluationEntries) -> None:
         self._current.change(evaluation=entries)
+
+
+@contextmanager
+def _wait_cursor() -> Iterator[None]:
+    """Show the wait cursor meanwhile: what a window needs takes up to some seconds to import."""
+    QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
+    try:
+        yield
+    finally:
+        QApplication.restoreOverrideCursor()
