@@ -8,6 +8,7 @@ segmented, and about 30 a second are checked by the guard and shown in all panel
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import subprocess
 import sys
@@ -211,6 +212,7 @@ def measure(frames: int, rate_hz: int) -> list[BenchFigure]:
         program = Program(PreferencesFile(folder / "preferences.json"))
         program.window.resize(1920, 1080)
         program.window.show()
+        gc.freeze()  # as the program
         # No camera is opened for a recording, and the frames are in memory.
         settings = StationSettings(
             source="recording",
