@@ -73,14 +73,15 @@ class FileLock:
             is_same = False
         except OSError as error:
             raise FileError(f"cannot read {self._path}: {error.strerror or error}") from error
+        if is_same:
+            return
         folder = self._path.parent
-        if not is_same and not os.path.exists(folder):
+        if not os.path.exists(folder):
             raise FileError(f"cannot write to {folder}: it was moved or deleted")
-        if not is_same:
-            raise FileError(
-                f"cannot write to {folder}: it was replaced or restored, or its lock was deleted, "
-                "so another program may be writing to it; open it again"
-            )
+        raise FileError(
+            f"cannot write to {folder}: it was replaced or restored, or its lock was deleted, so "
+            "another program may be writing to it; open it again"
+        )
 
     def release(self) -> None:
         """Release the lock; safe to call twice."""

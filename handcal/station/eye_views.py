@@ -23,12 +23,12 @@ from handcal.types import EYES, Eye, Float64
 
 _PERIOD_S = 0.2
 _STALE_NS = 2_000_000_000
-"""Age of a moment whose second eye is no longer rendered: the hand was out of sight since."""
+"""Age of a moment whose second eye is no longer rendered: the hand has been out of sight."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Moment:
-    """What the views of both eyes show."""
+    """The hand, drawings and scene that the views of both eyes show."""
 
     hand: PlacedHand
     cursor: PlacedHand | None
@@ -111,13 +111,12 @@ class EyeViews:
     def _begin(
         self, hand: PlacedHand, targets_E_m: Mapping[Eye, Float64], is_offline: bool
     ) -> _Moment:
-        calibration = self._calibration
-        drawn_shift_m = {eye: calibration.applied_shift_m[eye] for eye in EYES}
+        applied_m = self._calibration.applied_shift_m
         return _Moment(
             hand,
-            calibration.cursor,
+            self._calibration.cursor,
             dict(targets_E_m),
-            {eye: np.zeros(3) for eye in EYES} if is_offline else drawn_shift_m,
+            {eye: np.zeros(3) if is_offline else applied_m[eye] for eye in EYES},
             self._simulation.scene_at(hand.t_host_ns) if self._simulation is not None else None,
         )
 

@@ -88,8 +88,7 @@ class NumberTable(QTableWidget):
         self.clearSpans()
         self.setColumnCount(len(columns))
         self.setRowCount(len(rows))
-        # A unit, which may follow a comma, has a line of its own: columns are narrower then.
-        self.setHorizontalHeaderLabels([column.replace(", ", "\n") for column in columns])
+        self.setHorizontalHeaderLabels(list(map(_heading, columns)))
         for number, row in enumerate(rows):
             self.setVerticalHeaderItem(number, QTableWidgetItem(row.label))
             for column, text in enumerate(row.cells):
@@ -118,12 +117,12 @@ class NumberTable(QTableWidget):
         columns, room_px = range(self.columnCount()), self.viewport().width()
         for column in columns:
             self.showColumn(column)  # a hidden one has no width
-        for is_wrapped in (False, True) if self._wraps else (False,):
-            if self._wraps:
-                self._wrap(is_wrapped)
+        if self._wraps:
+            self._wrap(False)
+        needed_px = self._needed_px()
+        if self._wraps and sum(needed_px) > room_px:
+            self._wrap(True)
             needed_px = self._needed_px()
-            if sum(needed_px) <= room_px:
-                break
         fits = [c == 0 or sum(needed_px[: c + 1]) <= room_px for c in columns]
         shown = [column for column in columns if fits[column] or not self._hides]
         spare_px = max(0, room_px - sum(needed_px[column] for column in shown))
@@ -144,7 +143,8 @@ class NumberTable(QTableWidget):
         line_px = QFontMetrics(number_font()).lineSpacing()
         for column, title in enumerate(self._columns):
             if (heading := self.horizontalHeaderItem(column)) is not None:
-                heading.setText(title.replace("-", "-\n") if is_wrapped else title)
+                text = _heading(title)
+                heading.setText(text.replace("-", "-\n") if is_wrapped else text)
         for number, row in enumerate(self._rows):
             texts = [_PARTS.sub("\n", cell) if is_wrapped else cell for cell in row.cells]
             for column, text in enumerate(texts):
@@ -168,6 +168,11 @@ def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:
     """Return rows as tab-separated lines, with a line of headings first."""
     lines = [("", *columns), *((row.label, *row.cells) for row in rows)]
     return "\n".join("\t".join(line) for line in lines)
+
+
+def _heading(column: str) -> str:
+    """Return a heading; a unit, which may follow a comma, has its own line and needs less width."""
+    return column.replace(", ", "\n")
 
 
 def _number_item(text: str) -> QTableWidgetItem:

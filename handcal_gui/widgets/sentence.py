@@ -1,4 +1,4 @@
-"""Capitalization of engine messages, which begin in lower case."""
+"""Messages of the engine as the window shows them: capitalised, and with advice."""
 
 from __future__ import annotations
 
@@ -6,3 +6,8 @@ from __future__ import annotations
 def sentence(text: str) -> str:
     """Return a text with its first letter capitalized."""
     return text[:1].upper() + text[1:]
+
+
+def with_advice(text: str, advice: str) -> str:
+    """Return a text with advice after a semicolon, unless it has some there."""
+    return text if "; " in text else f"{text}; {advice}"

@@ -80,7 +80,7 @@ def find_lines(lines: Iterable[Line], words: str) -> list[Line]:
 
 
 def in_reading_order(lines: Iterable[Line], start: Path) -> list[Line]:
-    """Return lines in the order in which a page links to theirs; after it, and before all others.
+    """Return the lines of a page, then of the pages that it links to in order, then all others.
 
     Parameters
     ----------

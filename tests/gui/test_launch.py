@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
@@ -42,6 +43,7 @@ def test_text_typed_while_it_starts_goes_to_the_wearers_name_and_no_other_key_do
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # put back at the end
     for name in ("setApplicationDisplayName", "setWindowIcon"):
         monkeypatch.setattr(qapp, name, lambda _: None)
+    monkeypatch.setattr(launch, "gc", SimpleNamespace(freeze=lambda: None, enable=lambda: None))
     for name in ("close_on_signals", "_log_to"):
         monkeypatch.setattr(launch, name, lambda *_: None)
     arguments = Namespace(

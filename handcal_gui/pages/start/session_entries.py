@@ -18,6 +18,7 @@ from handcal.types import Eye
 from handcal_gui.preferences import MOST_RECENT
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.sentence import with_advice
 from handcal_gui.widgets.times import local_time
 
 
@@ -110,11 +111,8 @@ def _unreadable(path: Path, why: str) -> Entry:
     """Return a session that cannot be chosen, with the reason and what to do."""
     named = why.replace(str(path), path.name)
     text = named if path.name in named else f"{path.name}: {named}"
-    if "; " not in named:  # which advice follows
-        text = tr(
-            "{}; make it readable, restore it from a backup, or delete it in All sessions"
-        ).format(text)
-    return Entry(path, text, is_enabled=False)
+    advice = tr("make it readable, restore it from a backup, or delete it in All sessions")
+    return Entry(path, with_advice(text, advice), is_enabled=False)
 
 
 def _text(wearer: str, started: str, alignments: int, verified: int, trials: int) -> str:

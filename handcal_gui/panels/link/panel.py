@@ -112,8 +112,8 @@ class LinkPanel(QWidget):
         word = tr("Connected") if is_connected else tr("Not connected")
         self._sign.setAccessibleName(word)
         # A problem says by itself that no headset is connected.
-        known = [word] if is_connected or not problem else []
-        self._state.setText(". ".join([*known, sentence(problem)] if problem else known))
+        both = f"{word}. {sentence(problem)}" if is_connected and problem else ""
+        self._state.setText(both or sentence(problem) or word)
 
     def _draw_sign(self) -> None:
         drawn = (

@@ -20,6 +20,7 @@ from handcal.session.record import replay
 from handcal.session.repair import check_session, repair_session
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.sentence import with_advice
 from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.library.sessions_model import SessionRow, make_row
 
@@ -61,11 +62,10 @@ def _require_sound(path: Path) -> None:
     named = "; ".join(one.what if found.state == "none" else str(one) for one in damaged)
     more = len(found.damaged) - _MOST_NAMED
     others = tr(" (and {} more)").format(more) if more > 0 else ""
-    advice = tr("; Repair copies what is sound")
-    if found.state == "none":  # the reason may come with advice
-        unread = tr("; make it readable, or restore it from a backup")
-        advice = "" if "; " in named else unread
-    raise FileError(f"{named}{others}{advice}")
+    if found.state == "none":
+        advice = tr("make it readable, or restore it from a backup")
+        raise FileError(with_advice(f"{named}{others}", advice))
+    raise FileError(f"{named}{others}{tr('; Repair copies what is sound')}")
 
 
 def repair_beside(path: Path, progress: Progress) -> str:

@@ -60,3 +60,24 @@ def test_last_columns_that_do_not_fit_may_be_in_the_tooltips(qtbot: QtBot) -> No
     table.resize(900, 120)
     assert [table.isColumnHidden(column) for column in range(2)] == [False, False]
     assert item.toolTip() == "each counts once"
+
+
+def test_parts_of_cells_and_headings_have_their_own_lines_where_not_all_columns_fit(
+    qtbot: QtBot,
+) -> None:
+    table = NumberTable("some-numbers", "Some numbers", wraps=True)
+    qtbot.addWidget(table)
+    table.show_rows(("icp-open3d, mm",), (Row("φ1", ("−2.00 ± 0.10",)),))
+    table.show()
+    cell, heading = table.item(0, 0), table.horizontalHeaderItem(0)
+    assert cell is not None
+    assert heading is not None
+    heights_px = []
+    for width_px in (600, 60):
+        table.resize(width_px, 120)
+        heights_px.append(table.rowHeight(0))
+        is_wide = width_px == 600
+        assert cell.text() == ("−2.00 ± 0.10" if is_wide else "−2.00\n± 0.10")
+        assert heading.text() == ("icp-open3d\nmm" if is_wide else "icp-\nopen3d\nmm")
+    assert heights_px[0] < heights_px[1]
+    assert table.as_text() == "\ticp-open3d, mm\nφ1\t−2.00 ± 0.10"

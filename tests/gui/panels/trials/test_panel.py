@@ -394,6 +394,6 @@ def test_the_legend_of_a_low_plot_is_above_it_and_whole(
 
 def test_a_trial_is_of_the_calibrated_shift_not_the_solved_one(panel: TrialsPanel) -> None:
     hint = text(panel, "trialsHint")
-    assert "the error of the calibrated φ relative to the fine-tuned one" in hint
+    assert "the error of the calibrated φ relative to the φ with which" in hint
     assert "0 for an eye that keeps the offline calibration" in hint
     assert "calibrated φ" in panel.record_action.toolTip()
