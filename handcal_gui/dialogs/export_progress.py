@@ -23,9 +23,9 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import plain_tooltip, with_name
 from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.job_bar import show_share
 from handcal_gui.widgets.numbers import pluralize
 
-_WHOLE = 1000
 _NOTHING = tr("nothing was exported; the sessions and earlier exports are unchanged")
 _NOTHING_ADVICE = tr("see the reasons below, then go back to choose another folder or try again")
 _UNCHANGED = tr("the session and earlier exports are unchanged")
@@ -37,7 +37,7 @@ class ExportProgress(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._doing: QLabel = with_name(ElidedLabel(), "doing")
-        self._bar = with_name(QProgressBar(maximum=_WHOLE), "progress", tr("Progress"))
+        self._bar = with_name(QProgressBar(), "progress", tr("Progress"))
         self._end = FindingLine("exportEnd")
         self._files = with_name(QListWidget(), "files", tr("Files"))
         self._files.setWordWrap(True)
@@ -62,7 +62,7 @@ class ExportProgress(QWidget):
     def show_progress(self, doing: str, share: float) -> None:
         """Show the present activity and the share done, 0..1."""
         self._doing.setText(f"{doing}…")
-        self._bar.setValue(round(_WHOLE * share))
+        show_share(self._bar, share)
 
     def show_files(self, folder: Path, made: Exported) -> None:
         """Show the files written, below the sessions that were not exported."""

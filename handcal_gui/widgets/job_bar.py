@@ -17,6 +17,12 @@ from handcal_gui.widgets.fields import button, fill_row, with_name
 _WHOLE = 1000
 
 
+def show_share(bar: QProgressBar, share: float) -> None:
+    """Show the share that is done, 0..1."""
+    bar.setRange(0, _WHOLE)
+    bar.setValue(round(_WHOLE * share))
+
+
 class JobBar(QWidget):
     """Runs jobs one at a time; its space stays reserved in between.
 
@@ -90,8 +96,7 @@ class JobBar(QWidget):
     def _show_progress(self, doing: str, share: float) -> None:
         if self._cancel.isEnabled():
             self._doing.setText(f"{doing}…")
-        self._bar.setRange(0, _WHOLE)
-        self._bar.setValue(round(_WHOLE * share))
+        show_share(self._bar, share)
 
     def _succeed(self, done: object) -> None:
         self._end()

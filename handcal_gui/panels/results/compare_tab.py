@@ -20,11 +20,11 @@ from handcal.types import METHODS, Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.job_bar import show_share
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.result_rows import comparison_rows
 
-_WHOLE = 1000
 _MEANINGS: Mapping[Method, str] = {
     "paper": tr("as published by Hu et al. 2021; slow."),
     "linear": tr("the paper's model, solved with all three rows of each pair."),
@@ -106,8 +106,7 @@ class CompareTab(QWidget):
 
     def show_progress(self, share: float) -> None:
         """Show the share that is done, 0..1."""
-        self._progress.setRange(0, _WHOLE)
-        self._progress.setValue(round(_WHOLE * share))
+        show_share(self._progress, share)
 
     def show_failure(self, text: str) -> None:
         """Show the reason why there is no comparison."""
@@ -143,12 +142,5 @@ class CompareTab(QWidget):
         label = QLabel(tr("Compare &with"))
         label.setBuddy(self._methods)
         row = hbox(label, (self._methods, 1), self._compare, self._cancel, spacing=SPACING_PX)
-        vbox(
-            row,
-            self._progress,
-            self._status,
-            (self.table, 1),
-            on=self,
-            margins=SPACING_PX // 2,
-            spacing=SPACING_PX,
-        )
+        parts = row, self._progress, self._status, (self.table, 1)
+        vbox(*parts, on=self, margins=SPACING_PX // 2, spacing=SPACING_PX)
