@@ -44,6 +44,7 @@ from handcal_gui.window import MainWindow, Page
 from handcal_gui.windows.manual import Manual
 
 _AGAIN_MS = 100
+"""Wait for the code behind a closed question to go on."""
 
 
 class Program(QObject):

@@ -6,12 +6,7 @@ from functools import partial
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QAction, QResizeEvent
-from PySide6.QtWidgets import (
-    QApplication,
-    QComboBox,
-    QLabel,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QWidget
 
 from handcal.station.snapshot import Snapshot
 from handcal.types import EyePlan
