@@ -87,7 +87,8 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     # All of this stays. Searching it for garbage held up the window by 0.1 s, also from a job.
     gc.freeze()
     gc.enable()
-    app.exec()
+    if program.window.isVisible():  # or it was closed meanwhile, and nothing would end the loop
+        app.exec()
     program.close()
     if demonstration is not None and demonstration.complaint is not None:
         raise LaunchError(demonstration.complaint, 1)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QWidget
 from pytestqt.qtbot import QtBot
@@ -19,12 +19,39 @@ from handcal_gui.window import MainWindow
 from tests.gui.helpers import child
 
 
-def test_text_typed_while_it_starts_goes_to_the_wearers_name_and_no_other_key_does_anything(
-    qtbot: QtBot, qapp: QApplication, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def arguments(qapp: QApplication, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Namespace:
+    """Arguments of the command line, for a launch that leaves the tests' process as it was."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # put back at the end
+    for name in ("setApplicationDisplayName", "setWindowIcon"):
+        monkeypatch.setattr(qapp, name, lambda _: None)
+    monkeypatch.setattr(launch, "gc", SimpleNamespace(freeze=lambda: None, enable=lambda: None))
+    for name in ("close_on_signals", "_log_to"):
+        monkeypatch.setattr(launch, name, lambda *_: None)
+    return Namespace(
+        preferences=tmp_path / "preferences.json",
+        size=None,
+        session=None,
+        source=None,
+        rig=None,
+        seed=None,
+        autopilot=False,
+        screenshots=None,
+    )
+
+
+@pytest.fixture
+def first(qtbot: QtBot) -> QWidget:
+    """The window shown until the main window replaces it."""
     first = QWidget()
     qtbot.addWidget(first)
     first.show()
+    return first
+
+
+def test_text_typed_while_it_starts_goes_to_the_wearers_name_and_no_other_key_does_anything(
+    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
     keys = Qt.Key
     for key, text in (
         *((keys.Key_Space, " "), (keys.Key_A, "a"), (keys.Key_X, "x"), (keys.Key_Backspace, "")),
@@ -40,21 +67,19 @@ def test_text_typed_while_it_starts_goes_to_the_wearers_name_and_no_other_key_do
         seen.append((wearer.currentText(), window.page, first.isVisible()))
 
     monkeypatch.setattr(qapp, "exec", look)
-    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # put back at the end
-    for name in ("setApplicationDisplayName", "setWindowIcon"):
-        monkeypatch.setattr(qapp, name, lambda _: None)
-    monkeypatch.setattr(launch, "gc", SimpleNamespace(freeze=lambda: None, enable=lambda: None))
-    for name in ("close_on_signals", "_log_to"):
-        monkeypatch.setattr(launch, name, lambda *_: None)
-    arguments = Namespace(
-        preferences=tmp_path / "preferences.json",
-        size=None,
-        session=None,
-        source=None,
-        rig=None,
-        seed=None,
-        autopilot=False,
-        screenshots=None,
-    )
     launch.launch(qapp, arguments, first)
     assert seen == [("ada", "start", False)]
+
+
+def test_a_window_closed_before_the_event_loop_begins_ends_the_program(
+    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a signal does whose event is handled while keys typed at the start are read."""
+    monkeypatch.setattr(
+        launch, "close_on_signals", lambda window, _: QTimer.singleShot(0, window.close)
+    )
+    entered = []
+    monkeypatch.setattr(qapp, "exec", lambda: entered.append(True))
+    launch.launch(qapp, arguments, first)
+    assert not entered
+    assert arguments.preferences.exists()
