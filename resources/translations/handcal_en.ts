@@ -1137,7 +1137,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{}; make it readable, restore it from a backup, or delete it in All sessions</source>
+        <source>make it readable, restore it from a backup, or delete it in All sessions</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4572,11 +4572,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>; Repair copies what is sound</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>; make it readable, or restore it from a backup</source>
+        <source>make it readable, or restore it from a backup</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
