@@ -108,7 +108,7 @@ QUANTITIES = (
     *PHI,
     EXPECTED_ERROR,
     Quantity(
-        tr("RMS to points (mm)"),
+        tr("Point RMS (mm)"),
         "",
         tr(
             "Distance from the hand's points to their partners on the cursor after registration,\n"

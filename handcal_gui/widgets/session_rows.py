@@ -37,7 +37,7 @@ ALIGNMENT_COLUMNS = (
     ),
     RecordColumn(tr("φ mm"), _PHI, rank=1),
     RecordColumn(
-        tr("RMS to points mm"),
+        tr("Point RMS mm"),
         tr("Distance from the hand's points to their partners on the cursor, in millimetres"),
         rank=3,
     ),

@@ -12,7 +12,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
-_TO_POINTS, _TO_SURFACE = tr("RMS to points (mm)"), tr("RMS to surface (mm)")
+_TO_POINTS, _TO_SURFACE = tr("Point RMS (mm)"), tr("Surface RMS (mm)")
 _MEANINGS = {
     _TO_POINTS: tr(
         "Distance from the hand's points to their partners on the cursor at each iteration\n"
@@ -20,7 +20,7 @@ _MEANINGS = {
     ),
     _TO_SURFACE: tr(
         "Distance from the hand's points to the cursor's surface, along its normals, at each\n"
-        "iteration of each alignment, root mean square. It is less than the RMS to points\n"
+        "iteration of each alignment, root mean square. It is less than the Point RMS\n"
         "among the numbers of each eye, which is to single points of the cursor."
     ),
 }

@@ -57,7 +57,7 @@ def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
         another = results.expected_after_another_arcmin[eye]
         assert cells(rows, "Expected error")[column] == f"{error:.1f}′"
         assert cells(rows, "One more alignment")[column] == f"{another:.1f}′"
-        assert cells(rows, "RMS to points (mm)")[column] == f"{1e3 * shift.rms_m:.2f}"
+        assert cells(rows, "Point RMS (mm)")[column] == f"{1e3 * shift.rms_m:.2f}"
         assert cells(rows, "Inliers")[column] == f"{100 * shift.inlier_ratio:.0f} %"
         assert cells(rows, "Iterations")[column] == str(shift.iterations)
         assert f"{eye} eye {error:.1f}′ → {another:.1f}′" in another_text(results, rig)
@@ -86,12 +86,12 @@ def test_a_result_of_verifications_alone_has_no_numbers_of_a_registration(rig: R
     prior = replace(verified.fused.prior, sessions=1)
     verified = replace(verified, fused=replace(verified.fused, prior=prior))
     rows = result_rows(verified, rig)
-    for label in ("RMS to points (mm)", "Inliers", "Iterations"):
+    for label in ("Point RMS (mm)", "Inliers", "Iterations"):
         assert cells(rows, label) == (NOTHING, NOTHING)
     assert cells(rows, "Prior") == ("learned from 1 session",)
     assert cells(rows, "Solved from") == (f"1 verified eye, {verified.method}",)
     compared = {row.label: row.cells for row in comparison_rows(verified, verified, rig)}
-    assert compared["RMS to points (mm)"] == (NOTHING, NOTHING, NOTHING)
+    assert compared["Point RMS (mm)"] == (NOTHING, NOTHING, NOTHING)
     assert compared["Expected error"][2] == "+0.0′"
 
 

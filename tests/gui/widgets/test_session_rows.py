@@ -48,7 +48,7 @@ def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
         for eye, line in zip(EYES, lines, strict=True):
             shown_mm = [float(value) for value in line.split()]
             np.testing.assert_allclose(shown_mm, 1e3 * shifts[eye].shift_m, atol=0.005)
-        assert cells[column(ALIGNMENT_COLUMNS, "RMS to points mm")] == "\n".join(
+        assert cells[column(ALIGNMENT_COLUMNS, "Point RMS mm")] == "\n".join(
             f"{1e3 * shift.rms_m:.2f}" for shift in shifts.values()
         )
 
@@ -75,7 +75,7 @@ def test_one_eye_alone(
         1e3 * results.alignments[1]["right"].shift_m,
         atol=0.005,
     )
-    assert "\n" not in cells[column(ALIGNMENT_COLUMNS, "RMS to points mm")]
+    assert "\n" not in cells[column(ALIGNMENT_COLUMNS, "Point RMS mm")]
 
 
 def test_trials_as_text(record: SessionRecord) -> None:

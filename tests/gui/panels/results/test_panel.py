@@ -153,13 +153,13 @@ def test_convergence_has_a_line_for_each_alignment_and_eye(
 
 def test_the_measures_of_fit_have_different_names(solved: ResultsPanel, results: Results) -> None:
     plot = child(solved, ConvergencePlot)
-    assert plot.item.getAxis("left").labelText == "RMS to surface (mm)"
-    assert "RMS to points (mm)" in [quantity.name for quantity in QUANTITIES]
+    assert plot.item.getAxis("left").labelText == "Surface RMS (mm)"
+    assert "Point RMS (mm)" in [quantity.name for quantity in QUANTITIES]
     shift = results.alignments[1]["left"]
     full = replace(shift, method="paper"), replace(shift, history_m2=np.array([shift.rms_m**2]))
     for one in full:
         plot.show_results(replace(results, alignments={1: {"left": one}}))
-        assert plot.item.getAxis("left").labelText == "RMS to points (mm)"
+        assert plot.item.getAxis("left").labelText == "Point RMS (mm)"
 
 
 def test_lines_that_end_together_share_one_name(solved: ResultsPanel, results: Results) -> None:
