@@ -2647,21 +2647,21 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>RMS to points (mm)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>RMS to surface (mm)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Distance from the hand&apos;s points to their partners on the cursor at each iteration
 of each alignment, root mean square.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Point RMS (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Surface RMS (mm)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Distance from the hand&apos;s points to the cursor&apos;s surface, along its normals, at each
-iteration of each alignment, root mean square. It is less than the RMS to points
+iteration of each alignment, root mean square. It is less than the Point RMS
 among the numbers of each eye, which is to single points of the cursor.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3824,6 +3824,10 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Point RMS mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Inliers %</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3890,10 +3894,6 @@ and in front of the rig&apos;s viewpoint, in millimetres; the left eye above the
     </message>
     <message>
         <source>φ mm</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>RMS to points mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4573,6 +4573,10 @@ one turns out.</source>
     </message>
     <message>
         <source>make it readable, or restore it from a backup</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>; Repair copies what is sound</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

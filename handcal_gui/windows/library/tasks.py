@@ -65,7 +65,8 @@ def _require_sound(path: Path) -> None:
     if found.state == "none":
         advice = tr("make it readable, or restore it from a backup")
         raise FileError(with_advice(f"{named}{others}", advice))
-    raise FileError(f"{named}{others}{tr('; Repair copies what is sound')}")
+    repair = tr("; Repair copies what is sound")
+    raise FileError(f"{named}{others}{repair}")
 
 
 def repair_beside(path: Path, progress: Progress) -> str:
