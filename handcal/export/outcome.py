@@ -32,8 +32,9 @@ class SessionOutcome:
     results: Results | None
     """All alignments solved again; None without alignments."""
     shifts_m: Mapping[Eye, Mapping[ShiftOrigin, Float64]]
-    """each (3,); every known φ of an eye, the final one first: fine-tuned by hand, solved, and the
-    zero of the offline calibration, which precedes the solved one if the verdict is *keep*."""
+    """each (3,); every known φ of an eye, the final one first: fine-tuned by hand if that changed
+    it, solved, and the zero of the offline calibration, which precedes the solved one if the
+    verdict is *keep*."""
 
     @property
     def name(self) -> str:
@@ -95,10 +96,13 @@ def _shifts_m(
     record: SessionRecord, results: Results | None, eye: Eye
 ) -> dict[ShiftOrigin, Float64]:
     shifts_m: dict[ShiftOrigin, Float64] = {}
-    if record.fine_tuned is not None and eye in record.fine_tuned:
-        shifts_m["fine_tuned"] = record.fine_tuned[eye]
     if results is not None and eye in results.eyes:
         if results.verdicts[eye].name == "keep":
             shifts_m["offline"] = np.zeros(3)
         shifts_m["solved"] = results.eyes[eye].shift_m
-    return shifts_m | {"offline": np.zeros(3)}
+    shifts_m.setdefault("offline", np.zeros(3))
+    if record.fine_tuned is not None and eye in record.fine_tuned:
+        tuned_m = record.fine_tuned[eye]  # recorded of both eyes, and after an undo
+        if np.abs(tuned_m - next(iter(shifts_m.values()))).max() >= _SAME_M:
+            return {"fine_tuned": tuned_m, **shifts_m}
+    return shifts_m

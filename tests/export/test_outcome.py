@@ -31,6 +31,13 @@ def test_what_was_tuned_by_hand_is_final_and_what_was_solved_otherwise(
     np.testing.assert_allclose(moved_m, [0.001, 0.0, 0.0], atol=1e-15)
 
 
+def test_an_undone_fine_tuning_is_not_final(outcome: SessionOutcome) -> None:
+    solved_m = {eye: outcome.shifts_m[eye]["solved"] for eye in EYES}
+    undone = load_outcome(replace(outcome.record, fine_tuned=solved_m))
+    assert [undone.final(eye) for eye in EYES] == ["solved", "solved"]
+    assert "fine_tuned" not in undone.shifts_m["left"]
+
+
 def test_applied_is_what_the_headset_rendered_with_in_the_end(outcome: SessionOutcome) -> None:
     assert outcome.is_applied("left", "fine_tuned")
     assert not outcome.is_applied("left", "solved")
