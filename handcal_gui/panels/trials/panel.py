@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from time import monotonic
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
@@ -55,6 +56,8 @@ _ZERO = tr(
     "φ of the {} has not been fine-tuned: the error would be 0 px. "
     "Press T again if the wearer sees no error."
 )
+_LEAST_APART_S = 1.0
+"""A double click neither confirms a doubtful trial nor records a second one."""
 
 
 class TrialsPanel(QWidget):
@@ -103,6 +106,7 @@ class TrialsPanel(QWidget):
         self._eye: Eye | None = None  # of the next trial, as said last
         self._target: tuple[Eye, float] | None = None  # requested
         self._compared = 0
+        self._pressed_s = -_LEAST_APART_S
         self._comparison = ComparisonRow()
         self._comparison.begun.connect(self.compare_requested)
         self._comparison.ended.connect(self.end_comparison_requested)
@@ -253,6 +257,9 @@ class TrialsPanel(QWidget):
 
     def _ask(self) -> None:
         """Request a trial; one that may be a mistake must be requested twice."""
+        before_s, self._pressed_s = self._pressed_s, monotonic()
+        if self._pressed_s - before_s < _LEAST_APART_S:
+            return
         doubt = self._doubt()
         self._is_doubtful = bool(doubt) and not self._is_doubtful
         if self._is_doubtful:
@@ -296,6 +303,7 @@ class TrialsPanel(QWidget):
             # Also from the fine-tune panel, where the study leader works.
             context=Qt.ShortcutContext.WindowShortcut,
         )
+        self.record_action.setAutoRepeat(False)
 
     def _lay_out(self) -> None:
         record = QToolButton()

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -34,6 +35,13 @@ from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
 from tests.gui.helpers import button, child, show, text
+
+
+@pytest.fixture(autouse=True)
+def presses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let each press come two seconds after the one before."""
+    times_s = itertools.count(0.0, 2.0)
+    monkeypatch.setattr("handcal_gui.panels.trials.panel.monotonic", lambda: next(times_s))
 
 
 @pytest.fixture
@@ -144,6 +152,24 @@ def test_a_trial_of_nothing_must_be_asked_for_twice(
     panel.show_snapshot(tuned(snapshot))
     panel.record_action.trigger()
     assert len(asked) == 2
+
+
+def test_a_double_click_or_a_held_key_is_one_press(
+    panel: TrialsPanel, snapshot: Callable[..., Snapshot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    panel.trial_requested.connect(lambda *_: asked.append("trial"))
+    panel.doubted.connect(lambda _: asked.append("doubt"))
+    presses_s = iter([0.0, 0.2, 1.3, 1.5, 2.6])
+    monkeypatch.setattr("handcal_gui.panels.trials.panel.monotonic", lambda: next(presses_s))
+    panel.show_snapshot(snapshot(State.APPLIED))
+    for _ in range(4):  # two double clicks
+        panel.record_action.trigger()
+    assert asked == ["doubt", "trial"]
+    panel.show_snapshot(tuned(snapshot))
+    panel.record_action.trigger()
+    assert asked == ["doubt", "trial", "trial"]
+    assert not panel.record_action.autoRepeat()
 
 
 def test_takes_the_eyes_in_turn(
