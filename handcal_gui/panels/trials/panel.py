@@ -257,9 +257,10 @@ class TrialsPanel(QWidget):
 
     def _ask(self) -> None:
         """Request a trial; one that may be a mistake must be requested twice."""
-        before_s, self._pressed_s = self._pressed_s, monotonic()
-        if self._pressed_s - before_s < _LEAST_APART_S:
+        now_s = monotonic()
+        if now_s - self._pressed_s < _LEAST_APART_S:
             return
+        self._pressed_s = now_s
         doubt = self._doubt()
         self._is_doubtful = bool(doubt) and not self._is_doubtful
         if self._is_doubtful:
