@@ -310,6 +310,7 @@ class CalibrationController(QObject):
         host, port = station.address
         host = f"[{host}]" if ":" in host else host
         panels.camera.begin(station.settings.calibration.segment)
+        panels.cloud.clear()
         panels.fine_tune.set_rig(station.rig)
         panels.results.show_results(None, {}, station.rig)
         panels.session.set_read_only(False)

@@ -117,6 +117,9 @@ class GuidePicture(QWidget):
         self.result.hide()  # or it takes its room in the layout
         self._stack.setCurrentWidget(self._camera)
         frame, seen = snapshot.frame, snapshot.observation
+        if frame is None and not snapshot.camera.problem:  # what is shown is of another session
+            self._camera.show_image(None)
+            self._camera.show_overlay(None)
         if frame is not None and frame is not self._frame:
             self._frame = frame
             self._camera.show_image(frame.color)

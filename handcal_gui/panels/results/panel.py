@@ -103,6 +103,7 @@ class ResultsPanel(QWidget):
         self._copy.setEnabled(results is not None)
         self._stack.setCurrentIndex(0 if results is None else 1)
         if results is None:
+            self._tabs.setCurrentIndex(0)
             return
         for eye, card in self._cards.items():
             card.show_verdict(results.verdicts.get(eye))

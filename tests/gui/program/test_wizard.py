@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton, QW
 from handcal.station.states import State
 from handcal_gui.pages.wizard import step_views, steps
 from handcal_gui.pages.wizard.view import Action, Step
+from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.preferences import PreferencesFile
 from tests.gui.program.technician import (
     Technician,
@@ -58,6 +59,13 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     assert "Ada" not in file.path.read_text()  # only in the session
     assert stored.sessions == (str(record.path),)
     assert stored.station == studio.settings
+    [cloud] = window.panels.cloud.findChildren(CloudView)
+    window.panels.cloud.show_alignment(record.alignments[1])
+    shown_first: list[str] = []
+    live.program.live.opened.connect(lambda _: shown_first.append(cloud.accessibleDescription()))
+    live.program.start_calibration(studio.settings, "Grace")
+    live.wait_for_page("live")
+    assert ["Hold a hand in front" in text for text in shown_first] == [True]  # no hand of Ada's
 
 
 def test_steps_run_by_themselves_after_one_press(

@@ -73,9 +73,12 @@ def test_without_results_it_says_how_to_get_them(panel: ResultsPanel, snapshot: 
     assert empty.text().endswith("alignment or verification.")
     panel.show_snapshot(snapshot(State.SOLVED))
     assert child(panel, QTabWidget).isVisible()
+    child(panel, QTabWidget).setCurrentIndex(2)
     panel.show_snapshot(snapshot(State.SHOW_HAND))
     assert not child(panel, QTabWidget).isVisible()
     assert panel.as_text() == ""
+    panel.show_snapshot(snapshot(State.SOLVED))
+    assert child(panel, QTabWidget).currentIndex() == 0  # not what the last wearer's ended with
 
 
 def test_a_low_panel_has_room_for_all_numbers(qtbot: QtBot, solved: ResultsPanel) -> None:
