@@ -68,12 +68,13 @@ class RotationPanel(QWidget):
         procedure, observation = snapshot.procedure, snapshot.observation
         self._show_refusals(snapshot.record.refused, procedure.refusal)
         self._show_limit(procedure.guard_limit_rad)
-        if procedure.cursor is not self._cursor:
-            self._cursor = procedure.cursor
+        is_aligning = procedure.cursor is not None and procedure.state is State.ALIGN
+        if self._history and not (is_aligning and procedure.cursor is self._cursor):
             self._history.clear()
             self._history_drawn_s = -np.inf
             self._angle_line.clear()
-        if procedure.cursor is None or procedure.state is not State.ALIGN:
+        self._cursor = procedure.cursor
+        if not is_aligning:
             self._show_nothing("", _NO_CURSOR if procedure.cursor is None else _TAKEN)
         elif snapshot.camera.problem:
             self._show_nothing(tr("? No image"), _NO_IMAGE)

@@ -130,8 +130,11 @@ def test_another_cursor_begins_another_history(panel: RotationPanel, snapshot: M
 
 
 def test_after_the_alignment_it_asks_for_nothing(panel: RotationPanel, snapshot: Make) -> None:
-    panel.show_snapshot(turned(snapshot, (0, 0, 5)))
-    panel.show_snapshot(snapshot(State.ALIGNED))
+    aligning = turned(snapshot, (0, 0, 5))
+    panel.show_snapshot(aligning)
+    assert len(history(panel)[0]) == 1
+    panel.show_snapshot(snapshot(State.ALIGNED, procedure={"cursor": aligning.procedure.cursor}))
+    assert history(panel)[0] is None  # it would no longer be of the last ten seconds
     assert text(panel, "advice") == "The alignment is confirmed."
     assert word(panel) == ""
 
