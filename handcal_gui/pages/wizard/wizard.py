@@ -135,12 +135,14 @@ class WizardPanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the wizard's view of a snapshot."""
         view = self.wizard.view(snapshot)
+        self.picture.step = view.step
         if view != self.shown:
             before, self.shown = self.shown, view
             self._refresh()
             if before is None or before.step is not view.step:
                 self.step_changed.emit(view.step)
-        self.picture.step = view.step
+            if before is None or before.sentence != view.sentence:
+                self.picture.show_snapshot(snapshot)  # before its turn, or it contradicts the text
         self._run(view, snapshot)
 
     def hold(self, is_held: bool) -> None:

@@ -13,12 +13,16 @@ from handcal.session.session import SessionRecord
 from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
+from handcal.types import EYES
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
+from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.theme import use_theme
+from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.progress_ring import ProgressRing
+from handcal_gui.widgets.result_rows import EYE_NAMES
 from tests.gui.views import NUDGED, VERIFIED, all_views, planned_snapshot
 
 Maker = Callable[..., Snapshot]
@@ -298,3 +302,30 @@ def test_names_and_paths_like_markup_are_shown_as_they_are(
 
 def _texts(panel: WizardPanel) -> set[str]:
     return {label.text() for label in panel.findChildren(QLabel)}
+
+
+def test_the_picture_is_of_the_eye_that_the_sentence_names(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    for eye in EYES:
+        panel.show_snapshot(snapshot(State.ALIGN, procedure={"eyes": (eye,)}))
+        open_eyes = [
+            one.accessibleName()
+            for one in panel.picture.findChildren(EyeCanvas)
+            if one.isVisibleTo(panel)
+        ]
+        assert open_eyes == [f"Guide {EYE_NAMES[eye]}"]
+
+
+def test_before_the_first_image_nothing_of_the_session_before_is_shown(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    camera = panel.picture.findChild(ImageView)
+    assert isinstance(camera, ImageView)
+    panel.show_snapshot(snapshot(State.SHOW_HAND))
+    assert camera.has_image
+    broken = snapshot(State.SHOW_HAND, frame=None, camera={"problem": "unplugged"})
+    panel.picture.show_snapshot(broken)
+    assert camera.has_image
+    panel.picture.show_snapshot(snapshot(State.SHOW_HAND, frame=None))
+    assert not camera.has_image
