@@ -238,9 +238,12 @@ def save_view(snapshot: Snapshot) -> WizardView:
             fact=kept_fact(snapshot.procedure),
             unearned=unearned,
         )
+    finish = tr("Everything is already saved. The session finishes by itself; Hold keeps it open.")
+    if snapshot.problem:
+        finish = tr("Solve the problem below, then finish the session.")
     return WizardView(
         Step.SAVE,
-        tr("Everything is already saved. Finish the session when you are done."),
+        finish,
         preconditions,
         ButtonSpec(Action.FINISH, tr("Finish session")),
         others,
