@@ -1051,7 +1051,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Enter the wearer&apos;s name and start; the settings are kept for the next one.</source>
+        <source>Enter the wearer&apos;s name, now or later in the library, and start; the settings are kept for the next one.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1585,6 +1585,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Keep the hand up, and look slowly to the left and to the right.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Cursor shown for {:g} s</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1642,6 +1646,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Everything is already saved. The session finishes by itself; Hold keeps it open.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solve the problem below, then finish the session.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1730,10 +1742,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Next wearer</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Everything is already saved. Finish the session when you are done.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -14,8 +14,10 @@ from handcal_gui.pages.wizard.preconditions import (
     hand_still,
     is_placed,
     is_steady,
+    needs_look,
 )
 from handcal_gui.pages.wizard.step_views import (
+    LOOK,
     UNUSABLE,
     align_view,
     connect_view,
@@ -142,11 +144,12 @@ class PlannedWizard(Wizard):
         others: tuple[ButtonSpec, ...] = (ButtonSpec(Action.BACK, tr("&Back")),)
         if snapshot.procedure.results is None and snapshot.procedure.alignments:
             others += (ButtonSpec(Action.SOLVE, tr("Keep the alignments &so far")),)
+        text = tr(
+            "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
+        ).format(distance(snapshot))
         return WizardView(
             Step.SHOW_HAND,
-            tr(
-                "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
-            ).format(distance(snapshot)),
+            LOOK if needs_look(snapshot) else text,
             (hand_found(snapshot), hand_still(snapshot)),
             ButtonSpec(Action.TAKE_STEP, _WAITS_FOR_HAND, False),
             others,

@@ -15,10 +15,14 @@ def is_steady(snapshot: Snapshot) -> bool:
 
 def hand_still(snapshot: Snapshot) -> Precondition:
     """Return whether the hand is held still and can be placed in time, as a precondition."""
-    seen = snapshot.observation
-    if seen is not None and seen.needs_delay:
+    if needs_look(snapshot):
         return Precondition(tr("The wearer has looked slowly to the left and to the right"), False)
     return Precondition(tr("Hand held still"), is_steady(snapshot))
+
+
+def needs_look(snapshot: Snapshot) -> bool:
+    """Return whether the wearer must turn the head before a hand can be placed in time."""
+    return snapshot.observation is not None and snapshot.observation.needs_delay
 
 
 def is_placed(snapshot: Snapshot) -> bool:

@@ -32,6 +32,7 @@ from handcal_gui.widgets.times import session_time
 
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
 """Waiting times of automatic steps: for the hand, and to read a text or advice."""
+LOOK = tr("Keep the hand up, and look slowly to the left and to the right.")
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 _LEAST_LOOK_NS = 1_500_000_000
 """Time from a drawing to its confirmation: a second press of a key confirms nothing unseen."""

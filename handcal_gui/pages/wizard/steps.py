@@ -15,9 +15,11 @@ from handcal_gui.pages.wizard.preconditions import (
     hand_still,
     is_placed,
     is_steady,
+    needs_look,
 )
 from handcal_gui.pages.wizard.step_views import (
     ADVICE_S,
+    LOOK,
     READ_S,
     SHOWN_S,
     STILL_S,
@@ -178,11 +180,12 @@ class Wizard:
         )
 
     def _make_cursor(self, snapshot: Snapshot) -> WizardView:
+        still = tr("Hold the hand still: it becomes the cursor for {}.").format(
+            eye_names(self.eyes(snapshot))
+        )
         return WizardView(
             Step.MAKE_CURSOR,
-            tr("Hold the hand still: it becomes the cursor for {}.").format(
-                eye_names(self.eyes(snapshot))
-            ),
+            LOOK if needs_look(snapshot) else still,
             (hand_found(snapshot), hand_still(snapshot)),
             ButtonSpec(Action.MAKE_CURSOR, tr("Make cursor"), is_steady(snapshot)),
             (ButtonSpec(Action.BACK, tr("&Back")),),

@@ -84,6 +84,15 @@ def test_the_state_counts_if_the_plan_s_step_is_older(snapshot: Maker) -> None:
     assert wizard.view(aligning).main.action is Action.CONFIRM
 
 
+def test_the_wearer_looks_around_first_where_that_is_needed(snapshot: Maker) -> None:
+    raising = planned_snapshot(snapshot, StepName.RAISE)
+    assert raising.observation is not None
+    waiting = replace(raising.observation, is_steady=False, needs_delay=True)
+    assert begun(snapshot).view(raising).sentence.startswith("Raise one bare hand")
+    view = begun(snapshot).view(replace(raising, observation=waiting))
+    assert "look slowly to the left" in view.sentence
+
+
 def test_the_wearer_keeps_the_hand_up(snapshot: Maker) -> None:
     wizard = begun(snapshot)
     assert wizard.view(planned_snapshot(snapshot, StepName.ALIGN)).sentence.endswith("stays up.")

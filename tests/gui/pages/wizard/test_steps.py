@@ -110,8 +110,10 @@ def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
     reach(wizard, start, Step.MAKE_CURSOR)
     assert start.observation is not None
     waiting = replace(start.observation, is_steady=False, needs_delay=True)
-    asked = wizard.view(replace(start, observation=waiting)).preconditions[-1]
-    assert "looked" in asked.text
+    view = wizard.view(replace(start, observation=waiting))
+    asked = view.preconditions[-1]
+    assert "look slowly to the left" in view.sentence
+    assert "looked slowly to the left" in asked.text
     assert not asked.holds
     restless = replace(start, observation=replace(start.observation, is_steady=False))
     assert not wizard.view(restless).main.is_enabled
