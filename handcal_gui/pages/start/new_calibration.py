@@ -73,10 +73,7 @@ class NewCalibration(Card):
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
             tr("Start a calibration"),
-            tr(
-                "Enter the wearer's name, now or later in the library, and start; the settings are "
-                "kept for the next one."
-            ),
+            tr("Enter a name, now or later in the library, and start; the settings are kept."),
             "hand",
         )
         self.setObjectName("newCalibration")
