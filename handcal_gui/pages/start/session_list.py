@@ -81,11 +81,14 @@ class SessionList(QWidget):
         follow_theme(self, lambda: self.show_entries(self._entries))
 
     def show_entries(self, entries: Sequence[Entry]) -> None:
-        """Replace the entries, keeping the selection if it is still listed."""
-        self._entries = entries
+        """Replace the entries, keeping the selection if it is still listed and none is newer."""
+        before, self._entries = {entry.path for entry in self._entries}, entries
         has_pictures = any(entry.eyes for entry in entries)
         kept = self._list.currentItem()
         kept_path = kept.data(Qt.ItemDataRole.UserRole) if kept is not None else None
+        newest = next((entry.path for entry in entries if entry.is_enabled), None)
+        if newest not in before:
+            kept_path = newest
         self._list.clear()
         self._list.setVisible(bool(entries))
         self._empty.setVisible(not entries)

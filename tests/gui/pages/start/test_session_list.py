@@ -28,3 +28,15 @@ def test_pictures_are_explained_by_a_legend_a_tooltip_and_for_screen_readers(qtb
     for told in (item.toolTip(), item.data(Qt.ItemDataRole.AccessibleDescriptionRole)):
         assert "Left eye: 20.0′ before, 5.0′ after" in told
         assert legend.toolTip() in told
+
+
+def test_a_new_session_is_selected_otherwise_the_one_before_stays(qtbot: QtBot) -> None:
+    shown = show(qtbot, SessionList("Sessions", "Open"), 400, 300)
+    entries = [Entry(Path(name), name) for name in ("newest", "new", "old")]
+    box = child(shown, QListWidget)
+    shown.show_entries(entries[1:])
+    box.setCurrentRow(1)
+    shown.show_entries(entries[1:])
+    assert box.currentItem().text() == "old"
+    shown.show_entries(entries)
+    assert box.currentItem().text() == "newest"
