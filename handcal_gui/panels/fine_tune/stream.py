@@ -112,4 +112,6 @@ def find_obstacle(snapshot: Snapshot) -> str:
     """Return the reason why φ cannot be set by hand now; empty if it can."""
     if not snapshot.link.connected:
         return tr("The headset is not connected; see Link.")
+    if snapshot.comparing is not None:  # which a change would end
+        return tr("The wearer compares two drawings: answer in Trials, or stop comparing.")
     return _OBSTACLES.get(snapshot.procedure.state, "")

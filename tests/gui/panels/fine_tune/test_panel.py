@@ -86,6 +86,14 @@ def test_cannot_be_used_without_a_headset(panel: FineTunePanel, show: Show) -> N
     assert not field(panel, "left", 1).isEnabled()
 
 
+def test_a_comparison_is_not_ended_by_accident(panel: FineTunePanel, show: Show) -> None:
+    show()
+    assert field(panel, "left", 1).isEnabled()
+    show(comparing="first")
+    assert status(panel).startswith("The wearer compares two drawings")
+    assert not field(panel, "left", 1).isEnabled()
+
+
 @pytest.mark.parametrize(
     ("key", "axis", "sign"),
     [
