@@ -71,7 +71,8 @@ def connect_panels(
 ) -> None:
     """Connect the requests of the panels with commands.
 
-    `on_doubted` is called with a command's name and the reason why its trial may be wrong.
+    `on_doubted` is called with a command's name and the reason why its trial may be wrong, or an
+    empty one once it may not.
     """
     panels.link.restart_headset_requested.connect(
         lambda: submit(tr("restart the headset"), Station.restart_headset)

@@ -340,6 +340,10 @@ class CalibrationController(QObject):
         self._window.banner.show_message(text)
 
     def _on_doubted(self, name: str, why: str) -> None:
+        if not why:
+            if self._failed_command == name:
+                self._window.banner.clear()
+            return
         self._failed_command = name
         self._window.banner.show_message(tr("The trial is not recorded yet: {}").format(why))
 

@@ -77,7 +77,8 @@ class TrialsPanel(QWidget):
     show_compared_requested, comparison_answered : Signal(str)
         As in `ComparisonRow`.
     doubted : Signal(str)
-        Reason why the user must confirm the trial by requesting it again.
+        Reason why the user must confirm the trial by requesting it again; empty if there is none
+        any more.
     delete_requested, restore_requested : Signal(str, int)
         "trial", and its number.
     """
@@ -100,7 +101,7 @@ class TrialsPanel(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._snapshot: Snapshot | None = None
         self._record: SessionRecord | None = None
-        self._is_read_only = self._is_doubtful = False
+        self._is_read_only = self._is_doubtful = self._is_finished = False
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._shows_target = QCheckBox(tr("Show the tar&get in the headset"))
         self._eye: Eye | None = None  # of the next trial, as said last
@@ -211,21 +212,23 @@ class TrialsPanel(QWidget):
 
     def _refresh(self) -> None:
         obstacle = self._obstacle()
-        self._is_doubtful = self._is_doubtful and bool(self._doubt())
+        if self._is_doubtful and not self._doubt():
+            self._forget_doubt()
         self.record_action.setEnabled(not obstacle)
         self._message.setText(
             obstacle
             or tr("Fine-tune φ of the {}, then record.").format(EYE_NAMES[self._next_eye()].lower())
         )
-        can_show = not (obstacle or (self._record and self._record.is_finished))
+        was_finished = self._is_finished
+        self._is_finished = self._record is not None and self._record.is_finished
         if not obstacle and self._eye != self._next_eye():
             self._eye = self._next_eye()
             self.eye_changed.emit(self._eye)
-        self._shows_target.setEnabled(can_show)
-        if not can_show:
+        self._shows_target.setEnabled(not obstacle)
+        if obstacle or (self._is_finished and not was_finished):
             self._shows_target.setChecked(False)
         self._request_target()
-        self._show_comparison(can_compare=can_show)
+        self._show_comparison(can_compare=not obstacle)
 
     def _show_comparison(self, *, can_compare: bool) -> None:
         snapshot = self._snapshot
@@ -269,8 +272,13 @@ class TrialsPanel(QWidget):
             self.trial_requested.emit(self._next_eye(), self._depth.currentData())
 
     def _choose_eye(self) -> None:
-        self._is_doubtful = False
+        self._forget_doubt()
         self._refresh()
+
+    def _forget_doubt(self) -> None:
+        if self._is_doubtful:
+            self._is_doubtful = False
+            self.doubted.emit("")
 
     def _fill_choices(self) -> None:
         self._eyes.setAccessibleName(tr("Eye"))

@@ -145,6 +145,7 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     )
     live.wait(lambda: not np.array_equal(studio.headset.shown.projections["left"].P, before))
     live.wait(lambda: live.snapshot.record.fine_tuned is not None)
+    assert live.banner == ""  # φ has been fine-tuned
     tuned = live.snapshot.record.fine_tuned
     assert tuned is not None
     np.testing.assert_allclose(tuned["left"], solved_m + np.array([step_m, 0.0, 0.0]))
