@@ -41,8 +41,9 @@ class EyeOutcome:
     before_arcmin: float | None
     """Error that is expected without the calibration."""
     expected_arcmin: float | None
+    """Error with the calibrated φ: an eye that keeps the offline calibration has that before."""
     measured_arcmin: float | None
-    """Error after the wearer's verification; None if the eye was not verified."""
+    """Error after the wearer's verification; None if the calibrated φ was not verified."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,10 +270,13 @@ def _results(path: Path, replayed: Replayed) -> dict[str, Any]:
 def _outcome(one: Mapping[str, Any]) -> EyeOutcome:
     """Return an eye's result; whatever is missing or not a number is unknown."""
     benefit, measured = one.get("benefit"), one.get("measured_arcmin")
-    expected = benefit if isinstance(benefit, dict) else {}
+    verdict, expected = str(one.get("verdict", "")), benefit if isinstance(benefit, dict) else {}
+    before_arcmin = _number(expected.get("without_arcmin"))
+    if verdict == "keep":  # whatever was solved and verified is not used
+        return EyeOutcome(verdict, before_arcmin, before_arcmin, None)
     return EyeOutcome(
-        str(one.get("verdict", "")),
-        _number(expected.get("without_arcmin")),
+        verdict,
+        before_arcmin,
         _number(expected.get("after_arcmin")),
         _number(measured[1]) if isinstance(measured, list) and len(measured) == 2 else None,
     )

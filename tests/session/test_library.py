@@ -70,6 +70,17 @@ def test_an_entry_says_what_the_session_holds(make: Callable[..., Path], tmp_pat
     assert not entry.damaged
 
 
+def test_an_eye_that_keeps_the_offline_calibration_has_its_error(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    kept = {"benefit": {"without_arcmin": 6.2, "after_arcmin": 2.7}, "measured_arcmin": [5, 2.7]}
+    with Session(make("one", "Ada", solved=False)) as session:
+        session.save_results({"eyes": {"right": {"verdict": "keep", **kept}}})
+    (entry,) = read_library(tmp_path)
+    right = entry.eyes["right"]
+    assert (right.before_arcmin, right.expected_arcmin, right.measured_arcmin) == (6.2, 6.2, None)
+
+
 def test_results_that_no_longer_hold_are_not_shown(
     make: Callable[..., Path], tmp_path: Path
 ) -> None:
