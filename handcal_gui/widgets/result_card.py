@@ -63,7 +63,7 @@ def eye_results(results: Results) -> list[EyeResult]:
             bars = (
                 before,
                 Bar(tr("Verification found"), verified),
-                Bar(unused or tr("After verification"), left),
+                Bar(unused or tr("After, expected"), left),
             )
         else:
             after = Bar(unused or tr("After, expected"), benefit.after_arcmin)
