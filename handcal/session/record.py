@@ -71,6 +71,8 @@ class SessionRecord:
     torn_bytes: int
     """Length of an incomplete last line, which is ignored; 0 if there is none."""
     facts: SessionFacts = field(default_factory=SessionFacts)
+    verified_since: frozenset[Eye] = frozenset()
+    """Eyes verified since the last change of the alignments."""
     alignment_facts: Mapping[int, AlignmentFacts] = field(default_factory=dict)
     """Of each alignment, deleted ones too."""
     last_alignment: int = 0
@@ -187,6 +189,7 @@ def read_session(
         journal_bytes=journal.complete_bytes,
         torn_bytes=journal.torn_bytes,
         facts=state.facts,
+        verified_since=frozenset(state.verified_since),
         alignment_facts=MappingProxyType(state.alignment_facts),
         last_alignment=state.alignments.last(),
         damaged=tuple(damaged),

@@ -14,7 +14,7 @@ _STEPS = 60
 
 
 class ProgressRing(QWidget):
-    """Shows a share from 0 to 1, or none, and two short texts inside, one below the other."""
+    """Shows a count with its name, and fills with it or with the time until a step runs itself."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -22,13 +22,13 @@ class ProgressRing(QWidget):
         self.setAccessibleName(tr("Progress"))
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._text = self._unit = ""
-        self._part: int | None = None
+        self._part, self._counts = 0, True
         self.set_diameter(8 * SPACING_PX)
 
     @property
     def share(self) -> float | None:
-        """The share shown."""
-        return None if self._part is None else self._part / _STEPS
+        """The share of the waiting time shown; None if the count is."""
+        return None if self._counts else self._part / _STEPS
 
     @property
     def text(self) -> str:
@@ -39,13 +39,15 @@ class ProgressRing(QWidget):
         """Set the size."""
         self.setFixedSize(QSize(diameter_px, diameter_px))
 
-    def show_share(self, share: float | None, text: str, unit: str) -> None:
-        """Show a share, and a number with the name of what it counts."""
-        part = None if share is None else round(_STEPS * share)
-        if (part, text, unit) != (self._part, self._text, self._unit):
-            self._part, self._text, self._unit = part, text, unit
-            filled = "" if part is None else f", {100 * part // _STEPS} %"
-            self.setAccessibleDescription(f"{text} {unit}".rstrip() + filled)
+    def show_count(self, done: int, planned: int, unit: str, share: float | None = None) -> None:
+        """Show a count, and the share from 0 to 1 of a step's waiting time, if there is one."""
+        text = f"{done}/{planned}"
+        part = round(_STEPS * (done / planned if share is None else share))
+        shown = part, share is None, text, unit
+        if shown != (self._part, self._counts, self._text, self._unit):
+            self._part, self._counts, self._text, self._unit = shown
+            filled = "" if self._counts else f", {100 * part // _STEPS} %"
+            self.setAccessibleDescription(f"{text} {unit}{filled}")
             self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
@@ -59,7 +61,7 @@ class ProgressRing(QWidget):
         painter.setPen(QPen(faint, width))
         painter.drawEllipse(ring)
         if self._part:
-            pen = QPen(QColor(colors().live), width)
+            pen = QPen(QColor(colors().good if self._counts else colors().live), width)
             pen.setCapStyle(Qt.PenCapStyle.FlatCap)
             painter.setPen(pen)
             painter.drawArc(ring, 90 * 16, -round(360 * 16 * self._part / _STEPS))

@@ -188,7 +188,10 @@ def snapshot(
             record=record,
             views=_views(rig, shots),
         )
-        return replace(snapshot, **changes)
+        made = replace(snapshot, **changes)
+        if verified := frozenset(procedure.get("verifications", ())):
+            made = replace(made, record=replace(made.record, verified_since=verified))
+        return made
 
     return make
 

@@ -17,7 +17,7 @@ from handcal.session.session import (
 )
 from handcal.session.state import MAX_ALIGNMENTS, MAX_TRIALS
 from handcal.session.trial import Trial, trial_json
-from handcal.types import Alignment
+from handcal.types import Alignment, Verification
 from tests.helpers import DATA
 from tests.session.conftest import RESULTS, SETTINGS, SHIFT_M
 
@@ -232,6 +232,17 @@ def test_a_session_reports_if_it_is_solved_and_applied(
     assert Session.open(session.path).results == RESULTS  # of the first
     session.save_results(RESULTS)
     assert now() == (True, False)
+
+
+def test_a_verification_is_of_the_alignments_so_far(session: Session, alignment: Alignment) -> None:
+    found = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0))
+    session.save_alignment(alignment)
+    session.save_facts(verified={"left": found})
+    assert Session.open(session.path).verified_since == {"left"}
+    session.save_alignment(replace(alignment, t_b_ns=3))
+    record = Session.open(session.path)
+    assert record.verified_since == frozenset()
+    assert set(record.facts.verified) == {"left"}
 
 
 def test_a_shift_set_by_hand_is_kept_until_the_next_results(session: Session) -> None:

@@ -91,7 +91,7 @@ class PlannedWizard(Wizard):
         if step is None and procedure.next_step is not None:
             step = _STEPS.get(procedure.next_step.name)
         # A verification is solved and sent at its own step.
-        is_of_verification = step is Step.SOLVE and procedure.verifications
+        is_of_verification = step is Step.SOLVE and snapshot.record.verified_since
         self._latest = Step.VERIFY if is_of_verification else step or self._latest
         return self._latest
 
@@ -228,7 +228,9 @@ class PlannedWizard(Wizard):
                     "Not accepted yet: verify {} again. Another alignment would change little."
                 ).format(eye_names(again))
         elif set(procedure.verifications) >= set(self.usable_eyes):
-            text = tr("The wearer has verified the result. Finish, or verify an eye again.")
+            text = tr("Each eye was verified before the last alignment. Finish, or verify again.")
+            if snapshot.record.verified_since >= set(self.usable_eyes):
+                text = tr("The wearer has verified the result. Finish, or verify an eye again.")
             main = ButtonSpec(Action.NEXT, tr("Finish"))
         else:
             text = tr("Not every eye has been verified. Finish, or verify an eye again.")

@@ -95,7 +95,7 @@ class Wizard:
             case State.VERIFY:
                 self._free = Step.VERIFY
                 return Step.VERIFY
-            case State.APPLYING if snapshot.procedure.verifications:
+            case State.APPLYING if snapshot.record.verified_since:
                 return Step.VERIFY
             case State.ALIGNED | State.SOLVED | State.APPLYING:
                 self._free = Step.VERIFY

@@ -9,7 +9,7 @@ from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QWidget
 
 from handcal.station.snapshot import Snapshot
-from handcal.types import EyePlan
+from handcal.types import EYES, EyePlan
 from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.automatic import Automatic
@@ -249,20 +249,19 @@ class WizardPanel(QWidget):
         """Press the main button once an automatic step has waited long enough."""
         now_s = 1e-9 * snapshot.t_host_ns
         share = self._automatic.share(view, now_s)
-        self._ring.show_share(share, *self._count(snapshot, view))
+        self._ring.show_count(*self._count(snapshot, view), share)
         if share == 1.0 and QApplication.activeModalWidget() is None:
             self._automatic.note_pressed(now_s)
             self.press_main()
 
-    def _count(self, snapshot: Snapshot, view: WizardView) -> tuple[str, str]:
+    def _count(self, snapshot: Snapshot, view: WizardView) -> tuple[int, int, str]:
         """Return the alignments made and planned, or the eyes verified, and their name."""
-        procedure = snapshot.procedure
-        if view.omitted:
-            eyes = len(self.wizard.usable_eyes) if isinstance(self.wizard, PlannedWizard) else 2
-            return f"{len(procedure.verifications)}/{eyes}", tr("verified")
-        done = len(procedure.alignments)
+        if view.omitted or view.step in OF_THE_RESULT:
+            eyes = 1 if self.wizard.plan in EYES else 2
+            return len(snapshot.record.verified_since), eyes, tr("verified")
+        done = len(snapshot.procedure.alignments)
         planned = 2 if self.wizard.plan == "each" else 1
-        return f"{done}/{max(planned, done)}", tr("aligned")
+        return done, max(planned, done), tr("aligned")
 
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)

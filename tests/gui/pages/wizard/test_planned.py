@@ -129,6 +129,22 @@ def test_the_end_says_what_was_reached(
     ]
 
 
+def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot: Maker) -> None:
+    done = planned_snapshot(snapshot, StepName.DONE, verifications=VERIFIED)
+    assert done.procedure.results is not None
+    verdicts = dict.fromkeys(EYES, Verdict("accept", "as told"))
+    results = replace(done.procedure.results, verdicts=verdicts)
+    done = replace(done, procedure=replace(done.procedure, results=results))
+    assert begun(snapshot).view(done).sentence.startswith("The wearer has verified the result.")
+    aligned = replace(done, record=replace(done.record, verified_since=frozenset()))
+    view = begun(snapshot).view(aligned)
+    assert view.sentence.startswith("Each eye was verified before the last alignment.")
+    solving = planned_snapshot(snapshot, StepName.SOLVE, verifications=VERIFIED)
+    assert begun(snapshot).view(solving).step is Step.VERIFY
+    solving = replace(solving, record=aligned.record)
+    assert begun(snapshot).view(solving).step is Step.SOLVE
+
+
 def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
     done = planned_snapshot(snapshot, StepName.DONE, verifications=VERIFIED)
     assert done.procedure.results is not None
