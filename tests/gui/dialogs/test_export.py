@@ -128,6 +128,26 @@ def test_what_is_chosen_is_exported_and_remembered(
     monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
     press(dialog, "exportEndFix").click()
     assert [url.toLocalFile() for url in opened] == [str(target)]
+    assert press(dialog, "openReport").isHidden()  # none was made
+
+
+def test_the_report_that_was_made_opens_with_a_letter(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    exporter.names = ("a.csv", "report.html", "report.pdf")
+    exporter.may_end.set()
+    press(dialog, "export").click()
+    qtbot.waitUntil(press(dialog, "openReport").isVisible)
+    assert sorted(letters(dialog, is_shown=True)) == ["b", "c", "o", "r"]
+    press(dialog, "openReport").click()
+    assert [url.toLocalFile() for url in opened] == [str(exporter.folders[0] / "report.pdf")]
+    press(dialog, "back").click()
+    exporter.names = ("a/report.pdf", "b/report.pdf")
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.")
+    assert press(dialog, "openReport").isHidden()  # which of them?
 
 
 def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog) -> None:
