@@ -85,9 +85,9 @@ def events(before: Snapshot | None, now: Snapshot) -> list[dict[str, object]]:
     step, last = new.next_step, None if old is None else old.next_step
     if step is not None and (last is None or (step.name, step.eyes) != (last.name, last.eyes)):
         add("step", step=step.name.value, eyes=list(step.eyes))
-    if old is None:
+    if before is None or old is None:
         return found
-    if new.refused > old.refused:
+    if now.record.refused > before.record.refused:
         add("refused", reason=new.refusal)
     for number in new.alignments.keys() - old.alignments.keys():
         alignment = new.alignments[number]
@@ -95,7 +95,6 @@ def events(before: Snapshot | None, now: Snapshot) -> list[dict[str, object]]:
     for eye, verification in new.verifications.items():
         if old.verifications.get(eye) is not verification:
             add("verified", eye=eye)
-    assert before is not None
     if now.record is not before.record:
         for number in now.record.trials.keys() - before.record.trials.keys():
             trial = now.record.trials[number]

@@ -125,7 +125,7 @@ def demo(arguments: argparse.Namespace) -> None:
     console.print(
         f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after; "
         f"the wearer's time: {result['seconds']:.1f} s\n"
-        f"Confirmations refused because the hand was rotated: {guard['rejected']}{rotation}\n"
+        f"Confirmations refused: {guard['rejected']}{rotation}\n"
         f"Session: {result['session']}"
     )
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -90,9 +91,7 @@ def _write(
     """Write the files of one format, destined for `folder`, into `place`."""
     match name:
         case "report" | "html":
-            for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf", "jinja2"):
-                import_module(heavy)
-                progress.check()
+            _import_drawing(progress)
             from handcal.export.report import session_report
             from handcal.report.html import write_html
             from handcal.report.pdf import write_pdf
@@ -124,3 +123,15 @@ def _write(
             write_northstar(place / "northstar.json", outcome)
         case "slicer":
             write_slicer(place / "slicer", outcome, progress)
+
+
+def _import_drawing(progress: Progress) -> None:
+    """Import what draws reports; where matplotlib first lists all fonts, that takes up to 20 s."""
+    from matplotlib import get_cachedir
+
+    lists = Path(get_cachedir()).glob("fontlist-*.json")
+    if "matplotlib.font_manager" not in sys.modules and not any(lists):
+        progress.at(0.0, "Preparing fonts, once on this computer")
+    for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf", "jinja2"):
+        import_module(heavy)
+        progress.check()

@@ -42,8 +42,11 @@ class Staging(Closable):
         home = next(path for path in (self._folder, *self._folder.parents) if path.exists())
         if not home.is_dir():
             raise FileError(f"cannot write to {self._folder}: {home} is a file, not a folder")
-        self._root = make_folder(home / f".{self._folder.name}.handcal-export")
-        self._lock = FileLock(self._root / "lock")
+        self._root = home / f".{self._folder.name}.handcal-export"
+        try:
+            self._lock = FileLock(make_folder(self._root) / "lock")
+        except FileError as error:  # it names a folder that nobody chose
+            raise FileError(str(error).replace(str(self._root), str(self._folder))) from error
         self.path = self._root / "new"
         self._old = self._root / "old"
         try:
@@ -53,7 +56,7 @@ class Staging(Closable):
                 leftover.mkdir()
         except OSError as error:
             self.close()
-            raise FileError(f"cannot write {self._root}: {error.strerror or error}") from error
+            raise FileError(f"cannot write to {self._folder}: {error.strerror or error}") from error
 
     def publish(self, replaced: Sequence[str]) -> tuple[Path, ...]:
         """Move the files into place and return their new paths, sorted.

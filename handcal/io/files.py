@@ -7,6 +7,7 @@ import json
 import os
 import re
 import secrets
+import shutil
 import stat
 from collections.abc import Mapping
 from pathlib import Path
@@ -188,6 +189,8 @@ def require_writable(folder: Path) -> None:
         raise FileError(f"{there} is a file: choose a folder")
     if not os.access(there, os.W_OK | os.X_OK):
         raise FileError(f"cannot write to {there}: choose another folder")
+    if shutil.disk_usage(there).total == 0:  # such as /proc, which lets its owner write
+        raise FileError(f"nothing can be stored in {there}: choose another folder")
 
 
 def write_json(path: Path, value: object) -> None:

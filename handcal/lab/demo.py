@@ -136,11 +136,11 @@ def run_demo(
         try:
             follow_plan(station, alignments, _PATIENCE, progress)
             seconds = watch.seconds
-            statistics = deliver(station).link
+            delivered = deliver(station)
         except ContradictedError as error:
             return _contradicted(station, settings, error.contradiction)
         station.finish()
-    calibration, rig = station.calibration, station.rig
+    calibration, rig, statistics = station.calibration, station.rig, delivered.link
     return {
         "seed": settings.seed,
         "session": str(station.session.path),
@@ -149,7 +149,7 @@ def run_demo(
         "seconds": seconds,
         **_judge(calibration, station, settings, begun_m),
         "guard": {
-            "rejected": calibration.refused,
+            "rejected": delivered.record.refused,
             "accepted_deg": max(
                 (
                     float(np.degrees(np.linalg.norm(alignment.rotation_rad)))

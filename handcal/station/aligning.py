@@ -52,8 +52,6 @@ class Refused:
     reason: str
     """The reason as the journal names it."""
     angle_deg: float | None = None
-    is_by_guard: bool = False
-    """True if the hand was turned or had changed its shape."""
 
 
 class Aligning:
@@ -228,7 +226,6 @@ class Aligning:
                 f"{turn_advice(R_D_W @ rotation_W).text} and confirm again.",
                 "turned",
                 angle_deg,
-                is_by_guard=True,
             )
         if self._has_changed(shape):
             return Refused(
@@ -236,7 +233,6 @@ class Aligning:
                 f"{change_text(shape, R_D_W)}. "
                 "Hold it as it was and confirm again, or make the cursor again.",
                 "shape changed",
-                is_by_guard=True,
             )
         return None
 

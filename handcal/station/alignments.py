@@ -60,7 +60,6 @@ class AlignmentSteps:
         self.rig = rig
         self.state = State.SHOW_HAND
         self.eyes: tuple[Eye, ...] = EYES
-        self.refused = 0
         self.camera = CameraIdentity()
         self.evidence = Evidence(rig, _earlier_evidence(resume))
         self._link = link
@@ -329,7 +328,6 @@ class AlignmentSteps:
         )
 
     def _refuse(self, refused: Refused, aligning: Aligning) -> None:
-        self.refused += refused.is_by_guard
         aligning.refusal = refused.prompt
         self._link.send_prompt(refused.prompt, self.eyes)
         self._store.event(

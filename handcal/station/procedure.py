@@ -84,8 +84,6 @@ class Calibration(VerificationSteps):
         The newest of each eye; fused with the alignments.
     verifying : Verifying or None
         The verification in progress, in the state `verify`.
-    refused : int
-        Number of confirmations refused by the guard.
     camera : CameraIdentity
         The camera that gives the frames; set it before `step`.
     evidence : Evidence

@@ -113,7 +113,7 @@ def _result(station: Station, snapshot: Snapshot) -> dict[str, Any]:
             "app": headset.app,
         },
         "alignments": len(calibration.alignments),
-        "refused": calibration.refused,
+        "refused": snapshot.record.refused,
         "eyes": {
             eye: {
                 "shift_mm": (1e3 * shift.shift_m).tolist(),

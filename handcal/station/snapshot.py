@@ -32,8 +32,6 @@ class Procedure:
     """The frozen hand while it is shown, else None."""
     refusal: str
     """Reason why the last confirmation of the present cursor was refused; empty if none was."""
-    refused: int
-    """Number of confirmations refused so far."""
     guard_limit_rad: float
     alignments: Mapping[int, Alignment]
     """By number, without deleted ones, including those that could not be written yet."""
@@ -68,7 +66,6 @@ def read_procedure(
         eyes=calibration.eyes,
         cursor=calibration.cursor,
         refusal=calibration.refusal,
-        refused=calibration.refused,
         guard_limit_rad=settings.guard.limit_rad,
         alignments=calibration.alignments,
         results=calibration.results,

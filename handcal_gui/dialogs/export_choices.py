@@ -6,14 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidget
 
 from handcal.export.export import ExportSettings
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
-from handcal.io.files import user_path
+from handcal.io.files import require_writable, user_path
+from handcal.station.doctor import Finding, Health
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import label_for, number, paragraph, with_name
+from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
 
@@ -82,12 +86,17 @@ class ExportChoices(QWidget):
         self._task = paragraph("exportTask")
         self._folder = PathField(tr("Export folder"), "folder")
         self._folder.set_path(str(folder))
+        self._found = FindingLine("folder")
+        self._is_refused = False
         self._lay_out()
         for kind, box in self._boxes.items():
             box.setChecked(kind in settings.formats)
             box.toggled.connect(self._refresh)
-        self._folder.changed.connect(self._refresh)
-        self._refresh()
+        self._check = LatestJob(require_writable, self)  # the folder may be on a slow network
+        self._check.answered.connect(lambda: self._show_found(""))
+        self._check.failed.connect(self._show_found)
+        self._folder.changed.connect(self._check_folder)
+        self._show_found("")
 
     @property
     def is_complete(self) -> bool:
@@ -114,11 +123,35 @@ class ExportChoices(QWidget):
         """The export's folder."""
         return self.folder / self._name
 
+    def showEvent(self, event: QShowEvent) -> None:
+        """Check the folder."""
+        super().showEvent(event)
+        self._check_folder()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Wait for the end of the check."""
+        super().hideEvent(event)
+        self._check.stop()
+
+    def _check_folder(self) -> None:
+        self._check.ask(self.target)
+        self._refresh()
+
+    def _show_found(self, problem: str) -> None:
+        """Show why the folder is refused, or else what is created in it."""
+        self._is_refused = bool(problem)
+        health = Health.BROKEN if problem else Health.GOOD
+        created = tr("The folder {} is created there.").format(self._name)
+        self._found.show_finding(Finding("", health, problem or created))
+        self._refresh()
+
     def _missing(self) -> str:
         """Return what is still to be chosen; empty if nothing is."""
         if not self._formats():
             return tr("Choose what to write: nothing is ticked.")
-        return "" if self._folder.path else tr("Choose the folder to export to.")
+        if not self._folder.path:
+            return tr("Choose the folder to export to.")
+        return tr("Choose another folder to export to.") if self._is_refused else ""
 
     def _formats(self) -> tuple[Format, ...]:
         return tuple(kind for kind, box in self._boxes.items() if box.isChecked())
@@ -149,7 +182,7 @@ class ExportChoices(QWidget):
             (tr("Export &to"), self._folder),
         ):
             form.addRow(label_for(field, title), field)
-        form.addRow("", QLabel(tr("The folder {} is created there.").format(self._name)))
+        form.addRow(self._found)
         vbox(self._task, formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)
 
 

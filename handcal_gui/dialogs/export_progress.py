@@ -21,9 +21,10 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import plain_tooltip, with_name
+from handcal_gui.widgets.fields import button, plain_tooltip, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import show_share
+from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.numbers import pluralize
 
 _NOTHING = tr("nothing was exported; the sessions and earlier exports are unchanged")
@@ -39,6 +40,9 @@ class ExportProgress(QWidget):
         self._doing: QLabel = with_name(ElidedLabel(), "doing")
         self._bar = with_name(QProgressBar(), "progress", tr("Progress"))
         self._end = FindingLine("exportEnd")
+        self._report = Path()
+        self._open_report = button("openReport", tr("Open &report"))
+        self._open_report.clicked.connect(lambda: _open(self._report))
         self._files = with_name(QListWidget(), "files", tr("Files"))
         self._files.setWordWrap(True)
         self._files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -46,14 +50,18 @@ class ExportProgress(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(SPACING_PX)
-        for widget in (self._doing, self._bar, self._end):
-            layout.addWidget(widget)
+        layout.addWidget(self._doing)
+        layout.addWidget(self._bar)
+        end = hbox((self._end, 1), self._open_report, spacing=SPACING_PX)
+        end.setAlignment(self._open_report, Qt.AlignmentFlag.AlignTop)
+        layout.addLayout(end)
         layout.addWidget(self._files, 1)
         layout.addStretch(0)
 
     def begin(self) -> None:
         """Show an export that has just started."""
         self._end.hide()
+        self._open_report.hide()
         self._files.clear()
         self._files.hide()
         self._bar.show()
@@ -79,11 +87,14 @@ class ExportProgress(QWidget):
             self._show_end(Finding("", Health.BROKEN, _NOTHING, _NOTHING_ADVICE))
             return
         count = tr("{} in {}").format(pluralize(len(made.files), tr("file"), tr("files")), folder)
-        url = QUrl.fromLocalFile(str(folder))
+        reports = sorted(path for path in made.files if path.stem == "report")
+        if len({path.parent for path in reports}) == 1:  # else the list tells them apart
+            self._report = reports[-1]  # the PDF
+            self._open_report.show()
         self._show_end(
             Finding("", Health.LIMITED if made.missing else Health.GOOD, count),
             tr("&Open folder"),
-            lambda: QDesktopServices.openUrl(url),
+            lambda: _open(folder),
         )
 
     def show_failure(self, why: str) -> None:
@@ -108,3 +119,7 @@ class ExportProgress(QWidget):
         self._bar.hide()
         self._end.show_finding(finding, fix, mend)
         self._end.show()
+
+
+def _open(path: Path) -> None:
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))

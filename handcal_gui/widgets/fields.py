@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from html import escape
 from typing import TypeVar, cast
@@ -25,6 +26,7 @@ from PySide6.QtWidgets import (
 from handcal.report.cells import MINUS, with_minus
 from handcal_gui.theme import SPACING_PX, scale_font, set_style
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import show_briefly
 from handcal_gui.widgets.layouts import hbox
 
 Field = TypeVar("Field", bound=QWidget)
@@ -55,6 +57,9 @@ def plain_message(text: str) -> str:
 class NumberField(QDoubleSpinBox):
     """A field for a number, with a point and a minus as in every other number shown.
 
+    A number out of range can be typed; once it is complete, the nearest one takes its place, and
+    the field says so. Otherwise its last digits would be dropped: 99 became 9.
+
     A comma becomes a point, and a hyphen is read as a minus. In the system's locale a comma, or a
     point, is a separator of thousands: 0,5 was read as 5.
     """
@@ -79,7 +84,25 @@ class NumberField(QDoubleSpinBox):
         """Return whether a text is a number, or may become one."""
         text = text.replace(",", ".")
         state, _, place = super().validate(text.replace(MINUS, "-"), place)
+        if state == QValidator.State.Invalid and self._typed(text) is not None:
+            state = QValidator.State.Intermediate
         return state, text, place
+
+    def fixup(self, text: str) -> str:
+        """Return the nearest number that is allowed, and say which are."""
+        typed = self._typed(text)
+        if typed is None:
+            return super().fixup(text)
+        nearest = self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
+        taken = f"{nearest}{self.suffix()}"
+        show_briefly(self, tr("Changed to {}. {}").format(taken, _range_text(self)))
+        return taken
+
+    def _typed(self, text: str) -> float | None:
+        """Return the number in a text, whatever the range; None if there is none."""
+        number_text = text.removesuffix(self.suffix()).strip().replace(MINUS, "-")
+        is_number = re.fullmatch(rf"-?\d+(\.\d{{0,{self.decimals()}}})?", number_text, re.ASCII)
+        return float(number_text) if is_number else None
 
 
 class WholeNumberField(QSpinBox):
@@ -207,11 +230,14 @@ def _show_range(spin: QAbstractSpinBox, event: QEvent) -> bool:
     if event.type() != QEvent.Type.ToolTip:
         return False
     field = cast(QDoubleSpinBox, spin)  # or a field for whole numbers, with the same functions
-    low, high = (field.textFromValue(end) for end in (field.minimum(), field.maximum()))
-    allowed = tr("Allowed: {} to {}").format(low, high + field.suffix())
-    text = f"{field.toolTip()}\n{allowed}".strip()
+    text = f"{field.toolTip()}\n{_range_text(field)}".strip()
     QToolTip.showText(cast(QHelpEvent, event).globalPos(), text, field)
     return True
+
+
+def _range_text(field: QDoubleSpinBox) -> str:
+    low, high = (field.textFromValue(end) for end in (field.minimum(), field.maximum()))
+    return tr("Allowed: {} to {}").format(low, high + field.suffix())
 
 
 def _settle(field: Spin) -> Spin:

@@ -44,6 +44,8 @@ class LiveCameras(QWidget):
     ----------
     images : tuple of (H, W, 3) uint8, or None
         The present images; None while no camera is shown.
+    are_stored : bool
+        True if the images shown are those of a recording or video, which does not wait.
     images_changed : Signal()
     failed : Signal(str)
         Reason why no camera is shown.
@@ -63,6 +65,7 @@ class LiveCameras(QWidget):
         super().__init__(parent)
         self.setObjectName("liveCameras")
         self.images: Images | None = None
+        self.are_stored = False
         self._realsense, self._tell, self._open_source = realsense, tell, open_source
         self._live: LiveImages | None = None
         self._warp: Callable[[UInt8], UInt8] | None = None
@@ -102,6 +105,7 @@ class LiveCameras(QWidget):
         if len(set(sources.values())) < len(sources):
             self.failed.emit(tr("both are the same camera: choose another for one of them"))
             return
+        self.are_stored = any(one.currentData() == _RECORDED for one in self._sources.values())
         self._live = LiveImages(
             [
                 partial(
@@ -122,7 +126,7 @@ class LiveCameras(QWidget):
         if self._live is not None:
             self._live.stop()
             self._live = None
-        self.images = None
+        self.images, self.are_stored = None, False
         self._show_message(tr("No image"))
         self.images_changed.emit()
 

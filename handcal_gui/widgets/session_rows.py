@@ -13,7 +13,7 @@ from handcal.report.cells import signed
 from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
-from handcal.types import EYES, Eye, EyeShift
+from handcal.types import EYES, Eye
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize
@@ -35,7 +35,9 @@ ALIGNMENT_COLUMNS = (
         tr("Angle between hand and cursor at the confirmation, in degrees"),
         rank=2,
     ),
-    RecordColumn(tr("φ mm"), _PHI, rank=1),
+    RecordColumn(tr("φ1 mm"), _PHI, rank=1),
+    RecordColumn(tr("φ2 mm"), _PHI, rank=1),
+    RecordColumn(tr("φ3 mm"), _PHI, rank=1),
     RecordColumn(
         tr("Point RMS mm"),
         tr("Distance from the hand's points to their partners on the cursor, in millimetres"),
@@ -124,9 +126,10 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
         shifts = solved.get(number, {})
         angle_deg = np.degrees(np.linalg.norm(alignment.rotation_rad))
         alone = [shifts[eye] for eye in EYES if eye in shifts]
+        phi = ([signed(1e3 * shift.shift_m[axis], 2) for shift in alone] for axis in range(3))
         rms = (f"{1e3 * shift.rms_m:.2f}" for shift in alone)
         inliers = (f"{100 * shift.inlier_ratio:.0f}" for shift in alone)
-        measured = ("\n".join(lines) for lines in (map(_phi_text, alone), rms, inliers))
+        measured = ("\n".join(lines) for lines in (*phi, rms, inliers))
         rows[number] = (
             str(number),
             _eyes_text(alignment.eyes),
@@ -208,7 +211,3 @@ def _spread_cells(spread: TrialSpread) -> tuple[str, ...]:
 def _eyes_text(eyes: Sequence[Eye]) -> str:
     """Return the name of one eye, or of both."""
     return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
-
-
-def _phi_text(shift: EyeShift) -> str:
-    return " ".join(f"{signed(1e3 * value_m, 2):>6}" for value_m in shift.shift_m)

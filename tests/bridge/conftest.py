@@ -52,7 +52,7 @@ def snapshot(tmp_path: Path) -> Iterator[Snapshot]:
     with Session.create(tmp_path, example_rig(), {}, name="session") as session:
         record = Session.open(session.path)
         procedure = Procedure(
-            State.SHOW_HAND, ("left", "right"), None, "", 0, 0.1, {}, None, SHIFT_M, True
+            State.SHOW_HAND, ("left", "right"), None, "", 0.1, {}, None, SHIFT_M, True
         )
         yield Snapshot(
             number=1,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from handcal.bridge.bridge import Bridge
 from handcal.bridge.lsl import LslOutput, events
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig.example import example_rig
+from handcal.session.journal import Event
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import Alignment
@@ -38,10 +40,16 @@ def test_pylsl_receives_events_with_their_times(
         inlet.open_stream(timeout=10.0)
         bridge(snapshot)
         bridge(later())  # nothing happened
-        now = later(
-            state=State.SOLVED, refused=1, refusal="turned", alignments={1: simulated(1)},
-            results=results,
-        )  # fmt: skip
+        refused = Event(90, "", "refused", {})
+        now = replace(
+            later(
+                state=State.SOLVED,
+                refusal="no hand",
+                alignments={1: simulated(1)},
+                results=results,
+            ),
+            record=replace(snapshot.record, events=(*snapshot.record.events, refused)),
+        )
         bridge(now)
         received = [inlet.pull_sample(timeout=5.0) for _ in range(7)]
         inlet.close_stream()
@@ -49,7 +57,7 @@ def test_pylsl_receives_events_with_their_times(
     assert [text["event"] for text in texts] == [
         "session", "state", "state", "refused", "confirmed", "solved", "solved"
     ]  # fmt: skip
-    assert texts[3] == {"event": "refused", "reason": "turned"}
+    assert texts[3] == {"event": "refused", "reason": "no hand"}
     assert texts[4] == {"event": "confirmed", "number": 1, "eyes": ["left", "right"]}
     assert texts[5]["phi_m"] == results.eyes["left"].shift_m.tolist()
     ahead_s = pylsl.local_clock() - time.monotonic()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -84,7 +85,7 @@ def test_if_one_file_cannot_be_replaced_none_is(
 
 def test_two_at_once_are_refused(tmp_path: Path) -> None:
     with Staging(tmp_path / "out") as first:
-        with pytest.raises(FileError, match="in use by process"):
+        with pytest.raises(FileError, match=f"^{re.escape(str(tmp_path / 'out'))} is in use"):
             Staging(tmp_path / "out")
         write(first, x="1")
         first.publish([])
@@ -118,3 +119,9 @@ def test_a_file_as_the_folder_is_refused_before_anything_is_written(
     with pytest.raises(FileError, match="is a file, not a folder"):
         Staging(tmp_path / name)
     assert tree(tmp_path) == {"file": "old"}
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="Linux has it")
+def test_a_folder_that_cannot_be_created_is_named_as_it_was_chosen() -> None:
+    with pytest.raises(FileError, match=r"^cannot create the folder /proc/a/b: No such file"):
+        Staging(Path("/proc/a/b"))

@@ -378,7 +378,6 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
         eyes=EYES,
         cursor=shots.cursor if state in (State.ALIGN, State.ALIGNED, State.SOLVED) else None,
         refusal="",
-        refused=0,
         guard_limit_rad=float(np.radians(9.0)),
         alignments={},
         results=results if is_sent or state is State.SOLVED else None,

@@ -13,6 +13,7 @@ from handcal.io.files import (
     read_json,
     read_limited,
     remove_leftovers,
+    require_writable,
     write_atomic,
     write_json,
     write_new,
@@ -130,6 +131,13 @@ def test_make_folder_makes_parents_and_takes_an_existing_one(tmp_path: Path) -> 
     (tmp_path / "file").touch()
     with pytest.raises(FileError, match="cannot create the folder"):
         make_folder(tmp_path / "file" / "c")
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="Linux has it")
+def test_a_folder_that_stores_nothing_is_refused(tmp_path: Path) -> None:
+    require_writable(tmp_path / "new" / "folder")
+    with pytest.raises(FileError, match="nothing can be stored in /proc: choose another folder"):
+        require_writable(Path("/proc/a/b"))
 
 
 def test_json_keeps_every_bit_of_a_number(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         with pytest.raises(ProcedureError, match="solve and apply"):
             station.trials.compare()
         calibration.make_cursor(EYES)
-        refused = step_until(station, "a refusal", lambda s: s.procedure.refused > 0, PATIENCE_S)
+        refused = step_until(station, "a refusal", lambda s: s.record.refused > 0, PATIENCE_S)
         assert "turned" in refused.procedure.refusal
         assert refused.procedure.state is State.ALIGN
         assert refused.record.alignments == {}

@@ -43,6 +43,8 @@ from handcal_gui.windows.evaluation.preparation import PreparationDialog
 _FIRST_SIZE = QSize(1120, 760)
 _TURNED = tr("Turned to the display's axes")
 _NOT_TURNED = tr("Along the camera's axes")
+_BY_ITSELF = tr("A&utomatically")
+_NOT_BY_ITSELF = tr("Automatically: stored images do not wait")
 MOST_POSES = 100
 
 
@@ -91,7 +93,7 @@ class CaptureDialog(PreparationDialog):
         self._take = main_button("takeCapture", tr("Take again"))
         self._take.setMinimumWidth(self._take.sizeHint().width())
         self._by_itself = with_name(
-            QCheckBox(tr("A&utomatically")),
+            QCheckBox(_BY_ITSELF),
             "byItself",
             help_text=tr(
                 "Take each image once the cube or the grid is at rest. Between two images of the "
@@ -313,6 +315,10 @@ class CaptureDialog(PreparationDialog):
         is_seen = self._camera.images is not None and self._list.chosen is not None
         self._start.setEnabled(self._looked_for is not None)
         self._take.setEnabled(is_ready and is_seen)
+        are_stored = self._camera.are_stored  # and would be paired as they come, not as asked for
+        self._by_itself.setText(_NOT_BY_ITSELF if are_stored else _BY_ITSELF)
+        self._by_itself.setEnabled(not are_stored)
+        self._by_itself.setChecked(self._by_itself.isChecked() and not are_stored)
         self._take.setText(tr("Take again") if self._list.chosen_is_taken else tr("Take"))
         self._instruction.setText(self._next_instruction())
 

@@ -97,12 +97,14 @@ def restore_sessions(paths: Sequence[Path], progress: Progress) -> str:
 
 
 def correct_names(names: Mapping[Path, str], progress: Progress) -> str:
-    """Correct the names of the wearers of some sessions; return a message."""
+    """Correct or remove the names of the wearers of some sessions; return a message."""
     corrected, lines = _each(
         list(names), lambda path: correct_wearer(path, names[path]), tr("Correcting {}"), progress
     )
     count = pluralize(corrected, tr("session"), tr("sessions"))
-    return _with_lines(tr("Name corrected in {}.").format(count), lines)
+    is_named = any(name.strip() for name in names.values())
+    said = tr("Name corrected in {}.") if is_named else tr("Name removed from {}.")
+    return _with_lines(said.format(count), lines)
 
 
 def _each(

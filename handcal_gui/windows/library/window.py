@@ -258,6 +258,7 @@ class LibraryWindow(QDialog):
         dialog.setComboBoxEditable(True)
         dialog.setComboBoxItems(list(names))
         dialog.setTextValue(chosen[0].wearer)
+        dialog.resize(56 * SPACING_PX, 0)  # the title needs room beside the buttons of the frame
         box = dialog.findChildren(QComboBox)[0]
         field, completer = box.lineEdit(), box.completer()
         assert field is not None
@@ -360,7 +361,6 @@ class LibraryWindow(QDialog):
         halves.setStretchFactor(0, 3)
         halves.setStretchFactor(1, 1)
         halves.setChildrenCollapsible(False)
-        top = hbox((self._search, 1), self._kind, spacing=SPACING_PX)
         buttons = (
             _pressed_for(action, button(name, action.text()))
             for name, action in {
@@ -378,7 +378,7 @@ class LibraryWindow(QDialog):
         actions = hbox(1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
-            top,
+            hbox((self._search, 1), self._kind, spacing=SPACING_PX),
             (halves, 1),
             counts,
             self._said,

@@ -27,7 +27,7 @@ from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.widgets.path_field import PathField
-from tests.gui.helpers import letters, text
+from tests.gui.helpers import child, letters, text
 
 
 class Exporter:
@@ -128,6 +128,26 @@ def test_what_is_chosen_is_exported_and_remembered(
     monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
     press(dialog, "exportEndFix").click()
     assert [url.toLocalFile() for url in opened] == [str(target)]
+    assert press(dialog, "openReport").isHidden()  # none was made
+
+
+def test_the_report_that_was_made_opens_with_a_letter(
+    qtbot: QtBot, dialog: ExportDialog, exporter: Exporter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    exporter.names = ("a.csv", "report.html", "report.pdf")
+    exporter.may_end.set()
+    press(dialog, "export").click()
+    qtbot.waitUntil(press(dialog, "openReport").isVisible)
+    assert sorted(letters(dialog, is_shown=True)) == ["b", "c", "o", "r"]
+    press(dialog, "openReport").click()
+    assert [url.toLocalFile() for url in opened] == [str(exporter.folders[0] / "report.pdf")]
+    press(dialog, "back").click()
+    exporter.names = ("a/report.pdf", "b/report.pdf")
+    press(dialog, "export").click()
+    qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.")
+    assert press(dialog, "openReport").isHidden()  # which of them?
 
 
 def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog) -> None:
@@ -143,6 +163,23 @@ def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog)
     folder.set_path("")
     assert not press(dialog, "export").isEnabled()
     assert text(dialog, "exportTask") == "Choose the folder to export to."
+
+
+def test_a_folder_that_cannot_be_created_is_refused_beside_it(
+    qtbot: QtBot, dialog: ExportDialog, tmp_path: Path
+) -> None:
+    made = f"The folder {dialog._choices.target.name} is created there."
+    qtbot.waitUntil(lambda: text(dialog, "folderFound") == made)
+    field, file = child(dialog, PathField), tmp_path / "file"
+    file.touch()
+    field.set_path(str(file / "folder"))
+    refused = f"{file} is a file: choose a folder."
+    qtbot.waitUntil(lambda: text(dialog, "folderFound") == refused)
+    assert text(dialog, "exportTask") == "Choose another folder to export to."
+    assert not press(dialog, "export").isEnabled()
+    field.set_path(str(tmp_path / "new"))
+    qtbot.waitUntil(press(dialog, "export").isEnabled)
+    assert text(dialog, "folderFound") == made
 
 
 def test_a_failure_is_reported_and_can_be_tried_again(

@@ -54,7 +54,7 @@ def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> N
         lambda: live.snapshot.observation is not None and live.snapshot.observation.is_over_limit
     )
     studio.headset.confirm()
-    live.wait(lambda: live.snapshot.procedure.refused == 1)
+    live.wait(lambda: live.snapshot.record.refused == 1)
     assert "more than 9°" in live.child(QLabel, "wizardNote").text()
     assert live.record.alignments == {}
     studio.camera.shows = "live"

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QEvent, QLocale, QPoint, QPointF
 from PySide6.QtGui import QHelpEvent, Qt, QTextDocument, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox, QToolTip
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QToolTip
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.fields import (
@@ -18,6 +18,7 @@ from handcal_gui.widgets.fields import (
     plain_message,
     whole_number,
 )
+from tests.gui.helpers import child
 
 Field = QComboBox | QDoubleSpinBox | QSpinBox
 
@@ -109,6 +110,34 @@ def test_a_minus_is_shown_and_a_hyphen_read_too(qtbot: QtBot, typed: str) -> Non
     assert (field.value(), field.text()) == (-2.5, "−2.50")
     field.stepBy(-1)
     assert field.text() == "−3.50"
+
+
+@pytest.mark.parametrize(
+    ("typed", "taken"), [("99", "30.00 mm"), ("-31", "−30.00 mm"), ("99.5", "30.00 mm")]
+)
+def test_a_number_out_of_range_is_typed_in_full_and_the_range_is_said(
+    qtbot: QtBot, typed: str, taken: str
+) -> None:
+    field = number("x", -30.0, 30.0, 0.01, " mm", "")
+    qtbot.addWidget(field)
+    field.show()
+    field.selectAll()
+    QTest.keyClicks(field.lineEdit(), typed)
+    assert field.cleanText() == typed
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert field.text() == taken
+    assert child(field, QLabel, "brief").text() == (
+        f"Changed to {taken}. Allowed: −30.00 to 30.00 mm"
+    )
+
+
+@pytest.mark.parametrize("typed", ["1.234", "1e3", "nan", "x"])
+def test_what_is_no_number_is_not_typed(qtbot: QtBot, typed: str) -> None:
+    field = number("x", -30.0, 30.0, 0.01, " mm", "")
+    qtbot.addWidget(field)
+    field.selectAll()
+    QTest.keyClicks(field.lineEdit(), typed)
+    assert field.cleanText() != typed
 
 
 def test_the_tooltip_names_the_range_with_the_unit(qtbot: QtBot) -> None:

@@ -33,6 +33,13 @@ def column(columns: Sequence[object], title: str) -> int:
     return [getattr(column, "title", column) for column in columns].index(title)
 
 
+def phi_mm(cells: Sequence[str]) -> list[list[float]]:
+    """Return φ1, φ2 and φ3 of each eye, from the columns that their headings name."""
+    places = (column(ALIGNMENT_COLUMNS, f"φ{axis} mm") for axis in (1, 2, 3))
+    columns = (cells[place].replace("−", "-").splitlines() for place in places)
+    return [list(map(float, line)) for line in zip(*columns, strict=True)]
+
+
 def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
     rows = alignment_rows(record, results)
     assert list(rows) == [1, 2]
@@ -44,9 +51,7 @@ def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
         assert float(cells[column(ALIGNMENT_COLUMNS, "Rotation °")]) == pytest.approx(
             angle_deg, abs=0.05
         )
-        lines = cells[column(ALIGNMENT_COLUMNS, "φ mm")].replace("−", "-").splitlines()
-        for eye, line in zip(EYES, lines, strict=True):
-            shown_mm = [float(value) for value in line.split()]
+        for eye, shown_mm in zip(EYES, phi_mm(cells), strict=True):
             np.testing.assert_allclose(shown_mm, 1e3 * shifts[eye].shift_m, atol=0.005)
         assert cells[column(ALIGNMENT_COLUMNS, "Point RMS mm")] == "\n".join(
             f"{1e3 * shift.rms_m:.2f}" for shift in shifts.values()
@@ -55,8 +60,8 @@ def test_alignments_as_text(record: SessionRecord, results: Results) -> None:
 
 def test_results_of_other_alignments_are_left_out(record: SessionRecord, results: Results) -> None:
     shorter = replace(record, alignments={1: record.alignments[1]})
-    assert alignment_rows(shorter, results)[1][3:6] == ("–",) * 3
-    assert alignment_rows(record, None)[2][3:6] == ("–",) * 3
+    assert alignment_rows(shorter, results)[1][3:8] == ("–",) * 5
+    assert alignment_rows(record, None)[2][3:8] == ("–",) * 5
 
 
 def test_one_eye_alone(
@@ -69,11 +74,8 @@ def test_one_eye_alone(
     )
     cells = alignment_rows(replace(record, alignments={1: one, 2: alignments[1]}), alone)[1]
     assert cells[1] == "Right eye"
-    [shown] = cells[column(ALIGNMENT_COLUMNS, "φ mm")].replace("−", "-").splitlines()
     np.testing.assert_allclose(
-        [float(value) for value in shown.split()],
-        1e3 * results.alignments[1]["right"].shift_m,
-        atol=0.005,
+        phi_mm(cells), [1e3 * results.alignments[1]["right"].shift_m], atol=0.005
     )
     assert "\n" not in cells[column(ALIGNMENT_COLUMNS, "Point RMS mm")]
 

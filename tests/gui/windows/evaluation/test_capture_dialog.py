@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CameraError
@@ -29,6 +29,7 @@ from handcal.types import Intrinsics, UInt8
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras
+from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.evaluation.capture_dialog import CaptureDialog
 from handcal_gui.windows.evaluation.capture_list import CaptureList
 from tests.gui.helpers import letters
@@ -254,6 +255,29 @@ def test_captures_at_rest_are_taken_by_themselves_and_the_view_is_turned(
     technician.camera.image = cube_seen()  # of another size than the intrinsics
     technician.wait_for_instruction("centre/pose-1: show the virtual cube, cover the real one.")
     assert "640×360" in view.caption
+
+
+def test_stored_images_which_do_not_wait_are_not_taken_by_themselves(
+    make: Callable[[CubeEntries], Technician], entries: CubeEntries, tmp_path: Path
+) -> None:
+    technician = make(entries)
+    technician.start()
+    by_itself = technician.dialog.findChild(QCheckBox, "byItself")
+    assert isinstance(by_itself, QCheckBox)
+    by_itself.setChecked(True)
+    source = technician.live.findChild(QComboBox, "source")
+    path = technician.live.findChild(PathField)
+    assert isinstance(source, QComboBox)
+    assert isinstance(path, PathField)
+    source.setCurrentIndex(source.findText("Recording or video"))
+    path.set_path(str(tmp_path))
+    technician.start()
+    assert (by_itself.isEnabled(), by_itself.isChecked()) == (False, False)
+    assert by_itself.text() == "Automatically: stored images do not wait"
+    assert technician.dialog.minimumSizeHint().width() <= 960
+    source.setCurrentIndex(0)
+    technician.start()
+    assert (by_itself.isEnabled(), by_itself.text()) == (True, "A&utomatically")
 
 
 def test_the_large_view_shows_the_image_alone_until_escape(

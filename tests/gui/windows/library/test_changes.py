@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QPushButton
+from PySide6.QtWidgets import QInputDialog, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.library import delete_session
@@ -117,6 +117,25 @@ def test_a_name_is_corrected_and_brought_back(
     qtbot.waitUntil(child(window, QPushButton, "correctName").isEnabled, timeout=PATIENCE_MS)
     assert child(window, QPushButton, "restoreSession").isHidden()
     assert answer_name(qtbot, window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
+
+
+def test_an_emptied_name_is_said_to_be_removed(qtbot: QtBot, window: LibraryWindow) -> None:
+    choose(window, "Bea")
+    answer_name(qtbot, window, " ")
+    wait_for(qtbot, window, "Name removed from 1 session.")
+    qtbot.waitUntil(lambda: window.chosen[0].wearer == "", timeout=PATIENCE_MS)
+    press(window, "restoreSession")
+    wait_for(qtbot, window, "Name corrected in 1 session.")
+
+
+def test_the_title_of_the_name_has_room_beside_the_buttons_of_its_frame(
+    window: LibraryWindow,
+) -> None:
+    window._ask_name()
+    dialog = child(window, QInputDialog)
+    title_px = dialog.fontMetrics().horizontalAdvance(dialog.windowTitle())
+    assert dialog.width() > 3 * title_px
+    dialog.reject()
 
 
 def test_a_name_is_no_markup(qtbot: QtBot, window: LibraryWindow) -> None:
