@@ -408,6 +408,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Choose another folder to export to.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose what to write and where, then export.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1051,7 +1055,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Enter the wearer&apos;s name, now or later in the library, and start; the settings are kept for the next one.</source>
+        <source>Enter a name, now or later in the library, and start; the settings are kept.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1418,6 +1422,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Not accepted yet: verify {} again. Another alignment would change little.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Each eye was verified before the last alignment. Finish, or verify again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2276,6 +2284,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>An eye is being verified; confirm or skip that first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer compares two drawings: answer in Trials, or stop comparing.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3652,10 +3664,6 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>After verification</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>After, expected</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3832,6 +3840,18 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>φ1 mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ2 mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ3 mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Point RMS mm</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3898,10 +3918,6 @@ root mean square over the inliers</source>
     <message>
         <source>φ1, φ2 and φ3 of the eye from this alignment alone: its distance to the right of, below
 and in front of the rig&apos;s viewpoint, in millimetres; the left eye above the right one</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>φ mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4616,6 +4632,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Name removed from {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Cancelled: {} left out.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4737,6 +4757,10 @@ one turns out.</source>
     </message>
     <message>
         <source>A&amp;utomatically</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Automatically: stored images do not wait</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6243,6 +6267,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Press the large button</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Changed to {}. {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
