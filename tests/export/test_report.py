@@ -103,6 +103,19 @@ def test_no_name_or_note_breaks_it(tmp_path: Path, empty: SessionRecord, text: s
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
 
 
+def test_it_says_what_was_simulated(empty: SessionRecord) -> None:
+    def simulated(**station: str) -> list[str]:
+        settings = {**empty.settings, "station": station}
+        outcome = load_outcome(replace(empty, settings=settings))
+        [summary] = session_report(outcome).sections[0].items
+        assert isinstance(summary, Table)
+        return [value for name, value in summary.rows if name == "Simulated"]
+
+    assert simulated(source="simulator", headset="virtual") == ["camera, headset and wearer"]
+    assert simulated(source="realsense", headset="virtual") == ["headset and wearer"]
+    assert simulated(source="realsense", headset="network") == []
+
+
 def test_without_alignments_it_says_so(empty: SessionRecord) -> None:
     found = texts(compose(session_report(load_outcome(empty)), Progress()))
     assert "Nothing is solved: the session holds no alignment." in found
