@@ -164,6 +164,8 @@ class BoardPage(QWidget):
         inner = " × ".join(map(str, self._project.inputs.board.inner))
         corners = tr("{} inner corners").format(inner)
         found = Finding("", Health.LIMITED, corners, tr("no image shows this board yet"))
+        for save in (self.main, self._picture):
+            save.setEnabled(not self._problem)
         if self._problem:
             found = Finding("", Health.BROKEN, self._problem)
         elif self._project.inputs.board_found:

@@ -84,6 +84,9 @@ def test_an_impossible_board_is_reported_and_not_taken(
     page.enter()
     assert "0.3 to 0.95" in found(page), "the step is shown again"
     assert project.inputs.board == Board()
+    assert not page.main.isEnabled()  # or the board before would be saved as this one
+    marker.setValue(10.0)
+    assert page.main.isEnabled()
 
 
 def test_the_board_is_saved(
