@@ -186,9 +186,9 @@ class PreferencesDialog(QDialog):
         add(
             tr("Tar&get"),
             self._target,
-            tr("Largest expected error of an accepted eye; 60′ are 1°."),
+            tr("Largest expected error of an accepted eye; 60′ is 1°."),
         )
-        add(tr("Eye box"), self._learn, tr("Expects eyes where those of earlier wearers were."))
+        add(tr("Eye box"), self._learn, tr("Learns from earlier wearers where eyes are to be expected."))
         self._calibration.add_heading(tr("Sent to other programs, from the next calibration on"))
         add("Open&IGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
         add(tr("&Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
@@ -210,7 +210,7 @@ class PreferencesDialog(QDialog):
         self._area = area = scrollable(self._calibration)
         about = paragraph(
             "about",
-            tr("Change what you need and press OK. A calibration that runs keeps its settings."),
+            tr("Change what you need and press OK. A running calibration keeps its settings."),
         )
         margin_px = SPACING_PX * 3 // 2  # with it, all fields are in sight on a small screen
         vbox(about, (area, 1), buttons, on=self, margins=margin_px, spacing=SPACING_PX)

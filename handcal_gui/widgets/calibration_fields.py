@@ -106,7 +106,7 @@ class CalibrationFields(QWidget):
         self._grid.setVerticalSpacing(SPACING_PX // 2 if explains else SPACING_PX)
         self._grid.setColumnStretch(2, 1)
         if explains:
-            self.add_heading(tr("Calibration, from the next one on"))
+            self.add_heading(tr("For the next calibrations"))
         turned = tr("The hand may be rotated this much from the cursor.")
         self.add_row(tr("&Rotation guard"), self._guard, turned)
         gate_row = self._grid.rowCount()
