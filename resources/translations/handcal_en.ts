@@ -627,6 +627,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Largest expected error of an accepted eye; 60′ is 1°.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Learns from earlier wearers where eyes are to be expected.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The&amp;me</source>
         <translation type="unfinished"></translation>
     </message>
@@ -643,19 +651,11 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Change what you need and press OK. A calibration that runs keeps its settings.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Largest expected error of an accepted eye; 60′ are 1°.</source>
+        <source>Change what you need and press OK. A running calibration keeps its settings.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Eye box</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Expects eyes where those of earlier wearers were.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3468,6 +3468,10 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>For the next calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Rotation guard</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3505,10 +3509,6 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>Solver</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Calibration, from the next one on</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
