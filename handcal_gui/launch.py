@@ -101,7 +101,7 @@ def _typed_meanwhile(first: QWidget, window: QWidget) -> str:
     nobody saw what it would press.
     """
     line = QLineEdit(first)
-    line.setGeometry(0, 0, 1, 1)
+    line.setGeometry(-1, -1, 1, 1)  # not seen
     line.show()
     line.setFocus()
     deadline_s = time.monotonic() + _ACTIVE_S
