@@ -1,4 +1,4 @@
-"""Values passed between packages: frozen, with read-only arrays and units and frames in their names.
+"""Values that packages pass on: frozen, with read-only arrays and units and frames in their names.
 
 Frames are named as in the paper (Hu, Rodriguez y Baena, Cutolo, ISMAR 2021): ``W`` world,
 ``H`` headset camera rig, ``D`` depth camera, ``C0`` viewpoint of the offline calibration,
