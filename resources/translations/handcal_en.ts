@@ -631,10 +631,6 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Learns from earlier wearers where eyes are to be expected.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The&amp;me</source>
         <translation type="unfinished"></translation>
     </message>
@@ -659,6 +655,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Learns from earlier wearers where eyes are.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Sent to other programs by the next calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Port</source>
         <translation type="unfinished"></translation>
     </message>
@@ -672,10 +676,6 @@ local network can read them.</source>
     </message>
     <message>
         <source>port</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Sent to other programs, from the next calibration on</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -776,6 +776,14 @@ local network can read them.</source>
     </message>
     <message>
         <source>Open the list, or choose the file or folder, of the field</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Shift+F4</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose a folder for a field that takes files, too</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
