@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -110,7 +109,7 @@ def _summary(outcome: SessionOutcome) -> Section:
                     "Session": outcome.name,
                     "Begun": at_minute(outcome.started),
                     "Rig": record.rig.name,
-                    **_simulated(record.settings),
+                    **({"Simulated": record.simulated} if record.simulated else {}),
                     "Method": outcome.settings.method,
                     "Alignments": str(len(record.alignments)),
                     "Confirmations refused": str(record.refused),
@@ -121,16 +120,6 @@ def _summary(outcome: SessionOutcome) -> Section:
             )
         ],
     )
-
-
-def _simulated(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Return what of a session was simulated, as a fact; nothing if all was real."""
-    station = settings.get("station")
-    if not isinstance(station, Mapping):
-        return {}
-    simulated = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
-    found = [what for name, value, what in simulated if station.get(name) == value]
-    return {"Simulated": ", ".join(found)} if found else {}
 
 
 def _shifts(outcome: SessionOutcome) -> Section:

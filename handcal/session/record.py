@@ -86,6 +86,15 @@ class SessionRecord:
         return bool(self.alignments or self.facts.verified)
 
     @property
+    def simulated(self) -> str:
+        """Parts of the session that were simulated, in words; empty if all was real."""
+        station = self.settings.get("station")
+        if not isinstance(station, dict):
+            return ""
+        parts = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
+        return ", ".join(what for name, value, what in parts if station.get(name) == value)
+
+    @property
     def refused(self) -> int:
         """Number of confirmations refused, for any reason."""
         return sum(event.name == "refused" for event in self.events)

@@ -12,6 +12,7 @@ from handcal.lab.methods.published import REPROJECTION
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with
+from handcal.session.comparison import count_comparisons, read_comparisons
 from handcal.session.trial import calibration_numbers
 from handcal.statistics import INTERVAL_METHOD
 
@@ -64,6 +65,16 @@ def _summary(test: UserTest, result: UserTestResult) -> Section:
         "Trials": f"{total.trials}, each one eye at one distance",
         "Corners": str(total.corners),
     }
+    sessions = test.sessions.values()
+    if simulated := sum(bool(record.simulated) for record in sessions):
+        counts["Simulated sessions"] = str(simulated)
+    compared = [one for record in sessions for one in read_comparisons(record.events)]
+    if compared:
+        found = count_comparisons(compared)
+        counts["Blinded comparisons"] = (
+            f"{found.applied} better with the calibration, {found.offline} without it, "
+            f"{found.neither} neither"
+        )
     return Section("", [facts(counts | made_with()), _METHOD])
 
 

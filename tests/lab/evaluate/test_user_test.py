@@ -20,7 +20,9 @@ from handcal.lab.evaluate.user_test_report import user_test_report
 from handcal.report.cells import median_quartiles
 from handcal.report.document import Table
 from handcal.rig.example import example_rig
-from handcal.session.session import Session
+from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, comparison_json
+from handcal.session.journal import Event
+from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.statistics import mean_interval
 from handcal.types import EYES, Float64
@@ -152,6 +154,28 @@ def test_the_report_says_it(user_test: UserTest) -> None:
     assert {figure.name for figure in report.figures} == {"errors", "wearers-1", "corners"}
     published = ("Moser & Swan 2016, finger, 25", "16.98", "10.83–25.51", "0.93–46.87")
     assert published in [tuple(row) for table in tables for row in table.rows]
+
+
+def test_the_report_counts_simulated_sessions_and_blinded_comparisons(user_test: UserTest) -> None:
+    def summary(sessions: dict[str, SessionRecord]) -> dict[str, str]:
+        test = replace(user_test, sessions=sessions)
+        [table, _] = user_test_report(test, evaluate_user_test(test)).sections[0].items
+        assert isinstance(table, Table)
+        return {row[0]: row[1] for row in table.rows}
+
+    sessions = dict(user_test.sessions)
+    assert not {"Simulated sessions", "Blinded comparisons"} & set(summary(sessions))
+    name, record = next(iter(sessions.items()))
+    answers: tuple[tuple[Drawing, Answer], ...] = (("offline", "second"), ("applied", "neither"))
+    events = tuple(
+        Event(number, record.events[-1].time, COMPARED, comparison_json(Comparison(*one, {})))
+        for number, one in enumerate(answers, 100)
+    )
+    settings = {"station": {"source": "simulator", "headset": "virtual"}}
+    sessions[name] = replace(record, events=(*record.events, *events), settings=settings)
+    said = summary(sessions)
+    assert said["Simulated sessions"] == "1"
+    assert said["Blinded comparisons"] == "1 better with the calibration, 0 without it, 1 neither"
 
 
 def test_what_is_drawn_within_an_interval_is_its_own_mean(user_test: UserTest) -> None:
