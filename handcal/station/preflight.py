@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from importlib.util import find_spec
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -105,6 +106,10 @@ def _look(part: Part, look: Callable[[], Finding], advice: str) -> Finding:
     return replace(finding, what=PARTS[part])
 
 
+_EXTRAS = {"oak": ("OAK-D", "depthai"), "orbbec": ("Orbbec camera", "pyorbbecsdk")}
+"""Names and libraries of cameras that need an extra."""
+
+
 def _good(found: str) -> Finding:
     return Finding("", Health.GOOD, found)
 
@@ -127,7 +132,10 @@ def _camera(settings: StationSettings, progress: Progress) -> Finding:
         case "hololens2":
             return _hololens2(settings)
         case "oak" | "orbbec" as kind:
-            name = "OAK-D" if kind == "oak" else "Orbbec camera"
+            name, library = _EXTRAS[kind]
+            if find_spec(library) is None:
+                install = f"install it: pip install 'handcal[{kind}]'"
+                return _broken(f"the library of the {name}, {library}, is missing", install)
             which = f"{name} {settings.serial}".rstrip()
             return _limited(f"{which}, not tried yet", "it is opened when you start")
         case "recording":

@@ -135,7 +135,14 @@ def test_a_source_names_the_camera(source: str, expected: dict[str, Any]) -> Non
     assert with_source(StationSettings(), source) == replace(StationSettings(), **expected)
 
 
-def test_a_hololens_needs_its_address(settings: StationSettings) -> None:
+def test_a_hololens_needs_its_address_and_others_their_libraries(
+    settings: StationSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal.station.preflight.find_spec", lambda name: name == "pyorbbecsdk")
+    oak = find("camera", replace(settings, source="oak", headset="network"))
+    assert oak.health is Health.BROKEN
+    assert oak.found == "the library of the OAK-D, depthai, is missing"
+    assert oak.advice == "install it: pip install 'handcal[oak]'"
     live = replace(settings, source="hololens2", headset="network")
     assert find("camera", live).found == "no HoloLens 2 is chosen"
     there = replace(live, hololens2=HoloLens2Settings("192.168.1.7"))
