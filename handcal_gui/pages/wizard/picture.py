@@ -90,6 +90,12 @@ class GuidePicture(QWidget):
         else:
             self._show_camera(snapshot)
 
+    def begin(self) -> None:
+        """Remove the image of the session before."""
+        self._frame = None
+        self._camera.show_image(None)
+        self._camera.show_overlay(None)
+
     def fit(self, *, has_details: bool, has_eyes: bool) -> None:
         """Leave out of the result what a low window has no room for: the eyes only above it."""
         self.result.card.show_details(has_details)
@@ -117,9 +123,6 @@ class GuidePicture(QWidget):
         self.result.hide()  # or it takes its room in the layout
         self._stack.setCurrentWidget(self._camera)
         frame, seen = snapshot.frame, snapshot.observation
-        if frame is None and not snapshot.camera.problem:  # what is shown is of another session
-            self._camera.show_image(None)
-            self._camera.show_overlay(None)
         if frame is not None and frame is not self._frame:
             self._frame = frame
             self._camera.show_image(frame.color)
