@@ -163,13 +163,17 @@ def _is_demonstration(arguments: argparse.Namespace) -> bool:
 
 
 def _log_to(path: Path) -> None:
+    """Log to a file what the window says, and to the terminal what failed unexpectedly."""
     handlers: list[logging.Handler] = [logging.StreamHandler()]
+    handlers[0].setLevel(logging.WARNING)
     with suppress(HandcalError, OSError):
         make_folder(path.parent)
         handlers.append(RotatingFileHandler(path, maxBytes=_LOG_BYTES, backupCount=1))
     logging.basicConfig(
         level=logging.WARNING, format="%(asctime)s %(name)s: %(message)s", handlers=handlers
     )
+    logging.getLogger("handcal_gui").setLevel(logging.INFO)
+    logging.getLogger(__name__).info("started")
 
 
 def _report_error(

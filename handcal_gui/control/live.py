@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable
@@ -31,6 +32,8 @@ from handcal_gui.pages.wizard.view import ACTION_NAMES, Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.translation import tr
 from handcal_gui.window import MainWindow
+
+_LOG = logging.getLogger(__name__)
 
 _POLL_MS = 25
 """A snapshot is shown as soon as it arrives; this is for one that was too early and stays."""
@@ -297,6 +300,7 @@ class CalibrationController(QObject):
 
     def _on_opened(self, station: Station) -> None:
         self._link = station.link
+        _LOG.info("camera: %s, headset: %s", station.settings.source, station.settings.headset)
         self._conditions = Conditions(
             is_usb=station.settings.source == "realsense",
             is_virtual=station.settings.headset == "virtual",
@@ -311,6 +315,7 @@ class CalibrationController(QObject):
         host = f"[{host}]" if ":" in host else host
         panels.camera.begin(station.settings.calibration.segment)
         panels.cloud.clear()
+        self._wizard_panel.picture.begin()
         panels.fine_tune.set_rig(station.rig)
         panels.results.show_results(None, {}, station.rig)
         panels.session.set_read_only(False)

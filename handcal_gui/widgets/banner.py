@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
@@ -12,6 +14,7 @@ from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.sentence import sentence
 
 _NOTICE_MS = 6000
+_LOG = logging.getLogger(__name__)
 
 
 class Banner(QWidget):
@@ -54,7 +57,8 @@ class Banner(QWidget):
         return self._message or self._condition or self._notice
 
     def show_message(self, text: str) -> None:
-        """Show a message until it is closed or replaced."""
+        """Show a message until it is closed or replaced, and log it."""
+        _LOG.info("%s", text)
         self._message, self._notice = text, ""
         self._refresh()
 
@@ -65,8 +69,9 @@ class Banner(QWidget):
         self._refresh()
 
     def show_condition(self, text: str) -> None:
-        """Show a present problem; an empty text removes it."""
+        """Show a present problem, and log it; an empty text removes it."""
         if text != self._condition:
+            _LOG.info("%s", text or "the condition has ended")
             self._condition = text
             self._refresh()
 

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import logging
+
+import pytest
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
@@ -47,3 +50,14 @@ def test_a_notice_ends_by_itself_and_closes_no_message(qtbot: QtBot) -> None:
     banner.show_message("it failed")
     timer.timeout.emit()
     assert banner.text == "it failed"
+
+
+def test_what_is_said_is_logged(qtbot: QtBot, caplog: pytest.LogCaptureFixture) -> None:
+    banner = Banner()
+    qtbot.addWidget(banner)
+    with caplog.at_level(logging.INFO, "handcal_gui"):
+        banner.show_condition("no camera")
+        banner.show_condition("no camera")
+        banner.show_message("Could not solve")
+        banner.show_condition("")
+    assert caplog.messages == ["no camera", "Could not solve", "the condition has ended"]
