@@ -138,7 +138,8 @@ def test_a_source_names_the_camera(source: str, expected: dict[str, Any]) -> Non
 def test_a_hololens_needs_its_address_and_others_their_libraries(
     settings: StationSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("handcal.station.preflight.find_spec", lambda name: name == "pyorbbecsdk")
+    libraries = {"pyorbbecsdk": object()}
+    monkeypatch.setattr("handcal.station.preflight.find_spec", libraries.get)
     oak = find("camera", replace(settings, source="oak", headset="network"))
     assert oak.health is Health.BROKEN
     assert oak.found == "the library of the OAK-D, depthai, is missing"
