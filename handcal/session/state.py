@@ -144,7 +144,7 @@ class SessionState:
     older_results : list of dict
         Those before.
     facts : SessionFacts
-    verified_since : set of eye
+    verified_since : frozenset of eye
     alignment_facts : dict of int to AlignmentFacts
     alignments : NumberedItems of str
         Checksums.
@@ -163,7 +163,7 @@ class SessionState:
         self.results: dict[str, Any] | None = None
         self.older_results: list[dict[str, Any]] = []
         self.facts = SessionFacts()
-        self.verified_since: set[Eye] = set()
+        self._verified_with: dict[Eye, frozenset[int]] = {}
         self.alignment_facts: dict[int, AlignmentFacts] = {}
         self.alignments = NumberedItems[str]("alignment", MAX_ALIGNMENTS)
         self.trials = NumberedItems[Trial]("trial", MAX_TRIALS)
@@ -172,6 +172,12 @@ class SessionState:
         self.is_finished = False
         self.applied_shift_m: dict[Eye, Float64] = {}
         self.fine_tuned: dict[Eye, Float64] | None = None
+
+    @property
+    def verified_since(self) -> frozenset[Eye]:
+        """The eyes verified with the present alignments."""
+        now = frozenset(self.alignments.active)
+        return frozenset(eye for eye, then in self._verified_with.items() if then == now)
 
     def items(self, kind: Kind) -> NumberedItems[Any]:
         """Return the alignments or the trials."""
@@ -215,7 +221,8 @@ class SessionState:
                 self.former_wearers.append(former)
             case SessionEvent.FACTS_SAVED:
                 before, self.facts = self.facts, with_facts(self.facts, data)
-                self.verified_since.update(data.get("verified", ()))
+                now = dict.fromkeys(data.get("verified", ()), frozenset(self.alignments.active))
+                self._verified_with.update(now)
                 is_known = self.facts.eye_distance == before.eye_distance
                 if not (is_known and dict(self.facts.verified) == dict(before.verified)):
                     self.is_solved = self.is_applied = False
@@ -246,7 +253,6 @@ class SessionState:
                 self.fine_tuned = as_shifts(data["shift_m"])
                 self.applied_shift_m |= self.fine_tuned
         if name.startswith("alignment_"):
-            self.verified_since.clear()
             self.is_solved = self.is_applied = False
         if name in (SessionEvent.ALIGNMENT_DELETED, SessionEvent.ALIGNMENT_RESTORED):
             self._set_results(None)

@@ -188,10 +188,9 @@ def snapshot(
             record=record,
             views=_views(rig, shots),
         )
-        made = replace(snapshot, **changes)
         if verified := frozenset(procedure.get("verifications", ())):
-            made = replace(made, record=replace(made.record, verified_since=verified))
-        return made
+            changes["record"] = replace(changes.get("record", record), verified_since=verified)
+        return replace(snapshot, **changes)
 
     return make
 

@@ -243,6 +243,8 @@ def test_a_verification_is_of_the_alignments_so_far(session: Session, alignment:
     record = Session.open(session.path)
     assert record.verified_since == frozenset()
     assert set(record.facts.verified) == {"left"}
+    session.delete("alignment", 2)
+    assert Session.open(session.path).verified_since == {"left"}
 
 
 def test_a_shift_set_by_hand_is_kept_until_the_next_results(session: Session) -> None:

@@ -228,7 +228,7 @@ class PlannedWizard(Wizard):
                     "Not accepted yet: verify {} again. Another alignment would change little."
                 ).format(eye_names(again))
         elif set(procedure.verifications) >= set(self.usable_eyes):
-            text = tr("Each eye was verified before the last alignment. Finish, or verify again.")
+            text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
             if snapshot.record.verified_since >= set(self.usable_eyes):
                 text = tr("The wearer has verified the result. Finish, or verify an eye again.")
             main = ButtonSpec(Action.NEXT, tr("Finish"))

@@ -138,7 +138,7 @@ def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot:
     assert begun(snapshot).view(done).sentence.startswith("The wearer has verified the result.")
     aligned = replace(done, record=replace(done.record, verified_since=frozenset()))
     view = begun(snapshot).view(aligned)
-    assert view.sentence.startswith("Each eye was verified before the last alignment.")
+    assert view.sentence.startswith("Verified before the alignments changed.")
     solving = planned_snapshot(snapshot, StepName.SOLVE, verifications=VERIFIED)
     assert begun(snapshot).view(solving).step is Step.VERIFY
     solving = replace(solving, record=aligned.record)
