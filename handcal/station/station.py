@@ -260,6 +260,7 @@ class Station(Closable):
     def finish(self) -> None:
         """Record the link statistics and finish the session; FileError if it cannot be written."""
         self.trials.hide_target()
+        self.trials.comparing.end()
         self.calibration.store_waiting()
         self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()

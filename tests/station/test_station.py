@@ -160,8 +160,10 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         station.restore("trial", 1)
         with pytest.raises(ValueError, match="no deleted trial 1"):
             station.restore("trial", 1)
+        station.trials.compare()
         station.finish()
         last = station.step()
+        assert last.comparing is None
         expected = make_trial(station.rig.eyes["left"], "left", 0.5, solved_m, adjusted_m)
         np.testing.assert_allclose(last.record.trials[1].error_px, expected.error_px, rtol=1e-12)
         assert expected.error_px.min() > 0.0
