@@ -18,7 +18,7 @@ from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_COLORS, VERDICT_WORDS
 from handcal_gui.widgets.sentence import sentence
 
-_NOT_MEASURED = tr("not measured")
+_NOT_VERIFIED = tr("not verified")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +27,12 @@ class Bar:
 
     name: str
     arcmin: float | None
-    """None if it was not measured."""
+    """None if it was not verified."""
 
     @property
     def text(self) -> str:
         """The error with its unit."""
-        return _NOT_MEASURED if self.arcmin is None else f"{self.arcmin:.1f}′"
+        return _NOT_VERIFIED if self.arcmin is None else f"{self.arcmin:.1f}′"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def eye_results(results: Results) -> list[EyeResult]:
             )
         else:
             after = Bar(unused or tr("After, expected"), benefit.after_arcmin)
-            bars = before, after, Bar(tr("After, measured"), None)
+            bars = before, after, Bar(tr("Verification"), None)
         another = tr("One more alignment: {:.1f}′ expected").format(
             results.expected_after_another_arcmin[eye]
         )

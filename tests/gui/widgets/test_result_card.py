@@ -18,9 +18,9 @@ def test_expected_and_measured_are_told_apart(results: Results) -> None:
     assert [(bar.name, bar.arcmin) for bar in left.bars] == [
         ("Before, expected", benefit.without_arcmin),
         ("After, expected", benefit.after_arcmin),
-        ("After, measured", None),
+        ("Verification", None),
     ]
-    assert left.bars[-1].text == "not measured"
+    assert left.bars[-1].text == "not verified"
     assert f"{results.expected_after_another_arcmin['left']:.1f}′" in left.another
 
 
@@ -30,7 +30,7 @@ def test_the_text_has_every_number_with_its_unit(results: Results) -> None:
     for eye in ("left", "right"):
         assert f"After, expected: {results.benefits[eye].after_arcmin:.1f}′" in lines
         assert f"Depth error: {results.benefits[eye].depth}" in lines
-    assert lines.count("After, measured: not measured") == 2
+    assert lines.count("Verification: not verified") == 2
 
 
 def test_the_card_shows_the_verdicts(qtbot: QtBot, results: Results) -> None:

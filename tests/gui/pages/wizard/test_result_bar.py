@@ -33,7 +33,7 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     copied = QGuiApplication.clipboard().text()
     assert copied.startswith("Wearer: without a name\n")
     assert "Target: 6.5′" in copied
-    assert copied.count("After, measured: not measured") == 2
+    assert copied.count("Verification: not verified") == 2
     assert text(bar.buttons, "brief") == "Copied: the result"
     printer = QPrinter()
     printer.setOutputFileName(str(tmp_path / "result.pdf"))
