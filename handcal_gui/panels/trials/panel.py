@@ -138,7 +138,8 @@ class TrialsPanel(QWidget):
         self._snapshot = snapshot
         if snapshot.record is not self._record:
             self.show_record(snapshot.record)
-        self._refresh()
+        else:
+            self._refresh()
 
     def show_record(self, record: SessionRecord) -> None:
         """Show the trials of a session."""
@@ -151,6 +152,7 @@ class TrialsPanel(QWidget):
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
             self._plot.show_trials(record.trials)
         self._show_deletions()
+        self._refresh()
 
     def set_read_only(self, is_read_only: bool) -> None:
         """Prepare for another session, read-only or running."""

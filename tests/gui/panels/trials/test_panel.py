@@ -22,6 +22,8 @@ from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
 from handcal.rig_types import Rig
+from handcal.session.comparison import COMPARED
+from handcal.session.journal import Event
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
@@ -387,6 +389,16 @@ def test_a_blinded_comparison_is_asked_for_step_by_step(
         button(panel, QPushButton, "Stop comparing").click()
     panel.show_snapshot(applied)
     assert begin.isVisible()
+    event = Event(
+        99,
+        applied.record.events[-1].time,
+        COMPARED,
+        {"first": "offline", "answer": "first", "applied_shift_m": {}},
+    )
+    panel.show_record(replace(applied.record, events=(*applied.record.events, event)))
+    assert text(panel, "compared") == "1 comparison recorded"
+    panel.show_record(applied.record)  # of another session
+    assert text(panel, "compared") == ""
 
 
 def test_no_button_moves_between_the_compared_drawings_and_the_answer(
