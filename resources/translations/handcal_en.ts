@@ -1433,10 +1433,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Each eye was verified before the last alignment. Finish, or verify again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The headset draws with a different φ from this result&apos;s: an earlier or a fine-tuned one.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1482,6 +1478,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Do not use this result. Follow the advice below, then add alignments.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verified before the alignments changed. Finish, or verify an eye again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3656,10 +3656,6 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>not measured</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>This result, not used</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3676,7 +3672,11 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>After, measured</source>
+        <source>not verified</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verification</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
