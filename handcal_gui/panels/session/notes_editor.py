@@ -14,6 +14,8 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
 
 SAVE_MS = 800
+_WRITE = tr("Notes on this session; saved automatically")
+_RESUME = tr("This session is only shown. To write notes, resume it.")
 
 
 class NotesEditor(QWidget):
@@ -33,7 +35,7 @@ class NotesEditor(QWidget):
         self._saved = ""
         self._edit = QPlainTextEdit()
         self._edit.setAccessibleName(tr("Notes on the session"))
-        self._edit.setPlaceholderText(tr("Notes on this session; saved automatically"))
+        self._edit.setPlaceholderText(_WRITE)
         self._edit.setTabChangesFocus(True)
         self._edit.setEnabled(False)
         self._edit.textChanged.connect(self._begin)
@@ -59,6 +61,7 @@ class NotesEditor(QWidget):
     def set_read_only(self, is_read_only: bool) -> None:
         """Set the editor read-only or editable."""
         self._edit.setReadOnly(is_read_only)
+        self._edit.setPlaceholderText(_RESUME if is_read_only else _WRITE)
         self._refresh()
 
     @property
@@ -90,8 +93,10 @@ class NotesEditor(QWidget):
         return len(self._edit.toPlainText()) - MAX_NOTES_CHARACTERS
 
     def _refresh(self) -> None:
-        if self._edit.isReadOnly() or self._session is None:
+        if self._session is None:
             text = ""
+        elif self._edit.isReadOnly():
+            text = _RESUME if self._saved else ""  # or the empty editor says it
         elif self._too_many() > 0:
             text = tr("⚠ Too long by {:,} characters: not saved").format(self._too_many())
         else:

@@ -116,4 +116,7 @@ def test_what_is_only_read_cannot_be_written(notes: NotesEditor, edit: QPlainTex
     notes.set_read_only(True)
     QTest.keyClicks(edit, "b")
     assert edit.toPlainText() == "a"
+    assert state(notes) == "This session is only shown. To write notes, resume it."
+    notes.show_saved(OTHER, "")
+    assert edit.placeholderText() == "This session is only shown. To write notes, resume it."
     assert state(notes) == ""
