@@ -55,6 +55,7 @@ _ARRIVALS = {
     Arrival.ARRIVED: ("check", tr("In the headset")),
     Arrival.LATE: ("warning", tr("Not acknowledged by the headset; see Link")),
 }
+_NO_SESSION = tr("Fine-tuning starts with a session.")
 
 
 class FineTunePanel(QWidget):
@@ -80,7 +81,7 @@ class FineTunePanel(QWidget):
         self._rig: Rig | None = None
         self._solved: Shifts = {}
         self._calibrated: Shifts = {}
-        self._obstacle = tr("Fine-tuning starts with a session.")
+        self._obstacle = _NO_SESSION
         self._history = ShiftHistory(_OFFLINE)
         self._burst: object = None
         self._sign_name = "wait"
@@ -115,6 +116,8 @@ class FineTunePanel(QWidget):
             The offline calibration of the displays.
         """
         self._rig = rig
+        self._stream.begin()
+        self._obstacle = _NO_SESSION  # until its φ is known
         self._begin(_OFFLINE)
         self._refresh()
 

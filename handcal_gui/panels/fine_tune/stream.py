@@ -50,14 +50,20 @@ class ShiftStream(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.arrival = Arrival.SENDING
-        self._newest: Shifts = {}
-        self._sent_ns = 0
-        self._seen_since = 0
         self._pace = _timer(self, PERIOD_MS)
         self._pace.timeout.connect(self._send)
         self._calm = _timer(self, SETTLE_MS)
         self._calm.timeout.connect(self.settled)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin with another session: its shifts were sent by others, also if they are the same."""
+        self._pace.stop()
+        self._calm.stop()
+        self.arrival = Arrival.SENDING
+        self._newest: Shifts = {}
+        self._sent_ns = 0
+        self._seen_since = 1  # nothing was sent that the first snapshot may not show yet
 
     def send(self, shifts_m: Shifts) -> None:
         """Send shifts to be stored, unless others follow soon."""

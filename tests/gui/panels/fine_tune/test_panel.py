@@ -86,6 +86,18 @@ def test_cannot_be_used_without_a_headset(panel: FineTunePanel, show: Show) -> N
     assert not field(panel, "left", 1).isEnabled()
 
 
+def test_a_session_resumed_with_the_same_phi_begins_with_it(
+    panel: FineTunePanel, show: Show, rig: Rig, results: Results
+) -> None:
+    for _ in range(2):
+        show()
+        for eye in EYES:
+            solved_mm = 1e3 * results.eyes[eye].shift_m
+            np.testing.assert_allclose(fields_mm(panel, eye), solved_mm, atol=0.005)
+        panel.set_rig(rig)  # the next session
+        assert not field(panel, "left", 1).isEnabled()
+
+
 def test_a_comparison_is_not_ended_by_accident(panel: FineTunePanel, show: Show) -> None:
     show()
     assert field(panel, "left", 1).isEnabled()

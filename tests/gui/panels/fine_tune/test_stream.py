@@ -87,7 +87,6 @@ def test_what_is_only_looked_at_does_not_settle(qtbot: QtBot, stream: ShiftStrea
 
 
 def test_own_shifts_are_told_from_others(stream: ShiftStream, see: Callable[..., bool]) -> None:
-    see(shifts_of(0.0))
     assert see(shifts_of(0.0))  # where it begins is news once
     assert not see(shifts_of(0.0))
     stream.send(shifts_of(0.001))
