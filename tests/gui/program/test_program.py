@@ -29,11 +29,13 @@ from handcal.export.export import ExportSettings
 from handcal.session.session import Session, SessionRecord
 from handcal.station.states import State
 from handcal.station.station import Station
+from handcal.types import Float64
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, text
+from tests.gui.panels.fine_tune.controls import fields_mm
 from tests.gui.program.technician import (
     PATIENCE_MS,
     Technician,
@@ -314,6 +316,30 @@ def test_nothing_is_lost_by_closing_at_work(
     second.wait_for_page("live")
     assert second.snapshot.procedure.state is resumed
     assert len(second.snapshot.record.alignments) == 1
+
+
+@pytest.mark.parametrize("compares", [False, True])
+def test_a_session_resumed_at_once_is_fine_tuned_from_its_phi(
+    live: Technician, studio: Any, *, compares: bool
+) -> None:
+    panels = live.program.window.panels
+
+    def is_shown(shift_m: Float64) -> bool:
+        return np.allclose(fields_mm(panels.fine_tune, "left"), 1e3 * shift_m, atol=0.01)
+
+    align(live, studio)
+    solve_and_apply(live)
+    applied_m, path = live.snapshot.procedure.applied_shift_m["left"], live.snapshot.session_path
+    live.wait(lambda: is_shown(applied_m))
+    if compares:
+        panels.trials.compare_requested.emit()
+        live.wait(lambda: live.snapshot.comparing is not None)
+    live.program.live.next_wearer_requested.emit()
+    live.wait_for_page("start")
+    live.program.resume_session(path)
+    live.wait_for_page("live")
+    live.wait(lambda: live.snapshot.link.connected)
+    live.wait(lambda: is_shown(applied_m))
 
 
 @pytest.mark.parametrize(
