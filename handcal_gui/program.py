@@ -322,12 +322,15 @@ class Program(QObject):
             self.start.set_opening(False)
 
     def _renew_key(self) -> None:
+        question = tr(
+            "Make a new pairing key? From the next calibration on, no headset connects until the "
+            "new key is entered in it."
+        )
+        buttons = QMessageBox.StandardButton
+        if QMessageBox.question(self.window, tr("New key"), question) != buttons.Yes:
+            return
         self._current.renew_pairing_key()
         self.start.set_pairing_key(self._current.pairings.open_key())
         self.window.banner.show_message(
-            tr(
-                "New pairing key created. Enter it in the headset; all others are "
-                "disconnected, and "
-                "the key is used from the next calibration on."
-            )
+            tr("A new pairing key was made. Enter it in the headsets before the next calibration.")
         )

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QLabel,
+    QMessageBox,
     QPlainTextEdit,
     QPushButton,
     QWidget,
@@ -316,6 +317,18 @@ def test_nothing_is_lost_by_closing_at_work(
     second.wait_for_page("live")
     assert second.snapshot.procedure.state is resumed
     assert len(second.snapshot.record.alignments) == 1
+
+
+@pytest.mark.parametrize("answer", ["No", "Yes"])
+def test_a_new_pairing_key_is_made_only_after_a_question(
+    technician: Technician, file: PreferencesFile, monkeypatch: pytest.MonkeyPatch, answer: str
+) -> None:
+    key = file.pairings().open_key()
+    button = getattr(QMessageBox.StandardButton, answer)
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: button)
+    technician.program.window.panels.link.new_key_requested.emit()
+    assert (file.pairings().open_key() == key) == (answer == "No")
+    assert ("new pairing key" in technician.banner) == (answer == "Yes")
 
 
 @pytest.mark.parametrize("compares", [False, True])
