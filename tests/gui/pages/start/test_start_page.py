@@ -107,6 +107,25 @@ def test_the_key_that_starts_is_shown_where_it_does(
     assert key.text() == "Return"
 
 
+def test_the_key_that_starts_is_hidden_while_it_cannot_and_an_error_moves_nothing(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    page.activateWindow()
+    wearer(page).setFocus()
+    key = find(page, QLabel, "startKey")
+    qtbot.waitUntil(key.isVisible)
+    folder = find(page, QWidget, "sessionsFinding")
+    y_px = folder.y()
+    inspector.healths["camera"] = inspector.healths["headset"] = Health.BROKEN
+    choose(page, "source", "realsense")
+    qtbot.waitUntil(lambda: button(page, "cameraFix").isVisible())
+    assert button(page, "headsetFix").isVisible()
+    assert not key.isVisible()
+    QApplication.processEvents()  # lays out
+    assert folder.y() == y_px
+
+
 def test_fields_are_reached_by_letters(qtbot: QtBot, open_page: Callable[..., StartPage]) -> None:
     page = open_page()
     page.activateWindow()
