@@ -27,6 +27,7 @@ from handcal_gui.pages.start.station_form import StationForm
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import limit_length
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, keep_space, scrollable, vbox
@@ -81,7 +82,8 @@ class NewCalibration(Card):
         self._starting: str | None = None
         self._is_opening = False
         self._wearer = with_name(QComboBox(), "wearer", tr("Wearer's name or code"))
-        name = QLineEdit(placeholderText=tr("Name or code"), maxLength=MAX_WEARER_CHARACTERS)
+        name = QLineEdit(placeholderText=tr("Name or code"))
+        limit_length(name, MAX_WEARER_CHARACTERS)
         name.textEdited.connect(self._drop_blanks)
         self._wearer.setLineEdit(name)
         self._wearer.setEditable(True)

@@ -92,6 +92,8 @@ def test_what_is_wrong_with_a_name_is_said_beside_it(
         QTest.keyClick(wearer(page), Qt.Key.Key_Return)
     wearer(page).setEditText("AB")
     assert not problem.isVisible()
+    QTest.keyClicks(wearer(page), 99 * "C")
+    assert text(page, "brief") == "At most 100 characters; the rest is cut off"
 
 
 def test_the_key_that_starts_is_shown_where_it_does(

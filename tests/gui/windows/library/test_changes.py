@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QInputDialog, QLabel, QPushButton
+from PySide6.QtWidgets import QComboBox, QInputDialog, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.library import delete_session
@@ -135,6 +135,18 @@ def test_the_title_of_the_name_has_room_beside_the_buttons_of_its_frame(
     dialog = child(window, QInputDialog)
     title_px = dialog.fontMetrics().horizontalAdvance(dialog.windowTitle())
     assert dialog.width() > 3 * title_px
+    dialog.reject()
+
+
+def test_a_name_that_is_too_long_is_said_to_be_cut_off(window: LibraryWindow) -> None:
+    window._ask_name()
+    dialog = child(window, QInputDialog)
+    field = child(dialog, QComboBox).lineEdit()
+    assert field is not None
+    field.setText(100 * "a")
+    assert not dialog.findChildren(QLabel, "brief")
+    QTest.keyClicks(field, "b")
+    assert text(dialog, "brief") == "At most 100 characters; the rest is cut off"
     dialog.reject()
 
 
