@@ -199,6 +199,13 @@ def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:
     assert find_lines(lines, "  ") == []
 
 
+@pytest.mark.parametrize("name", ["guide.md", "rig-guide.md"])
+def test_the_guides_are_for_technicians(name: str) -> None:
+    text = (ROOT / "docs" / name).read_text("utf-8")
+    for of_a_developer in (".venv/", "bash ", "python ", "OpenGL and"):
+        assert of_a_developer not in text
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_link_of_a_page_leads_to_something_that_the_wheel_carries(page: Path) -> None:
     carried = ("docs/", "examples/", "handcal/link/handcal.proto", "CONTRIBUTING.md", "THIRD-")
