@@ -29,6 +29,14 @@ class FileError(HandcalError):
     """A file is missing, malformed, too large or of an unknown version."""
 
 
+class InUseError(FileError):
+    """A program, this one if `is_here`, holds a folder or a file."""
+
+    def __init__(self, text: str, *, is_here: bool) -> None:
+        super().__init__(text)
+        self.is_here = is_here
+
+
 class PoseError(HandcalError):
     """The headset's pose at a time is unknown; the text says why."""
 

@@ -19,6 +19,7 @@ _IN_PANEL = tr("a panel; works while it has the keyboard focus")
 _NOT_ACTIONS = {
     _WINDOW: (
         (tr("Return"), tr("Press the button, or open the list, that has the focus")),
+        (tr("Return on the start page"), tr("Start the calibration, from one of its fields")),
         (tr("Alt+underlined letter"), tr("Press its button, or go to its field")),
         (tr("F4"), tr("Open the list, or choose the file or folder, of the field")),
         (tr("Shift+F4"), tr("Choose a folder for a field that takes files, too")),

@@ -12,7 +12,7 @@ from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.errors import FileError, InUseError
 
 if sys.platform == "win32":
     import msvcrt
@@ -36,8 +36,10 @@ class FileLock:
 
     Raises
     ------
+    InUseError
+        If this or another program holds it.
     FileError
-        If another program holds it, or the file cannot be opened.
+        If the file cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,10 +56,12 @@ class FileLock:
             file.seek(0)
             holder = (file.read(20) or b"").decode(errors="replace") or "unknown"
             file.close()
-            whose = "this program" if holder == str(os.getpid()) else "another program"
-            raise FileError(
+            is_here = holder == str(os.getpid())
+            whose = "this program" if is_here else "another program"
+            raise InUseError(
                 f"{path.parent} is in use by process {holder}, {whose}; close it there, then "
-                "try again"
+                "try again",
+                is_here=is_here,
             ) from error
         with suppress(OSError):  # only for people to read: a full disk locks nobody out
             file.truncate(0)

@@ -130,7 +130,7 @@ class ReviewController(QObject):
         self.record = record = stored.record
         self._results = stored.results
         panels = self._window.panels
-        note = "" if record.alignments else tr("It contains no alignments yet.")
+        note = _without_alignments(record)
         target_arcmin = stored.settings.verdict.target_arcmin
         panels.results.show_results(
             stored.results, record.alignments, record.rig, has_verdicts=False
@@ -145,9 +145,7 @@ class ReviewController(QObject):
             for number, last in [*record.alignments.items()][-1:]:
                 self._show_alignment(number, last.eyes[0])
         # Then: if it is on the screen, it chooses the alignment whose clouds are shown.
-        self._page.show_session(
-            record, stored.results, target_arcmin, "" if stored.results else note
-        )
+        self._page.show_session(record, stored.results, target_arcmin, note)
         self._window.show_page("review")
         self._window.show_wearer(record.wearer)
         self.opened.emit(record.path)
@@ -158,3 +156,12 @@ class ReviewController(QObject):
             residuals_m = self._results.alignments[number][eye].residuals_m
             cloud = self._window.panels.cloud
             cloud.show_alignment(self.record.alignments[number], residuals_m)
+
+
+def _without_alignments(record: SessionRecord) -> str:
+    """Return that a session has no alignments; empty if it has some."""
+    if record.alignments:
+        return ""
+    if record.facts.verified:
+        return tr("This session was only verified; it has no alignments.")
+    return tr("It contains no alignments yet.")

@@ -52,7 +52,7 @@ class ReviewPage(QWidget):
         self._title: QLabel = ElidedLabel()
         scale_font(self._title, 1.6, is_bold=True)
         self._task = paragraph("reviewTask")
-        self._is_solved = False
+        self._has_maps = False
         self._fit_soon = fit_soon(self._fit, self)
         self._facts = QFormLayout()
         self._facts.setHorizontalSpacing(2 * SPACING_PX)
@@ -105,7 +105,7 @@ class ReviewPage(QWidget):
         target_arcmin : float
             The lab's target when the session was made.
         note : str
-            The current activity, or the reason why there are no results.
+            The current activity, or the reason why there are no results or alignments.
         """
         self.show_wearer(record.wearer)
         self._export.setEnabled(record.is_solvable)
@@ -115,7 +115,7 @@ class ReviewPage(QWidget):
         self._card.setVisible(results is not None)
         if results is not None:
             self.residuals.show_results(results, record.alignments)
-        self._is_solved = results is not None
+        self._has_maps = results is not None and bool(results.alignments)
         self._fit()
         while self._facts.rowCount():
             self._facts.removeRow(0)
@@ -142,7 +142,7 @@ class ReviewPage(QWidget):
         parts = self._title, self._task, self._facts, self._card, self._export
         others_px = sum(2 * SPACING_PX + part.sizeHint().height() for part in parts)
         room_px = viewport.height() - others_px - 4 * SPACING_PX
-        self.residuals.setVisible(self._is_solved and room_px > _LEAST_MAP_PX)
+        self.residuals.setVisible(self._has_maps and room_px > _LEAST_MAP_PX)
 
 
 def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str, str]]:

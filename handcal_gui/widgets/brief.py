@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QGuiApplication, QPalette
-from PySide6.QtWidgets import QFrame, QLabel, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QLineEdit, QWidget
 
 from handcal_gui.theme import SPACING_PX
+from handcal_gui.translation import tr
 
 _SHOWN_MS = 3000
 
@@ -32,6 +33,13 @@ def copy_text(source: QWidget, text: str, said: str) -> None:
     """Copy a text, and say over a widget what was copied."""
     QGuiApplication.clipboard().setText(text)
     show_briefly(source, said)
+
+
+def limit_length(field: QLineEdit, most: int) -> None:
+    """Let a field take so many characters; say so when more are typed or pasted."""
+    field.setMaxLength(most)
+    said = tr("At most {} characters; the rest is cut off").format(most)
+    field.inputRejected.connect(lambda: show_briefly(field, said))
 
 
 def show_briefly(source: QWidget, said: str) -> None:

@@ -44,7 +44,9 @@ _ROI_HELP = tr(
     "the nearest, or the leftmost or rightmost in the camera's image.\n"
     "Depth alone: the nearest hand-sized object."
 )
+_NEAREST_M, _FARTHEST_M = 0.10, 2.00
 _GATE_M = 0.05
+"""Least depth of the gate."""
 
 
 class CalibrationFields(QWidget):
@@ -80,16 +82,16 @@ class CalibrationFields(QWidget):
         )
         self._near = number(
             "gateNear",
-            0.10,
-            1.95,
+            _NEAREST_M,
+            _FARTHEST_M - _GATE_M,
             0.05,
             " m",
             tr("Anything nearer to the camera is ignored; in metres."),
         )
         self._far = number(
             "gateFar",
-            0.15,
-            2.00,
+            _NEAREST_M + _GATE_M,
+            _FARTHEST_M,
             0.05,
             " m",
             tr("Anything farther from the camera is ignored; in metres."),
@@ -120,8 +122,10 @@ class CalibrationFields(QWidget):
         self.add_row(tr("&Hand found by"), self._roi, tr("Finds the hand in the camera's images."))
         solves = tr("Computes where the eyes are from each alignment.")
         self.add_row(tr("&Solver"), self._method, solves)
-        self._near.valueChanged.connect(self._push_far)
-        self._far.valueChanged.connect(self._push_near)
+        self._near.valueChanged.connect(self._limit_gate)
+        self._far.valueChanged.connect(self._limit_gate)
+        note = tr("“To” must be at least {:.2f} m larger than “from”.").format(_GATE_M)
+        self._near.note = self._far.note = note
         for field in (self._guard, self._near, self._far):
             field.valueChanged.connect(self.changed)
         for chosen in (self._roi, self._method):
@@ -130,8 +134,11 @@ class CalibrationFields(QWidget):
     def show_settings(self, settings: CalibrationSettings) -> None:
         """Show settings."""
         self._guard.setValue(float(np.degrees(settings.guard.limit_rad)))
+        self._near.setMaximum(_FARTHEST_M - _GATE_M)  # whatever is shown
+        self._far.setMinimum(_NEAREST_M + _GATE_M)
         self._far.setValue(settings.segment.depth_max_m)
         self._near.setValue(settings.segment.depth_min_m)
+        self._limit_gate()
         self._roi.setCurrentIndex(self._roi.findData(settings.segment.roi))
         self._method.setCurrentIndex(self._method.findData(settings.solve.method))
 
@@ -185,9 +192,7 @@ class CalibrationFields(QWidget):
         heading.setContentsMargins(0, SPACING_PX, 0, 0)
         self._grid.addWidget(heading, self._grid.rowCount(), 0, 1, 3)
 
-    def _push_far(self, near_m: float) -> None:
-        """Keep the far limit beyond the near one."""
-        self._far.setValue(max(self._far.value(), near_m + _GATE_M))
-
-    def _push_near(self, far_m: float) -> None:
-        self._near.setValue(min(self._near.value(), far_m - _GATE_M))
+    def _limit_gate(self) -> None:
+        """Keep the gate open: neither end moves the other."""
+        self._near.setMaximum(self._far.value() - _GATE_M)
+        self._far.setMinimum(self._near.value() + _GATE_M)

@@ -62,10 +62,16 @@ class NumberField(QDoubleSpinBox):
 
     A comma becomes a point, and a hyphen is read as a minus. In the system's locale a comma, or a
     point, is a separator of thousands: 0,5 was read as 5.
+
+    Attributes
+    ----------
+    note : str
+        Why the range is as it is, if that is not plain; said with it.
     """
 
     def __init__(self, decimals: int) -> None:
         super().__init__(decimals=decimals)
+        self.note = ""
         self.setLocale(QLocale.c())
 
     def event(self, event: QEvent) -> bool:
@@ -95,7 +101,8 @@ class NumberField(QDoubleSpinBox):
             return super().fixup(text)
         nearest = self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
         taken = f"{nearest}{self.suffix()}"
-        show_briefly(self, tr("Changed to {}. {}").format(taken, _range_text(self)))
+        said = tr("Changed to {}. {}").format(taken, _range_text(self))
+        show_briefly(self, "\n".join(filter(None, (said, self.note))))
         return taken
 
     def _typed(self, text: str) -> float | None:

@@ -40,6 +40,14 @@ class FindingLine(QWidget):
         layout.addWidget(self._button, 0, Qt.AlignmentFlag.AlignTop)
         follow_theme(self, self._refresh)
 
+    def keep_room(self) -> None:
+        """Be as high without a button as with one, so that what is below does not move."""
+        layout = self.layout()
+        assert layout is not None
+        layout.setContentsMargins(0, 0, 0, 0)
+        self.setMinimumHeight(max(3 * SPACING_PX, self._button.sizeHint().height()))
+        self._text.setAlignment(Qt.AlignmentFlag.AlignTop)
+
     def show_finding(
         self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
     ) -> None:

@@ -37,13 +37,17 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
 
-_FIRST_SIZE = QSize(900, 750)
-_CONTENTS_PX = 220
+_FIRST_SIZE = QSize(1000, 750)
+_CONTENTS_PX, _PAGE_PX = 220, 660
+"""Least widths; wider contents show the titles whole."""
+_BESIDE_TITLES_PX = 4 * SPACING_PX
+"""Room for the edges of the contents and their scroll bar."""
 _BESIDE_PX = 50
 """Room beside the widest picture."""
 _FOUND_PX = 230
 _COLUMNS_PX = 150, 200, 450
 _MOST_FOUND = 200
+_GUIDE = "guide.md"
 _NOTHING = tr("Nothing found: search for fewer or other words")
 _DIMMED = 0.25
 """Share of the light that a picture of the light window loses on a dark page."""
@@ -73,10 +77,13 @@ def read_lines(folder: Path) -> list[Line]:
 
 
 def find_lines(lines: Iterable[Line], words: str) -> list[Line]:
-    """Return the lines that contain all words, those in headings first; none without words."""
+    """Return the lines that contain all words; none without words.
+
+    Headings come first, then the user guide, then the others in their order.
+    """
     wanted = words.casefold().split()
     found = [one for one in lines if wanted and all(word in one.text.casefold() for word in wanted)]
-    return sorted(found, key=lambda line: line.text != line.section)
+    return sorted(found, key=lambda line: (line.text != line.section, line.page.name != _GUIDE))
 
 
 def in_reading_order(lines: Iterable[Line], start: Path) -> list[Line]:
@@ -123,6 +130,7 @@ class Manual(QWidget):
         self.found.hide()
         self.contents = with_name(QTreeWidget(), "manualContents", tr("Contents"))
         self.contents.setHeaderHidden(True)
+        self._parts = QSplitter()
         self._pages: dict[Path, QTreeWidgetItem] = {}
         self._count = QLabel()
         self._lines: list[Line] = []
@@ -153,8 +161,11 @@ class Manual(QWidget):
             If the installation is damaged.
         """
         if not self._lines:
-            self._lines = read_lines(resource_path("docs"))
+            lines = read_lines(resource_path("docs"))
+            self._lines = in_reading_order(lines, resource_path("docs/index.md"))
             self._list_pages()
+            above = self.parentWidget() or self
+            self.move(above.frameGeometry().center() - self.rect().center())
         self.show()  # first, as pictures are no wider than the page
         self.page.setSource(QUrl.fromLocalFile(str(resource_path(page))))
         keep_on_screen(self)
@@ -172,23 +183,25 @@ class Manual(QWidget):
     def _lay_out_pages(self) -> QSplitter:
         label = QLabel(tr("&Contents"))
         label.setBuddy(self.contents)
-        beside, parts = QWidget(), QSplitter()
+        beside, parts = QWidget(), self._parts
         vbox(label, (self.contents, 1), on=beside, margins=0, spacing=SPACING_PX // 2)
         for part in (beside, self.page):
             parts.addWidget(part)
         parts.setStretchFactor(1, 1)
-        parts.setSizes([_CONTENTS_PX, _FIRST_SIZE.width() - _CONTENTS_PX])
         return parts
 
     def _list_pages(self) -> None:
         """List the pages and their sections."""
-        for line in in_reading_order(self._lines, resource_path("docs/index.md")):
+        for line in self._lines:
             if line.level in (1, 2):
                 parent = self.contents if line.level == 1 else self._pages[line.page]
                 item = QTreeWidgetItem(parent, [line.text])
                 item.setToolTip(0, line.text)
                 item.setData(0, Qt.ItemDataRole.UserRole, line)
                 self._pages.setdefault(line.page, item)
+        titles_px = self.contents.sizeHintForColumn(0) + _BESIDE_TITLES_PX
+        contents_px = max(_CONTENTS_PX, min(titles_px, self.width() - _PAGE_PX))
+        self._parts.setSizes([contents_px, self.width() - contents_px])
 
     def _mark_page(self, url: QUrl) -> None:
         """Mark the page shown in the contents, and unfold its sections only."""

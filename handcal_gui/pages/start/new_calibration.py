@@ -27,6 +27,7 @@ from handcal_gui.pages.start.station_form import StationForm
 from handcal_gui.preferences import Preferences
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import limit_length
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, keep_space, scrollable, vbox
@@ -81,7 +82,8 @@ class NewCalibration(Card):
         self._starting: str | None = None
         self._is_opening = False
         self._wearer = with_name(QComboBox(), "wearer", tr("Wearer's name or code"))
-        name = QLineEdit(placeholderText=tr("Name or code"), maxLength=MAX_WEARER_CHARACTERS)
+        name = QLineEdit(placeholderText=tr("Name or code"))
+        limit_length(name, MAX_WEARER_CHARACTERS)
         name.textEdited.connect(self._drop_blanks)
         self._wearer.setLineEdit(name)
         self._wearer.setEditable(True)
@@ -95,7 +97,6 @@ class NewCalibration(Card):
         self._form = StationForm(wearer, preferences.station, pairing_key)
         self._problem = paragraph("startProblem")
         self._button = main_button("start", tr("Start calibration"))
-        self._button.setEnabled(False)
         self._start_key = KeyCap("startKey", "Return")
         keep_space(self._start_key)
         self._cancel = button("cancelOpening", tr("Cancel"), help_text=tr("Cancel the start (Esc)"))
@@ -122,6 +123,7 @@ class NewCalibration(Card):
         app = QApplication.instance()
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)
+        self._allow_start(False)
         self.show_preferences(preferences)
 
     @property
@@ -183,7 +185,7 @@ class NewCalibration(Card):
         except ValueError:
             self._wearer.setFocus()  # the reason is below the name
             return
-        self._button.setEnabled(False)
+        self._allow_start(False)
         self.check()
 
     def set_opening(self, is_opening: bool) -> None:
@@ -194,7 +196,7 @@ class NewCalibration(Card):
         self._cancel.setEnabled(True)
         self._problem.setText(tr("Opening camera and headset…") if is_opening else "")
         if is_opening:
-            self._button.setEnabled(False)
+            self._allow_start(False)
             self.setFocus()
         else:
             self._wearer.setFocus()
@@ -251,7 +253,7 @@ class NewCalibration(Card):
         self._form.show_findings(findings)
         broken = [part.what for part in findings.values() if part.health is Health.BROKEN]
         self._problem.setText(tr("Fix first: {}.").format(", ".join(broken)) if broken else "")
-        self._button.setEnabled(is_ready(findings))
+        self._allow_start(is_ready(findings))
         wearer, self._starting = self._starting, None
         if wearer is not None and is_ready(findings):
             self.start_requested.emit(self._form.settings, wearer)
@@ -265,11 +267,16 @@ class NewCalibration(Card):
         self._starting = None
         self._problem.setText(why)
 
+    def _allow_start(self, is_ready: bool) -> None:
+        self._button.setEnabled(is_ready)
+        self._show_key(None, QApplication.focusWidget())
+
     def _show_key(self, _old: QWidget | None, new: QWidget | None) -> None:
-        """Show the key that starts, unless it would press another button."""
+        """Show the key that starts while it would, and not press another button."""
         is_here = new is self or (new is not None and self.isAncestorOf(new))
         self._start_key.setVisible(
-            new is None or (is_here and not isinstance(new, QAbstractButton))
+            self._button.isEnabled()
+            and (new is None or (is_here and not isinstance(new, QAbstractButton)))
         )
 
     def _drop_blanks(self, typed: str) -> None:

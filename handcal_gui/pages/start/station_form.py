@@ -141,6 +141,7 @@ class StationForm(QWidget):
         grid.setRowMinimumHeight(grid.rowCount(), SPACING_PX)
         for part in PARTS:
             _add_row(grid, TITLES[part], fields[part])
+            self._findings[part].keep_room()
             grid.addWidget(self._findings[part], grid.rowCount(), 1)
         grid.addWidget(self._advanced, grid.rowCount(), 1)
         grid.setRowStretch(grid.rowCount(), 1)  # or the fields move apart on a tall page

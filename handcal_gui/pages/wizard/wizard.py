@@ -23,6 +23,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
+from handcal_gui.widgets.sentence import sentence
 
 _MOST_PRECONDITIONS = 3
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
@@ -313,7 +314,7 @@ class WizardPanel(QWidget):
         self._preconditions.show_preconditions(
             [one for one in view.preconditions if not (has_card and one.verdict)]
         )
-        self._note.setText(view.note)
+        self._note.setText(sentence(view.note))
         self._note.setStyleSheet(f"color: {colors().red}")
         self._fact.setText(view.fact)
         self._fact.setVisible(bool(view.fact))

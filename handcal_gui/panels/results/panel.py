@@ -110,6 +110,8 @@ class ResultsPanel(QWidget):
             card.setVisible(has_verdicts)
         eyes = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(eyes, result_rows(results, rig))
+        for tab in (self._convergence, self._residuals, self._alone):
+            self._tabs.setTabVisible(self._tabs.indexOf(tab), bool(results.alignments))
         self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
         self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results, rig))
@@ -181,7 +183,8 @@ class ResultsPanel(QWidget):
         tabs.addTab(self._convergence, tr("Iterations"))
         tabs.setTabToolTip(1, tr("Convergence of each registration"))
         tabs.addTab(self._residuals, tr("Residuals"))
-        tabs.addTab(self._alignments_tab(), tr("Single"))
+        self._alone = self._alignments_tab()
+        tabs.addTab(self._alone, tr("Single"))
         tabs.setTabToolTip(3, tr("φ of each alignment alone"))
         tabs.addTab(self._compare, tr("Compare"))
         self._stack = QStackedLayout(self)

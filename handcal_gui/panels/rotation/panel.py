@@ -140,7 +140,7 @@ class RotationPanel(QWidget):
         else:
             # The journal may follow the refusal by a frame.
             refused = pluralize(max(count, 1), tr("confirmation"), tr("confirmations"))
-            self._refusals.setText(tr("{} refused. {}").format(refused, last).strip())
+            self._refusals.setText(tr("{} refused. {}").format(refused, sentence(last)).strip())
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)

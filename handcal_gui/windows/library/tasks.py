@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from handcal.errors import CancelledError, FileError
+from handcal.errors import CancelledError, FileError, InUseError
 from handcal.progress import Progress
 from handcal.session.library import (
     LibraryEntry,
@@ -26,6 +26,8 @@ from handcal_gui.windows.library.sessions_model import SessionRow, make_row
 
 _MOST_NAMED = 3
 _MOST_LINES = 8
+_RUNS_HERE = tr("{} is running in this window. Finish it first.")
+_RUNS_ELSEWHERE = tr("{} is open in another program. Close it there, then try again.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +129,9 @@ def _each(
         except CancelledError:
             left = pluralize(len(paths) - tried, tr("session"), tr("sessions"))
             return tried - len(lines), [tr("Cancelled: {} left out.").format(left), *lines]
+        except InUseError as error:
+            where = _RUNS_HERE if error.is_here else _RUNS_ELSEWHERE
+            lines.append(where.format(_name_of(path)))
         except (FileError, ValueError) as error:  # a name may be invalid
             lines.append(f"{path.name}: {error}")
     return len(paths) - len(lines), lines

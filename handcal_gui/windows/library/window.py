@@ -26,7 +26,7 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.brief import copy_text
+from handcal_gui.widgets.brief import copy_text, limit_length
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import (
     button,
@@ -263,7 +263,7 @@ class LibraryWindow(QDialog):
         field, completer = box.lineEdit(), box.completer()
         assert field is not None
         assert completer is not None
-        field.setMaxLength(MAX_WEARER_CHARACTERS)
+        limit_length(field, MAX_WEARER_CHARACTERS)
         completer.setCaseSensitivity(Qt.CaseSensitivity.CaseSensitive)  # p7 may become P7
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.textValueSelected.connect(lambda name: self._correct_names(chosen, name))

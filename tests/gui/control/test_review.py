@@ -10,11 +10,13 @@ from typing import Any
 
 import pytest
 from PySide6.QtWidgets import (
+    QApplication,
     QComboBox,
     QLabel,
     QProgressBar,
     QProgressDialog,
     QPushButton,
+    QTabWidget,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -336,6 +338,16 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     contents = child(program, QLabel, "reviewContents").text()
     assert contents.startswith("1 verified eye, 0 trials")
+    said = child(program, QLabel, "reviewNote").text()
+    assert said == "This session was only verified; it has no alignments."
+    # Nothing empty is shown, however large the window.
+    program.window.resize(1600, 1200)
+    for _ in range(3):  # lays out
+        QApplication.processEvents()
+    assert child(program, ReviewPage, "reviewPage").residuals.isHidden()
+    tabs = child(program, QTabWidget, "results-tabs")
+    shown = [tabs.tabText(i) for i in range(tabs.count()) if tabs.isTabVisible(i)]
+    assert shown == ["Eyes", "Compare"]
     assert child(program, QPushButton, "reviewExport").isEnabled()
     assert program.windows.export() is not None
     program.window.panels.results.compare_requested.emit("linear")

@@ -129,8 +129,8 @@ def test_a_gate_without_room_for_a_hand_is_refused_beside_it(opened: Preferences
     assert not found.isVisible()
     QApplication.processEvents()
     before = [_middle(one, opened) for one in fields], opened.height()
-    near.setValue(0.9)
     far.setValue(0.95)
+    near.setValue(0.9)
     assert found.isVisible()
     for _ in range(3):  # a layout may ask for another
         QApplication.processEvents()

@@ -76,6 +76,7 @@ def test_help_lists_every_key_of_an_action(program: Program) -> None:
     for group, keys, meaning in (
         ("File", "Ctrl+N", "Next wearer"),
         ("Window", "Space", "Press the large button, except from a text field"),
+        ("Window", "Return on the start page", "Start the calibration, from one of its fields"),
         ("Guide", "Shift+Left", "Move the outline far left"),
         ("Camera", "F", "Freeze"),
         ("Hand cloud", "+, =", "Zoom in"),

@@ -14,7 +14,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.theme import use_theme
+from handcal_gui.theme import SPACING_PX, use_theme
 from handcal_gui.windows.manual import Manual, find_lines, read_lines
 from tests.helpers import ROOT
 
@@ -154,6 +154,41 @@ def test_a_small_window_shows_the_contents_beside_pages_that_fit(
     assert manual.page.width() > 400
 
 
+def test_the_titles_are_shown_whole(manual: Manual) -> None:
+    manual.resize(1000, 400)
+    manual.open("docs/commands.md")
+    contents = manual.contents
+    assert contents.verticalScrollBar().isVisible()
+    for row in range(contents.topLevelItemCount()):
+        item = contents.topLevelItem(row)
+        assert item is not None
+        title_px = contents.fontMetrics().horizontalAdvance(item.text(0))
+        left_px = contents.visualItemRect(item).x()
+        assert left_px + title_px <= contents.viewport().width(), item.text(0)
+
+
+def test_it_opens_over_the_middle_of_its_parent(manual: Manual) -> None:
+    above = manual.parentWidget()
+    assert above is not None
+    above.setGeometry(200, 150, 500, 400)
+    above.show()
+    manual.resize(400, 300)
+    manual.open("docs/guide.md")
+    off = manual.geometry().center() - above.geometry().center()
+    assert off.manhattanLength() <= 2 * SPACING_PX  # the frames
+
+
+def test_a_search_finds_the_guide_before_pages_for_developers(manual: Manual) -> None:
+    manual.open("docs/index.md")
+    manual.search.setText("headset slipped")
+    rows = range(manual.found.topLevelItemCount())
+    titles = [line.text(0) for row in rows if (line := manual.found.topLevelItem(row))]
+    assert titles[0] == "User guide"
+    assert "Architecture" in titles
+    QTest.keyClick(manual.search, Qt.Key.Key_Return)
+    assert manual.page.source().fileName() == "guide.md"
+
+
 def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:
     text = "# Page\n\n## Keys\n\n| key | does |\n|---|---|\n| **F1** | shows *keys* |\n"
     (tmp_path / "page.md").write_text(text)
@@ -162,6 +197,13 @@ def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:
     assert rows == [("Page", "Keys", "F1 · shows keys")]
     assert find_lines(lines, "key")[0].text == "Keys"  # headings come first
     assert find_lines(lines, "  ") == []
+
+
+@pytest.mark.parametrize("name", ["guide.md", "rig-guide.md"])
+def test_the_guides_are_for_technicians(name: str) -> None:
+    text = (ROOT / "docs" / name).read_text("utf-8")
+    for of_a_developer in (".venv/", "bash ", "python ", "OpenGL and"):
+        assert of_a_developer not in text
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -92,6 +92,8 @@ def test_what_is_wrong_with_a_name_is_said_beside_it(
         QTest.keyClick(wearer(page), Qt.Key.Key_Return)
     wearer(page).setEditText("AB")
     assert not problem.isVisible()
+    QTest.keyClicks(wearer(page), 99 * "C")
+    assert text(page, "brief") == "At most 100 characters; the rest is cut off"
 
 
 def test_the_key_that_starts_is_shown_where_it_does(
@@ -105,6 +107,25 @@ def test_the_key_that_starts_is_shown_where_it_does(
         qtbot.waitUntil(widget.hasFocus)
         assert key.isVisible() == is_shown
     assert key.text() == "Return"
+
+
+def test_the_key_that_starts_is_hidden_while_it_cannot_and_an_error_moves_nothing(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    page.activateWindow()
+    wearer(page).setFocus()
+    key = find(page, QLabel, "startKey")
+    qtbot.waitUntil(key.isVisible)
+    folder = find(page, QWidget, "sessionsFinding")
+    y_px = folder.y()
+    inspector.healths["camera"] = inspector.healths["headset"] = Health.BROKEN
+    choose(page, "source", "realsense")
+    qtbot.waitUntil(lambda: button(page, "cameraFix").isVisible())
+    assert button(page, "headsetFix").isVisible()
+    assert not key.isVisible()
+    QApplication.processEvents()  # lays out
+    assert folder.y() == y_px
 
 
 def test_fields_are_reached_by_letters(qtbot: QtBot, open_page: Callable[..., StartPage]) -> None:

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QDoubleSpinBox,
+    QLabel,
     QLineEdit,
     QSpinBox,
 )
@@ -49,7 +51,7 @@ def test_every_choice_reaches_the_settings(
     find(page, QLineEdit, "host").setText("192.168.1.2")
     find(page, QSpinBox, "port").setValue(50_002)
     find(page, QSpinBox, "seed").setValue(7)
-    for name, value in (("guard", 12.0), ("gateFar", 0.3), ("gateNear", 0.2), ("loss", 5.0)):
+    for name, value in (("guard", 12.0), ("gateNear", 0.2), ("gateFar", 0.3), ("loss", 5.0)):
         find(page, QDoubleSpinBox, name).setValue(value)
     choose(page, "method", "paper")
     choose(page, "roi", "depth")
@@ -115,14 +117,30 @@ def test_the_address_of_a_hololens_reaches_the_settings(
     assert (page.new.settings.source, page.new.settings.serial) == ("orbbec", "AB1")
 
 
-def test_the_gate_stays_open(open_page: Callable[..., StartPage]) -> None:
+def test_the_gate_stays_open_and_neither_end_moves_the_other(
+    open_page: Callable[..., StartPage],
+) -> None:
     page = open_page()
-    find(page, QDoubleSpinBox, "gateNear").setValue(1.95)
+    near, far = (find(page, QDoubleSpinBox, name) for name in ("gateNear", "gateFar"))
+    for field, typed, gate_m, allowed in (
+        (near, "0.95", (0.65, 0.7), "Changed to 0.65 m. Allowed: 0.10 to 0.65 m"),
+        (far, "0.1", (0.65, 0.7), "Changed to 0.70 m. Allowed: 0.70 to 2.00 m"),
+        (far, "0.95", (0.65, 0.95), ""),
+        (near, "0.90", (0.9, 0.95), ""),
+    ):
+        field.selectAll()
+        QTest.keyClicks(field.lineEdit(), typed)
+        field.interpretText()  # as Return does
+        segment = page.new.settings.calibration.segment
+        assert (segment.depth_min_m, segment.depth_max_m) == pytest.approx(gate_m)
+        said = f"{allowed}\n“To” must be at least 0.05 m larger than “from”." if allowed else ""
+        assert [one.text() for one in page.findChildren(QLabel, "brief")] == [said] * bool(said)
+        for brief in page.findChildren(QLabel, "brief"):
+            brief.setParent(None)
+    page.new.show_settings(StationSettings())
     segment = page.new.settings.calibration.segment
-    assert segment.depth_max_m == pytest.approx(2.0)
-    find(page, QDoubleSpinBox, "gateFar").setValue(0.0)
-    segment = page.new.settings.calibration.segment
-    assert (segment.depth_min_m, segment.depth_max_m) == pytest.approx((0.1, 0.15))
+    assert (segment.depth_min_m, segment.depth_max_m) == pytest.approx((0.35, 0.7))
+    assert (near.maximum(), far.minimum()) == pytest.approx((0.65, 0.4))
 
 
 def test_the_usual_gate_leaves_the_other_settings(
@@ -131,6 +149,7 @@ def test_the_usual_gate_leaves_the_other_settings(
     page = open_page()
     choose(page, "roi", "right")
     inspector.healths["camera"] = Health.BROKEN
+    find(page, QDoubleSpinBox, "gateFar").setValue(2.0)
     find(page, QDoubleSpinBox, "gateNear").setValue(1.5)
     fix = button(page, "cameraFix")
     qtbot.waitUntil(lambda: fix.text() == "Use the usual gate")

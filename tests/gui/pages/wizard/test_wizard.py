@@ -260,10 +260,12 @@ def test_the_plan_is_chosen_before_the_cursor_is_made(
 
 
 def test_the_refusal_is_read(panel: WizardPanel, snapshot: Maker) -> None:
-    panel.show_snapshot(snapshot(procedure={"refusal": "Your hand is turned by 14.0°."}))
+    panel.show_snapshot(
+        snapshot(procedure={"refusal": "the headset's poses have a gap of 466 ms."})
+    )
     note = panel.findChild(QLabel, "wizardNote")
     assert isinstance(note, QLabel)
-    assert note.text() == "Your hand is turned by 14.0°."
+    assert note.text() == "The headset's poses have a gap of 466 ms."
 
 
 def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_eyes(

@@ -156,7 +156,7 @@ def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapsh
     turned = {"refusal": "Your hand is turned."}
     panel.show_snapshot(snapshot(procedure=turned, record=counted))
     assert text(panel, "refusals") == "2 confirmations refused. Your hand is turned."
-    panel.show_snapshot(snapshot(procedure={"refusal": "The headset draws something else."}))
+    panel.show_snapshot(snapshot(procedure={"refusal": "the headset draws something else."}))
     assert text(panel, "refusals") == "1 confirmation refused. The headset draws something else."
 
 

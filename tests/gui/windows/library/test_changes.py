@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QInputDialog, QLabel, QPushButton
+from PySide6.QtWidgets import QComboBox, QInputDialog, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.session.library import delete_session
@@ -87,7 +87,13 @@ def test_an_open_session_stays(qtbot: QtBot, window: LibraryWindow, folder: Path
     choose(window, "Bea")
     with Session(folder / "bea"):
         press(window, "deleteSessions")
-        wait_for(qtbot, window, "is in use by process")
+        wait_for(qtbot, window, "0 sessions deleted.\nBea, ")
+        assert text(window, "message").endswith(" is running in this window. Finish it first.")
+        assert "process" not in text(window, "message")
+        (folder / "bea" / "lock").write_text("1")  # as if another program held it
+        qtbot.waitUntil(child(window, QPushButton, "deleteSessions").isEnabled)
+        press(window, "deleteSessions")
+        wait_for(qtbot, window, " is open in another program. Close it there, then try again.")
     assert (folder / "bea").is_dir()
 
 
@@ -138,6 +144,18 @@ def test_the_title_of_the_name_has_room_beside_the_buttons_of_its_frame(
     dialog.reject()
 
 
+def test_a_name_that_is_too_long_is_said_to_be_cut_off(window: LibraryWindow) -> None:
+    window._ask_name()
+    dialog = child(window, QInputDialog)
+    field = child(dialog, QComboBox).lineEdit()
+    assert field is not None
+    field.setText(100 * "a")
+    assert not dialog.findChildren(QLabel, "brief")
+    QTest.keyClicks(field, "b")
+    assert text(dialog, "brief") == "At most 100 characters; the rest is cut off"
+    dialog.reject()
+
+
 def test_a_name_is_no_markup(qtbot: QtBot, window: LibraryWindow) -> None:
     choose(window, "Bea")
     answer_name(qtbot, window, "<b>Bea")
@@ -156,12 +174,12 @@ def test_an_open_session_keeps_its_name(qtbot: QtBot, window: LibraryWindow, fol
     choose(window, "Bea")
     with Session(folder / "bea"):
         answer_name(qtbot, window, "Eve")
-        wait_for(qtbot, window, "Name corrected in 0 sessions.\nbea: ")
+        wait_for(qtbot, window, "Name corrected in 0 sessions.\nBea, ")
         qtbot.waitUntil(child(window, QPushButton, "restoreSession").isHidden, timeout=PATIENCE_MS)
         choose(window, "Bea", "Cid")
         answer_name(qtbot, window, "Eve")
-        wait_for(qtbot, window, "Name corrected in 1 session.\nbea: ")
-        assert "is in use by process" in text(window, "message")
+        wait_for(qtbot, window, "Name corrected in 1 session.\nBea, ")
+        assert "is running in this window" in text(window, "message")
     qtbot.waitUntil(lambda: wearers(window)[:2] == ["Eve", "Bea"], timeout=PATIENCE_MS)
     press(window, "restoreSession")  # only Cid's name was corrected
     wait_for(qtbot, window, "Name corrected in 1 session.")
