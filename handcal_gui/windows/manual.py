@@ -53,6 +53,8 @@ _DIMMED = 0.25
 """Share of the light that a picture of the light window loses on a dark page."""
 _PAGES = (".md", ".py", ".proto")
 _LINK = re.compile(r"\]\(([\w-]+\.md)")
+_DIRECTIVE = re.compile(r"^::: (\S+)$", re.MULTILINE)
+"""Where a web page has the description of a function."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,9 +176,11 @@ class Manual(QWidget):
         self.page.setFocus()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """End the search with Esc."""
-        if event.key() == Qt.Key.Key_Escape:
+        """End the search with Esc, or close the window without one."""
+        if event.key() == Qt.Key.Key_Escape and self.search.text():
             self.search.clear()
+        elif event.key() == Qt.Key.Key_Escape:
+            self.close()
         else:
             super().keyPressEvent(event)
 
@@ -294,9 +298,11 @@ class ManualPage(QTextBrowser):
 
         In dark themes, photographs and pictures of the light window are dimmed and framed.
         """
+        path = Path(self.source().resolved(QUrl(name)).toLocalFile())
+        if kind == QTextDocument.ResourceType.MarkdownResource.value and path.is_file():
+            return _markdown(path)
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
-        path = Path(self.source().resolved(QUrl(name)).toLocalFile())
         is_drawing = path.suffix == ".svg" and path.is_file()
         image = QImage.fromData(themed_drawing(path)) if is_drawing else QImage(str(path))
         widest_px = self.width() - _BESIDE_PX
@@ -325,10 +331,16 @@ def _dimmed(image: QImage) -> QImage:
     return image
 
 
+def _markdown(page: Path) -> str:
+    """Return the text of a page; Python's own help has what only the web page describes."""
+    text = page.read_text("utf-8")
+    return _DIRECTIVE.sub(r"`\1`, described by `help(\1)` in Python", text)
+
+
 def _lines(page: Path) -> Iterator[Line]:
     """Yield the lines of a page; the cells of a table's row are one."""
     document = QTextDocument()
-    document.setMarkdown(page.read_text("utf-8"))
+    document.setMarkdown(_markdown(page))
     blocks: dict[object, list[QTextBlock]] = {}
     block = document.begin()
     while block.isValid():

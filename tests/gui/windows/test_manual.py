@@ -108,6 +108,10 @@ def test_a_search_lists_lines_of_all_pages_and_return_goes_from_one_to_the_next(
     QTest.keyClicks(manual.search, "nosuchword")
     assert not manual.found.isVisible()
     assert any("Nothing found" in label.text() for label in manual.findChildren(QLabel))
+    QTest.keyClick(manual.search, Qt.Key.Key_Escape)
+    assert manual.isVisible()
+    QTest.keyClick(manual.search, Qt.Key.Key_Escape)
+    assert not manual.isVisible()
 
 
 def test_the_contents_list_every_page_and_open_its_sections_by_keys(
@@ -215,6 +219,13 @@ def test_every_link_of_a_page_leads_to_something_that_the_wheel_carries(page: Pa
         target = (page.parent / link.partition("#")[0]).resolve()
         assert target.exists(), link
         assert target.relative_to(ROOT).as_posix().startswith(carried), link
+
+
+def test_functions_are_named_with_where_they_are_described(manual: Manual) -> None:
+    manual.open("docs/api.md")
+    text = manual.page.toPlainText()
+    assert "handcal.solve, described by help(handcal.solve) in Python" in text
+    assert ":::" not in text
 
 
 def test_it_opens_on_a_small_screen(qtbot: QtBot, manual: Manual) -> None:
