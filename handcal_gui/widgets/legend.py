@@ -57,7 +57,8 @@ class LegendEntry(QWidget):
         self._name = name
         self._name.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._number = NumberLabel(f"{self.objectName()}-number", widest, tooltip)
-        self._number.setVisible(bool(widest))
+        if not widest:
+            self._number.hide()  # shown, it would be a window: it has no parent yet
         hbox(self._sample, self._name, self._number, on=self, margins=0, spacing=SPACING_PX // 2)
 
     @property

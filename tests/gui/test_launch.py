@@ -8,13 +8,15 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui import launch
 from handcal_gui.pages.start.start_page import StartPage
+from handcal_gui.preferences import PreferencesFile
+from handcal_gui.program import Program
 from handcal_gui.window import MainWindow
 from tests.gui.helpers import child
 
@@ -83,3 +85,26 @@ def test_a_window_closed_before_the_event_loop_begins_ends_the_program(
     launch.launch(qapp, arguments, first)
     assert not entered
     assert arguments.preferences.exists()
+
+
+class _Windows(QObject):
+    """Names the windows that are shown, over all of the application."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.shown: list[str] = []
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() is QEvent.Type.Show and isinstance(watched, QWidget) and watched.isWindow():
+            self.shown.append(watched.objectName() or type(watched).__name__)
+        return False
+
+
+def test_no_part_of_the_window_is_shown_before_it(qtbot: QtBot, tmp_path: Path) -> None:
+    windows, app = _Windows(), QApplication.instance()
+    assert app is not None
+    app.installEventFilter(windows)
+    program = Program(PreferencesFile(tmp_path / "preferences.json"))
+    app.removeEventFilter(windows)
+    qtbot.addWidget(program.window)
+    assert windows.shown == []

@@ -65,8 +65,8 @@ class WearerViewPanel(QWidget):
         for column in self._eyes.values():
             whole.toggled.connect(column.canvas.show_whole)
             before.toggled.connect(column.canvas.show_offline)
-        before.setChecked(True)
         self._lay_out(whole, before)
+        before.setChecked(True)  # then: what it shows would be a window without a parent
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the eyes' views, the closed eye, or a message."""
