@@ -178,6 +178,8 @@ class TrialsPanel(QWidget):
         procedure, eye = self._snapshot.procedure, self._next_eye()
         if procedure.state is not State.APPLIED or procedure.results is None:
             return tr("Solve and apply the alignments first.")
+        if self._snapshot.comparing is not None:  # the drawing may be without the calibration
+            return tr("Answer the comparison first, or stop it.")
         if eye not in procedure.results.eyes:
             return tr("The {} has not been aligned.").format(EYE_NAMES[eye].lower())
         return ""

@@ -35,6 +35,8 @@ def test_a_blinded_comparison_is_asked_for_step_by_step(
     first = replace(applied, comparing="first")
     panel.show_snapshot(first)
     assert not begin.isVisible()
+    assert not panel.record_action.isEnabled()
+    assert text(panel, "message") == "Answer the comparison first, or stop it."
     better = button(panel, QPushButton, "Second is better")
     assert not better.isEnabled()  # before both were shown
     assert better.toolTip() == "Show the first and the second drawing before the answer"
