@@ -231,6 +231,10 @@ class PlannedWizard(Wizard):
             text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
             if snapshot.record.verified_since >= set(self.usable_eyes):
                 text = tr("The wearer has verified the result. Finish, or verify an eye again.")
+                if any(one.verdict == "keep" for one in preconditions):
+                    text = tr(
+                        "Verified; the result is not used for every eye. Finish, or verify again."
+                    )
             main = ButtonSpec(Action.NEXT, tr("Finish"))
         else:
             text = tr("Not every eye has been verified. Finish, or verify an eye again.")

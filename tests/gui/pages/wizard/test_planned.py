@@ -105,7 +105,7 @@ def test_the_wearer_keeps_the_hand_up(snapshot: Maker) -> None:
     ("name", "is_verified", "label", "says"),
     [
         ("accept", True, "Finish", "has verified"),
-        ("keep", True, "Finish", "has verified"),
+        ("keep", True, "Finish", "not used for every eye"),
         ("accept", False, "Finish as it is", "Not every eye has been verified"),
         ("repeat", True, "Finish as it is", "Not accepted yet"),
         ("contradicted", True, "Finish as it is", "Do not use"),
