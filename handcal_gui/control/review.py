@@ -19,6 +19,7 @@ from handcal_gui.engine.jobs import Job
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.translation import tr
+from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_WORDS
 from handcal_gui.window import MainWindow
 
 _PATIENCE_MS = 500
@@ -130,7 +131,7 @@ class ReviewController(QObject):
         self.record = record = stored.record
         self._results = stored.results
         panels = self._window.panels
-        note = _without_alignments(record)
+        note = _without_alignments(record) or _other_verdicts(stored)
         target_arcmin = stored.settings.verdict.target_arcmin
         panels.results.show_results(
             stored.results, record.alignments, record.rig, has_verdicts=False
@@ -139,7 +140,7 @@ class ReviewController(QObject):
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)
         panels.trials.show_record(record)
-        panels.cloud.clear(note)  # of the session shown before
+        panels.cloud.clear(_without_alignments(record))  # of the session shown before
         if stored.results is not None:
             self._comparison.use(record, stored.settings)
             for number, last in [*record.alignments.items()][-1:]:
@@ -165,3 +166,19 @@ def _without_alignments(record: SessionRecord) -> str:
     if record.facts.verified:
         return tr("This session was only verified; it has no alignments.")
     return tr("It contains no alignments yet.")
+
+
+def _other_verdicts(stored: _Stored) -> str:
+    """Return the verdicts that a session holds if they are not those of solving it again."""
+    held, results = (stored.record.results or {}).get("eyes"), stored.results
+    if results is None or not isinstance(held, dict):
+        return ""
+    words = [
+        f"{EYE_NAMES[eye].lower()} {VERDICT_WORDS[verdict]}"
+        for eye, found in results.verdicts.items()
+        if isinstance(held.get(eye), dict)
+        and (verdict := held[eye].get("verdict")) in VERDICT_WORDS
+        and verdict != found.name
+    ]
+    text = tr("Solved again by this version; when it was recorded, the verdict was {}.")
+    return text.format(", ".join(words)) if words else ""

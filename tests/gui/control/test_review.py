@@ -144,6 +144,8 @@ def test_the_example_is_opened_from_the_start_page(
     program.start.example_requested.emit(tmp_path / "sessions")
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
+    said = child(program, QLabel, "reviewNote").text()  # the example is of an older version
+    assert said.startswith("Solved again by this version; when it was recorded, the verdict was")
     program.show_start()
     assert program.start.new.settings.sessions == entered  # kept for the next wearer
     program.start.example_requested.emit(tmp_path / "preferences.json" / "none")
