@@ -104,7 +104,15 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>This session was only verified; it has no alignments.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>It contains no alignments yet.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solved again by this version; when it was recorded, the verdict was {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -760,6 +768,14 @@ local network can read them.</source>
     </message>
     <message>
         <source>Return</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Return on the start page</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Start the calibration, from one of its fields</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1430,6 +1446,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Not accepted yet: verify {} again. Another alignment would change little.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verified; the result is not used for every eye. Finish, or verify again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2908,6 +2928,10 @@ Each eye&apos;s position, its uncertainty and the verdict appear here after its 
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>This session is only shown. To write notes, resume it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>⚠ Too long by {:,} characters: not saved</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3096,6 +3120,10 @@ and record which fits the hand better. The report says which was which.</source>
     </message>
     <message>
         <source>Solve and apply the alignments first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Answer the comparison first, or stop it.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3321,6 +3349,18 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Make a new pairing key? From the next calibration on, no headset connects until the new key is entered in it.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>New key</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A new pairing key was made. Enter it in the headsets before the next calibration.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Guide</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3358,10 +3398,6 @@ trials above and below it. A single trial has no SD.</source>
     </message>
     <message>
         <source>Open a session&apos;s folder</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>New pairing key created. Enter it in the headset; all others are disconnected, and the key is used from the next calibration on.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3489,6 +3525,10 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>Depth gate &amp;to</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>“To” must be at least {:.2f} m larger than “from”.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4601,6 +4641,14 @@ one turns out.</source>
     </message>
     <message>
         <source>{} sound, every file read.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} is running in this window. Finish it first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} is open in another program. Close it there, then try again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6323,6 +6371,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>to solve, tick an image in which the board was found</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>At most {} characters; the rest is cut off</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
