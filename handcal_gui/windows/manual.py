@@ -54,7 +54,7 @@ _DIMMED = 0.25
 _PAGES = (".md", ".py", ".proto")
 _LINK = re.compile(r"\]\(([\w-]+\.md)")
 _DIRECTIVE = re.compile(r"^::: (\S+)$", re.MULTILINE)
-"""Where a web page has the description of a function."""
+"""Place of a function's description in a web page."""
 
 
 @dataclass(frozen=True, slots=True)
