@@ -258,6 +258,12 @@ def test_nothing_moves_the_main_button(
         for one in (view, replace(view, sentence=LONG, note=LONG, preconditions=long)):
             say(program, now, one)
             look()
+    window.banner.show_message(LONG)
+    look()
+    window.banner.clear()
+    say(program, now, view)  # with four long texts at once the guide scrolls, beside its bar
+    look()
+    QApplication.processEvents()
     buttons = [one for one in window.findChildren(QAbstractButton) if one.isVisible()]
     before = [one.mapTo(window, QPoint()) for one in buttons]
     window.banner.show_message(LONG)
