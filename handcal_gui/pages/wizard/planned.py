@@ -252,7 +252,7 @@ class PlannedWizard(Wizard):
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:
-        view = save_view(snapshot)
+        view = save_view(snapshot, is_held=self.is_held)
         view = replace(view, fact=_drawn_otherwise(snapshot.procedure) or view.fact)
         if not snapshot.record.is_finished:
             return view

@@ -112,7 +112,7 @@ def align_view(snapshot: Snapshot) -> WizardView:
             _all_hold(preconditions) and is_placed(snapshot) and snapshot.link.connected,
         ),
         (ButtonSpec(Action.REDO, tr("&Make another cursor"), discards=tr("Discards this cursor")),),
-        procedure.refusal,
+        procedure.refusal if preconditions[0].holds else "",  # or it tells a lost hand to turn
     )
 
 
@@ -218,8 +218,8 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     )
 
 
-def save_view(snapshot: Snapshot) -> WizardView:
-    """Return the view of a session to finish, or finished."""
+def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
+    """Return the view of a session to finish, which is held or finishes itself, or finished."""
     preconditions = (
         Precondition(tr("Saved in {}").format(snapshot.session_path), not snapshot.problem),
         *eyes_accepted(snapshot),
@@ -240,6 +240,8 @@ def save_view(snapshot: Snapshot) -> WizardView:
             unearned=unearned,
         )
     finish = tr("Everything is already saved. The session finishes by itself; Hold keeps it open.")
+    if is_held:
+        finish = tr("Everything is already saved. Finish the session when you are done.")
     if snapshot.problem:
         finish = tr("Solve the problem below, then finish the session.")
     return WizardView(

@@ -146,7 +146,7 @@ class Wizard:
                 view = self._verify(snapshot)
                 return replace(view, fact=view.fact or kept_fact(snapshot.procedure))
             case Step.SAVE:
-                return save_view(snapshot)
+                return save_view(snapshot, is_held=self.is_held)
 
     def eyes(self, snapshot: Snapshot) -> tuple[Eye, ...]:
         """Return the eyes that the next alignment is for."""

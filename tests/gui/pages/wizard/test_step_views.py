@@ -52,6 +52,8 @@ def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) 
     assert view.sentence.startswith("Close the right eye.")
     assert view.note == refusal
     assert not view.preconditions[1].holds
+    lost = {"hand": None, "cloud": None, "problem": "hand cut by the image border"}
+    assert not Wizard().view(snapshot(procedure={"refusal": refusal}, observation=lost)).note
     assert Wizard().view(snapshot()).preconditions[1].holds
 
 
@@ -203,16 +205,22 @@ def test_the_distance_of_the_hand_follows_from_the_depth_gate(snapshot: Maker) -
     assert said(0.55, 2.00) == "60 to 70 cm from the camera"
 
 
+def test_a_session_that_is_held_does_not_finish_by_itself(snapshot: Maker) -> None:
+    seen = judged(snapshot, "accept", "accept", State.APPLIED)
+    assert "finishes by itself" in save_view(seen, is_held=False).sentence
+    assert "Finish the session when you are done" in save_view(seen, is_held=True).sentence
+
+
 def test_a_kept_offline_calibration_is_named_and_not_unearned(snapshot: Maker) -> None:
     kept = judged(snapshot, "accept", "keep", State.APPLIED)
     told = "The headset uses the offline calibration for the right eye: φ is 0 there."
-    assert save_view(kept).fact == told
-    assert not save_view(kept).unearned
+    assert save_view(kept, is_held=False).fact == told
+    assert not save_view(kept, is_held=False).unearned
     wizard = Wizard()
     wizard.view(judged(snapshot, "accept", "keep", State.SOLVED))
     view = wizard.view(kept)
     assert (view.step, view.fact) == (Step.VERIFY, told)
-    assert not save_view(judged(snapshot, "accept", "accept", State.APPLIED)).fact
+    assert not save_view(judged(snapshot, "accept", "accept", State.APPLIED), is_held=False).fact
 
 
 def test_a_resumed_session_says_that_it_continues(snapshot: Maker, record: SessionRecord) -> None:
