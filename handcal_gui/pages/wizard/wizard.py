@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import QSize, Qt, Signal
@@ -26,6 +27,7 @@ from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.sentence import sentence
 
 _MOST_PRECONDITIONS = 3
+_COMPARING = tr("The wearer compares two drawings. Record the answer in Trials, or stop comparing.")
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
 _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
@@ -136,6 +138,9 @@ class WizardPanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the wizard's view of a snapshot."""
         view = self.wizard.view(snapshot)
+        if snapshot.comparing is not None:
+            main = replace(view.main, is_enabled=False)
+            view = replace(view, sentence=_COMPARING, main=main, note="", runs_after_s=None)
         self.picture.step = view.step
         if view != self.shown:
             before, self.shown = self.shown, view
@@ -209,6 +214,7 @@ class WizardPanel(QWidget):
         )
         hold.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
         hold.setWhatsThis(tr("Hold the automatic steps, or let them run"))
+        hold.setIconText(tr("Hold (H)"))
         hold.setCheckable(True)
         hold.triggered.connect(self._choose_hold)
         return hold
@@ -290,7 +296,7 @@ class WizardPanel(QWidget):
         layout.addSpacing(SPACING_PX)
         layout.addLayout(head)
         self._ring.setToolTip(
-            tr("Alignments made, or eyes verified; a full ring runs the next step")
+            tr("Green: alignments made, or eyes verified. Blue: time until the step runs by itself")
         )
         said = self._sentence, self._preconditions, self._fact, self._note
         texts = vbox(*said, 0, spacing=SPACING_PX // 2)

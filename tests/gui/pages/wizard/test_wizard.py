@@ -338,3 +338,14 @@ def test_before_the_first_image_nothing_of_the_session_before_is_shown(
     broken = snapshot(State.SHOW_HAND, frame=None, camera={"problem": "unplugged"})
     panel.picture.show_snapshot(broken)
     assert not camera.has_image
+
+
+def test_while_drawings_are_compared_the_guide_asks_for_the_answer(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    applied = snapshot(State.APPLIED)
+    panel.show_snapshot(applied)
+    assert child(panel, "wizardMain").isEnabled()
+    panel.show_snapshot(replace(applied, comparing="first"))
+    assert not child(panel, "wizardMain").isEnabled()
+    assert any(text.startswith("The wearer compares two drawings.") for text in _texts(panel))
