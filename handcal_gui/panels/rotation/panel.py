@@ -122,7 +122,8 @@ class RotationPanel(QWidget):
             return
         self._history_drawn_s = now_s
         times_s, angles_deg = np.array(self._history).T
-        self._angle_line.setData(times_s - now_s, angles_deg)
+        top_deg = _HISTORY_LIMITS * float(np.degrees(self._limit_rad))
+        self._angle_line.setData(times_s - now_s, np.minimum(angles_deg, top_deg))
 
     def _show_limit(self, limit_rad: float) -> None:
         if limit_rad == self._limit_rad:

@@ -123,6 +123,11 @@ def test_the_history_is_of_the_last_ten_seconds(panel: RotationPanel, snapshot: 
     np.testing.assert_allclose(angles_deg, np.arange(4, 15))
 
 
+def test_what_is_beyond_the_scale_is_drawn_at_its_end(panel: RotationPanel, snapshot: Make) -> None:
+    panel.show_snapshot(turned(snapshot, (0, 0, 40)))
+    assert history(panel)[1].tolist() == pytest.approx([18.0])
+
+
 def test_another_cursor_begins_another_history(panel: RotationPanel, snapshot: Make) -> None:
     panel.show_snapshot(turned(snapshot, (0, 0, 5)))
     panel.show_snapshot(snapshot(State.SHOW_HAND))
