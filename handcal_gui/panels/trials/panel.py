@@ -216,20 +216,21 @@ class TrialsPanel(QWidget):
 
     def _refresh(self) -> None:
         obstacle = self._obstacle()
-        if self._is_doubtful and not self._doubt():
+        was_finished = self._is_finished
+        self._is_finished = self._record is not None and self._record.is_finished
+        has_ended = self._is_finished and not was_finished
+        if has_ended or not self._doubt():
             self._forget_doubt()
         self.record_action.setEnabled(not obstacle)
         self._message.setText(
             obstacle
             or tr("Fine-tune φ of the {}, then record.").format(EYE_NAMES[self._next_eye()].lower())
         )
-        was_finished = self._is_finished
-        self._is_finished = self._record is not None and self._record.is_finished
         if not obstacle and self._eye != self._next_eye():
             self._eye = self._next_eye()
             self.eye_changed.emit(self._eye)
         self._shows_target.setEnabled(not obstacle)
-        if obstacle or (self._is_finished and not was_finished):
+        if obstacle or has_ended:
             self._shows_target.setChecked(False)
         self._request_target()
         self._show_comparison(can_compare=not obstacle)

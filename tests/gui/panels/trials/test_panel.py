@@ -144,6 +144,11 @@ def test_a_trial_of_nothing_must_be_asked_for_twice(
     with qtbot.waitSignal(panel.doubted) as doubted:
         choose(panel, "Eye", "Right eye")
     assert doubted.args == [""]
+    panel.record_action.trigger()
+    with qtbot.waitSignal(panel.doubted) as doubted:
+        there = snapshot(State.APPLIED)
+        panel.show_snapshot(replace(there, record=replace(there.record, is_finished=True)))
+    assert doubted.args == [""]
     assert asked == []
     for _ in range(2):
         panel.record_action.trigger()
