@@ -130,7 +130,7 @@ class EngineThread(Worker):
             why = str(error)
         except Exception as error:
             _LOG.exception("the engine failed unexpectedly")
-            why = tr("handcal hit an unexpected error ({}); the session is kept").format(
+            why = tr("handcal hit an unexpected error ({}); the session is kept: resume it").format(
                 _describe(error)
             )
         self._emit_later(self.ended.emit, why)

@@ -114,7 +114,8 @@ class CompareTab(QWidget):
         self._status.setText(text)
 
     def _explain(self, method: Method | Literal[""]) -> None:
-        self._status.setText(f"{method}: {_MEANINGS[method]}" if method else "")
+        text = tr("{}: {} Compare shows it beside the present results.")
+        self._status.setText(text.format(method, _MEANINGS[method]) if method else "")
 
     def _ask(self) -> None:
         method = self._methods.currentText()

@@ -165,7 +165,7 @@ def test_an_engine_that_breaks_down_closes_the_station_and_says_so(qtbot: QtBot)
         engine.start()
     engine.close()
     assert ended.args == [
-        "handcal hit an unexpected error (ZeroDivisionError: oh); the session is kept"
+        "handcal hit an unexpected error (ZeroDivisionError: oh); the session is kept: resume it"
     ]
     assert station.is_closed
 
