@@ -1689,6 +1689,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Everything is already saved. Finish the session when you are done.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solve the problem below, then finish the session.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1993,11 +1997,23 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Green: alignments made, or eyes verified. Blue: time until the step runs by itself</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Draw with the offline calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The wearer compares two drawings. Record the answer in Trials, or stop comparing.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Hold</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hold (H)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2015,10 +2031,6 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
     </message>
     <message>
         <source>E&amp;yes</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Alignments made, or eyes verified; a full ring runs the next step</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2672,6 +2684,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>Δ: {} minus {}. σ and expected error are realistic only for “consistent”; the other methods&apos; are too small.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: {} Compare shows it beside the present results.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6296,10 +6312,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>handcal hit an unexpected error ({}); the session is kept</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>handcal hit an unexpected error ({})</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6375,6 +6387,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>At most {} characters; the rest is cut off</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>handcal hit an unexpected error ({}); the session is kept: resume it</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
