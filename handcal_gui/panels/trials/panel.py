@@ -219,7 +219,7 @@ class TrialsPanel(QWidget):
         was_finished = self._is_finished
         self._is_finished = self._record is not None and self._record.is_finished
         has_ended = self._is_finished and not was_finished
-        if has_ended or not self._doubt():
+        if self._is_doubtful and (has_ended or not self._doubt()):
             self._forget_doubt()
         self.record_action.setEnabled(not obstacle)
         self._message.setText(
