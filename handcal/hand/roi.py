@@ -18,6 +18,7 @@ from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 _STEP_PX = 8  # of the depth image: fine enough to locate a hand
 _PIXELS_MIN = 6
 _DEPTH_SPREAD_M = 0.10  # within one hand
+_INSIDE_M = 0.05  # from an end of the gate to where all of a hand is within it
 _SAME_OVERLAP = 0.3
 _SHIFTS, _STILL_PX = 3, 1.0
 _MEASURED_MIN = 0.1  # least share of a box with depth, to say how far it is
@@ -251,17 +252,18 @@ class _CoarseCloud:
                 f"a hand at the measured {hand_m:.2f} m would be only {100 * side_m:.0f} cm large: "
                 "depth is in a wrong unit; correct the depth scale of the camera or recording"
             )
+        where = f"at {100 * hand_m:.0f} cm"
         if hand_m < near_m:
-            back_cm = 100 * (near_m - hand_m)
-            return f"the hand is too near, at {hand_m:.2f} m; move it back by {back_cm:.0f} cm"
+            back_cm = 100 * (near_m + _INSIDE_M - hand_m)
+            return f"the hand is too near, {where}; move it back by {back_cm:.0f} cm"
         if side_m > settings.side_max_m:
             return (
                 f"the depth camera measures only the background, at {hand_m:.2f} m, where the hand "
                 "is; the hand may be too near: move it back"
             )
         if hand_m > far_m:
-            forward_cm = 100 * (hand_m - far_m)
-            return f"the hand is too far, at {hand_m:.2f} m; bring it nearer by {forward_cm:.0f} cm"
+            near_cm = 100 * (hand_m - far_m + _INSIDE_M)
+            return f"the hand is too far, {where}; bring it nearer by {near_cm:.0f} cm"
         return "most of the hand is hidden or without depth; show all of it to the camera"
 
     def follow(self, track: _Track) -> _Track | None:

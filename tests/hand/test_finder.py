@@ -98,8 +98,8 @@ def test_where_the_detector_sees_a_hand_the_reason_names_what_is_there(frame: Fr
     hole = frame.depth.copy()
     hole[y0:y1, x0:x1] = 0
     for there, reason in (
-        (moved(frame, -0.25), r"too near, at 0\.2\d m; move it back by (8|9|10|11) cm"),
-        (moved(frame, 0.25), r"too far, at 0\.7\d m; bring it nearer by [4-7] cm"),
+        (moved(frame, -0.25), r"too near, at 2\d cm; move it back by 1[3-6] cm"),
+        (moved(frame, 0.25), r"too far, at 7\d cm; bring it nearer by (9|10|11|12) cm"),
         (
             replace(frame, depth_scale_m=0.1 * frame.depth_scale_m),
             "only [12] cm large: depth is in",
