@@ -21,6 +21,9 @@ _ENOUGH_HZ, _MOST_LOST = 20.0, 0.5
 """Below this rate, frames lost in this computer are named if they are more than this share of the
 frames taken."""
 _LOST_OVER_S = 1.0
+_FEW_POSES_HZ = 5.0
+"""Poses a second below which no hand can be placed in time."""
+_FEW_POSES = tr("The headset sends too few poses to place a hand; close other programs on it")
 
 
 class Conditions:
@@ -73,6 +76,7 @@ class Conditions:
             or snapshot.problem
             or camera.problem
             or link_problem
+            or (_FEW_POSES if 0.0 < link.pose_rate_hz < _FEW_POSES_HZ else "")
             or snapshot.contradiction
             or self._slow_text
         )

@@ -146,3 +146,11 @@ def test_a_late_frame_does_not_take_the_hand_away(snapshot: Maker) -> None:
     other_state = replace(snapshot(State.ALIGN), observation=None)
     for other in (after(late, 0.9), unplugged, other_state):
         assert conditions.calm(other).observation is None
+
+
+def test_a_headset_that_sends_few_poses_is_named(snapshot: Maker) -> None:
+    conditions = Conditions()
+    few = snapshot(link={"pose_rate_hz": 2.0})
+    assert watch(conditions, few, [0.0, 0.5]) == ["", ""]
+    assert watch(conditions, few, [1.0])[0].startswith("The headset sends too few poses")
+    assert watch(conditions, snapshot(link={"pose_rate_hz": 30.0}), [2.0]) == [""]
