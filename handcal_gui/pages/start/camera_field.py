@@ -42,7 +42,7 @@ class CameraField(QWidget):
         super().__init__(parent)
         self._source = choice("source", tr("Camera"), _SOURCES)
         self._serial = with_name(
-            QLineEdit(placeholderText=tr("Serial number; any if empty")),
+            QLineEdit(placeholderText=tr("Any serial number")),
             "serial",
             tr("Serial number"),
         )
@@ -59,7 +59,7 @@ class CameraField(QWidget):
             QLineEdit(placeholderText=tr("Address of the headset")), "hololens2Host", tr("Address")
         )
         self._hololens2 = HoloLens2Settings()
-        self._other = QLineEdit(placeholderText=tr("Serial number; any if empty"))
+        self._other = QLineEdit(placeholderText=tr("Any serial number"))
         with_name(self._other, "otherSerial", tr("Serial number"))
         self._recording = PathField(tr("Recording"), "either", _PATTERN)
         details = QStackedWidget()

@@ -189,7 +189,10 @@ class EvaluationPage(QWidget):
 
     def _lay_out(self, question: str) -> None:
         vbox(
-            paragraph("question", tr("{} Check the entries and press Run.").format(question)),
+            paragraph(
+                "question",
+                tr("{} Check the entries, then start at the lower right.").format(question),
+            ),
             self.form,
             self._found,
             (self._results, 1),

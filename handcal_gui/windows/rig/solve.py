@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -140,8 +141,10 @@ def solve_display(
 
 def _compared(result: CameraCalibration) -> str:
     """Return the lens models compared with their errors on images not used to solve them."""
+    edge, unknown = tr("± {:.2f} px at the edge"), tr("unknown at the edge")
     listed = ", ".join(
-        tr("{} {:.3f} px (± {:.2f} px at the edge)").format(one.lens, one.held_out_px, one.edge_px)
+        f"{one.lens} {one.held_out_px:.3f} px "
+        f"({edge.format(one.edge_px) if math.isfinite(one.edge_px) else unknown})"
         for one in result.compared
     )
     return tr("lens {}, of {}").format(result.lens, listed)
