@@ -12,6 +12,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The headset sends too few poses to place a hand; close other programs on it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{}; press Restart headset in Link</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1019,15 +1023,15 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Any serial number</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Settin&amp;gs…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Camera</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Serial number; any if empty</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4956,7 +4960,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} Check the entries and press Run.</source>
+        <source>{} Check the entries, then start at the lower right.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6056,11 +6060,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the viewpoint camera&apos;s intrinsics are missing: solve its step first</source>
+        <source>± {:.2f} px at the edge</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} {:.3f} px (± {:.2f} px at the edge)</source>
+        <source>unknown at the edge</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the viewpoint camera&apos;s intrinsics are missing: solve its step first</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
