@@ -74,7 +74,7 @@ class NewCalibration(Card):
     def __init__(self, preferences: Preferences, pairing_key: str, check: Check) -> None:
         super().__init__(
             tr("Start a calibration"),
-            tr("Enter a name, now or later in the library, and start; the settings are kept."),
+            tr("Enter a name, now or later in All sessions, and start; the settings are kept."),
             "hand",
         )
         self.setObjectName("newCalibration")
