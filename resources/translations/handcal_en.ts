@@ -1083,7 +1083,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Enter a name, now or later in the library, and start; the settings are kept.</source>
+        <source>Enter a name, now or later in All sessions, and start; the settings are kept.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
