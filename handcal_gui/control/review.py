@@ -131,7 +131,7 @@ class ReviewController(QObject):
         self.record = record = stored.record
         self._results = stored.results
         panels = self._window.panels
-        note = _without_alignments(record) or _other_verdicts(stored)
+        lack = _without_alignments(record)
         target_arcmin = stored.settings.verdict.target_arcmin
         panels.results.show_results(
             stored.results, record.alignments, record.rig, has_verdicts=False
@@ -140,12 +140,13 @@ class ReviewController(QObject):
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)
         panels.trials.show_record(record)
-        panels.cloud.clear(_without_alignments(record))  # of the session shown before
+        panels.cloud.clear(lack)  # of the session shown before
         if stored.results is not None:
             self._comparison.use(record, stored.settings)
             for number, last in [*record.alignments.items()][-1:]:
                 self._show_alignment(number, last.eyes[0])
         # Then: if it is on the screen, it chooses the alignment whose clouds are shown.
+        note = lack or _other_verdicts(stored)
         self._page.show_session(record, stored.results, target_arcmin, note)
         self._window.show_page("review")
         self._window.show_wearer(record.wearer)

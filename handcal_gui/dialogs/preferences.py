@@ -188,11 +188,7 @@ class PreferencesDialog(QDialog):
             self._target,
             tr("Largest expected error of an accepted eye; 60′ is 1°."),
         )
-        add(
-            tr("Eye box"),
-            self._learn,
-            tr("Learns from earlier wearers where eyes are."),
-        )
+        add(tr("Eye box"), self._learn, tr("Learns from earlier wearers where eyes are."))
         self._calibration.add_heading(tr("Sent to other programs by the next calibrations"))
         add("Open&IGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
         add(tr("&Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))
