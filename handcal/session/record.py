@@ -71,7 +71,7 @@ class SessionRecord:
     torn_bytes: int
     """Length of an incomplete last line, which is ignored; 0 if there is none."""
     facts: SessionFacts = field(default_factory=SessionFacts)
-    verified_since: frozenset[Eye] = frozenset()
+    verified_now: frozenset[Eye] = frozenset()
     """Eyes verified with the present alignments."""
     alignment_facts: Mapping[int, AlignmentFacts] = field(default_factory=dict)
     """Of each alignment, deleted ones too."""
@@ -198,7 +198,7 @@ def read_session(
         journal_bytes=journal.complete_bytes,
         torn_bytes=journal.torn_bytes,
         facts=state.facts,
-        verified_since=state.verified_since,
+        verified_now=state.verified_now,
         alignment_facts=MappingProxyType(state.alignment_facts),
         last_alignment=state.alignments.last(),
         damaged=tuple(damaged),

@@ -144,7 +144,7 @@ class SessionState:
     older_results : list of dict
         Those before.
     facts : SessionFacts
-    verified_since : frozenset of eye
+    verified_now : frozenset of eye
     alignment_facts : dict of int to AlignmentFacts
     alignments : NumberedItems of str
         Checksums.
@@ -174,7 +174,7 @@ class SessionState:
         self.fine_tuned: dict[Eye, Float64] | None = None
 
     @property
-    def verified_since(self) -> frozenset[Eye]:
+    def verified_now(self) -> frozenset[Eye]:
         """The eyes verified with the present alignments."""
         now = frozenset(self.alignments.active)
         return frozenset(eye for eye, then in self._verified_with.items() if then == now)

@@ -189,7 +189,7 @@ def snapshot(
             views=_views(rig, shots),
         )
         if verified := frozenset(procedure.get("verifications", ())):
-            changes["record"] = replace(changes.get("record", record), verified_since=verified)
+            changes["record"] = replace(changes.get("record", record), verified_now=verified)
         return replace(snapshot, **changes)
 
     return make

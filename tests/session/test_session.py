@@ -238,13 +238,13 @@ def test_a_verification_is_of_the_alignments_so_far(session: Session, alignment:
     found = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0))
     session.save_alignment(alignment)
     session.save_facts(verified={"left": found})
-    assert Session.open(session.path).verified_since == {"left"}
+    assert Session.open(session.path).verified_now == {"left"}
     session.save_alignment(replace(alignment, t_b_ns=3))
     record = Session.open(session.path)
-    assert record.verified_since == frozenset()
+    assert record.verified_now == frozenset()
     assert set(record.facts.verified) == {"left"}
     session.delete("alignment", 2)
-    assert Session.open(session.path).verified_since == {"left"}
+    assert Session.open(session.path).verified_now == {"left"}
 
 
 def test_a_shift_set_by_hand_is_kept_until_the_next_results(session: Session) -> None:

@@ -91,7 +91,7 @@ class PlannedWizard(Wizard):
         if step is None and procedure.next_step is not None:
             step = _STEPS.get(procedure.next_step.name)
         # A verification is solved and sent at its own step.
-        is_of_verification = step is Step.SOLVE and snapshot.record.verified_since
+        is_of_verification = step is Step.SOLVE and snapshot.record.verified_now
         self._latest = Step.VERIFY if is_of_verification else step or self._latest
         return self._latest
 
@@ -229,7 +229,7 @@ class PlannedWizard(Wizard):
                 ).format(eye_names(again))
         elif set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
-            if snapshot.record.verified_since >= set(self.usable_eyes):
+            if snapshot.record.verified_now >= set(self.usable_eyes):
                 text = tr("The wearer has verified the result. Finish, or verify an eye again.")
                 if any(one.verdict == "keep" for one in preconditions):
                     text = tr(

@@ -227,7 +227,7 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
     others = (ButtonSpec(Action.EXPORT, tr("E&xport…")), ButtonSpec(Action.BACK, tr("&Back")))
     judged = preconditions[1:]
     is_settled = bool(judged) and all(one.verdict in ("accept", "keep") for one in judged)
-    is_verified = is_settled and len(snapshot.record.verified_since) == len(judged)
+    is_verified = is_settled and len(snapshot.record.verified_now) == len(judged)
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
     if snapshot.record.is_finished:
         return WizardView(

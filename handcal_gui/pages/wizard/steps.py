@@ -95,7 +95,7 @@ class Wizard:
             case State.VERIFY:
                 self._free = Step.VERIFY
                 return Step.VERIFY
-            case State.APPLYING if snapshot.record.verified_since:
+            case State.APPLYING if snapshot.record.verified_now:
                 return Step.VERIFY
             case State.ALIGNED | State.SOLVED | State.APPLYING:
                 self._free = Step.VERIFY

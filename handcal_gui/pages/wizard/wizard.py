@@ -265,7 +265,7 @@ class WizardPanel(QWidget):
         """Return the alignments made and planned, or the eyes verified, and their name."""
         if view.omitted or view.step in OF_THE_RESULT:
             eyes = 1 if self.wizard.plan in EYES else 2
-            return len(snapshot.record.verified_since), eyes, tr("verified")
+            return len(snapshot.record.verified_now), eyes, tr("verified")
         done = len(snapshot.procedure.alignments)
         planned = 2 if self.wizard.plan == "each" else 1
         return done, max(planned, done), tr("aligned")

@@ -136,7 +136,7 @@ def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot:
     results = replace(done.procedure.results, verdicts=verdicts)
     done = replace(done, procedure=replace(done.procedure, results=results))
     assert begun(snapshot).view(done).sentence.startswith("The wearer has verified the result.")
-    aligned = replace(done, record=replace(done.record, verified_since=frozenset()))
+    aligned = replace(done, record=replace(done.record, verified_now=frozenset()))
     view = begun(snapshot).view(aligned)
     assert view.sentence.startswith("Verified before the alignments changed.")
     solving = planned_snapshot(snapshot, StepName.SOLVE, verifications=VERIFIED)

@@ -221,7 +221,7 @@ def test_each_solved_eye_is_verified_before_anything_is_said_to_fit(snapshot: Ma
     unverified = replace(
         accepted,
         procedure=replace(accepted.procedure, verifications={}),
-        record=replace(accepted.record, verified_since=frozenset()),
+        record=replace(accepted.record, verified_now=frozenset()),
     )
     for _ in EYES:
         assert Action.SKIP in actions(wizard.view(unverified))

@@ -287,7 +287,7 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_ey
         record,
         facts=replace(record.facts, former="ada-1"),
         alignments={},
-        verified_since=frozenset({"left"}),
+        verified_now=frozenset({"left"}),
     )
     slipped = replace(
         planned_snapshot(
