@@ -49,8 +49,8 @@ _PACKAGES = (
     "PySide6-Essentials",
     "pyqtgraph",
 )
-_CAMERA_EXTRAS = (("oak", "depthai", "OAK-D"), ("orbbec", "pyorbbecsdk", "Orbbec"))
-"""Extra, its module, and the cameras that need it."""
+CAMERA_EXTRAS = {"oak": ("depthai", "OAK-D"), "orbbec": ("pyorbbecsdk", "Orbbec")}
+"""Extras that cameras need: the module of each, and the cameras."""
 _CAMERA_LATENCY_S = CalibrationSettings().camera_latency_s
 _SETTLE_S = 2.0
 _POLL_S = 0.05
@@ -237,7 +237,7 @@ def _cameras(rig: Path | None) -> list[Finding]:
 def _camera_extras() -> list[Finding]:
     """Look for the libraries of the other cameras without importing them."""
     findings = []
-    for extra, module, camera in _CAMERA_EXTRAS:
+    for extra, (module, camera) in CAMERA_EXTRAS.items():
         what = f"{camera} library"
         if importlib.util.find_spec(module) is None:
             advice = f"needed for {camera} cameras: pip install 'handcal[{extra}]'"

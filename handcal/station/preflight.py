@@ -24,7 +24,14 @@ from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
-from handcal.station.doctor import Finding, Health, examine_camera, examine_disk, with_rig
+from handcal.station.doctor import (
+    CAMERA_EXTRAS,
+    Finding,
+    Health,
+    examine_camera,
+    examine_disk,
+    with_rig,
+)
 from handcal.station.settings import StationSettings
 
 _LEAST_GATE_M = 0.15
@@ -106,10 +113,6 @@ def _look(part: Part, look: Callable[[], Finding], advice: str) -> Finding:
     return replace(finding, what=PARTS[part])
 
 
-_EXTRAS = {"oak": ("OAK-D", "depthai"), "orbbec": ("Orbbec camera", "pyorbbecsdk")}
-"""Names and libraries of cameras that need an extra."""
-
-
 def _good(found: str) -> Finding:
     return Finding("", Health.GOOD, found)
 
@@ -132,7 +135,8 @@ def _camera(settings: StationSettings, progress: Progress) -> Finding:
         case "hololens2":
             return _hololens2(settings)
         case "oak" | "orbbec" as kind:
-            name, library = _EXTRAS[kind]
+            library, camera = CAMERA_EXTRAS[kind]
+            name = camera if kind == "oak" else f"{camera} camera"
             if find_spec(library) is None:
                 install = f"install it: pip install 'handcal[{kind}]'"
                 return _broken(f"the library of the {name}, {library}, is missing", install)
