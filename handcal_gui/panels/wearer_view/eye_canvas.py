@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
+from itertools import product
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, Qt
+from pyqtgraph.functions import arrayToQPolygonF
+from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QTransform
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -16,19 +19,19 @@ from handcal_gui.widgets.legend import role_color
 
 LINES = {
     "hand": ("text", (1.0, Qt.PenStyle.SolidLine)),
-    "drawn": ("live", (1.0, Qt.PenStyle.DashLine)),
-    "cursor": ("cursor", (2.0, Qt.PenStyle.SolidLine)),
+    "drawn": ("live", (2.0, Qt.PenStyle.DashLine)),
+    "cursor": ("cursor", (3.0, Qt.PenStyle.SolidLine)),
     "offline": ("muted", (1.0, Qt.PenStyle.DotLine)),
 }
-"""Colour of each kind of outline, and width in pixels and style of its line; wider lines are ten
-times slower in Qt, and halos make these visible."""
-_HALO_PX = 4.5
+"""Colour of each kind of outline, and width in pixels and style of its line."""
+_HALO_PX = 2.0
+"""How much wider the ground is on which a line lies over an image."""
 _FEW_POINTS = 120
 """Outlines of so few points, such as a target, are drawn as they are."""
 _SMOOTHED_POINTS = 5
 """A hand's outline has a point for each of the camera's pixels on it; so many neighbours are
 averaged, which takes away the steps from pixel to pixel and leaves the webs between fingers."""
-_SPACING_PX = 18.0
+_SPACING_PX = 12.0
 """Between the points drawn, in pixels of the widget: Qt takes a microsecond or more for each."""
 _MARGIN = 0.12
 _WIDEST_CROP = 1.8
@@ -145,14 +148,18 @@ class EyeCanvas(QWidget):
             for what, px in outlines
             if len(px)
         ]
-        painter.setPen(_pen(colors().canvas, _HALO_PX))
-        for _, line in lines:
-            painter.drawPolyline(line)
+        if not self._image.isNull():
+            for what, line in lines:
+                painter.setPen(_pen(colors().canvas, LINES[what][1][0] + _HALO_PX))
+                painter.drawPolyline(line)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for what, line in lines:
-            role, width_and_style = LINES[what]
-            painter.setPen(_pen(role_color(role, self), *width_and_style))
-            painter.drawPolyline(line)
+            role, (width_px, style) = LINES[what]
+            pen = _pen(role_color(role, self), 1.0, style)
+            if style is Qt.PenStyle.DashLine:
+                pen.setDashPattern([4.0 * width_px, 3.0 * width_px - 1.0])
+            painter.setPen(pen)
+            _draw_wide(painter, line, round(width_px))
 
     def _to_widget(self) -> QTransform:
         """Return the transform that fits the crop into the widget, close to the title above."""
@@ -238,7 +245,7 @@ def simplified(outline_px: Float64, spacing_px: float) -> Float64:
     if len(outline_px) <= _FEW_POINTS:
         return outline_px
     steps_px = np.diff(outline_px[:_FEW_POINTS], axis=0)
-    step_px = float(np.median(np.linalg.norm(steps_px, axis=1)))
+    step_px = math.sqrt(np.sort((steps_px**2).sum(axis=1))[len(steps_px) // 2])  # the median
     every = max(1, int(spacing_px / max(step_px, 1e-9)))
     end = len(outline_px) - _SMOOTHED_POINTS + 1
     neighbours_px = [outline_px[k : end + k : every] for k in range(_SMOOTHED_POINTS)]
@@ -247,8 +254,16 @@ def simplified(outline_px: Float64, spacing_px: float) -> Float64:
 
 
 def _closed(outline_px: Float64) -> QPolygonF:
-    points = outline_px.tolist()
-    return QPolygonF([QPointF(x, y) for x, y in [*points, points[0]]])
+    line: QPolygonF = arrayToQPolygonF(*np.vstack([outline_px, outline_px[:1]]).T)
+    return line
+
+
+def _draw_wide(painter: QPainter, line: QPolygonF, width_px: int) -> None:
+    """Draw a line as thin ones side by side: Qt is many times slower at smooth wide lines."""
+    px = 1.0 / painter.device().devicePixelRatio()
+    offsets = [px * (k - 0.5 * (width_px - 1)) for k in range(width_px)]
+    for right, down in product(offsets, offsets):
+        painter.drawPolyline(line.translated(right, down))
 
 
 def _pen(color: QColor | str, width_px: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:

@@ -178,3 +178,17 @@ def test_the_drawn_outline_follows_the_webs_between_the_fingers(
 
 def test_an_outline_of_few_points_is_drawn_as_it_is() -> None:
     np.testing.assert_array_equal(simplified(RING_M[::25, :2], 1.0), RING_M[::25, :2])
+
+
+def test_the_cursor_keeps_its_colour_over_an_image(canvas: EyeCanvas) -> None:
+    world = np.full((DISPLAY.height_px // 2, DISPLAY.width_px // 2, 3), 128, np.uint8)
+    eye_m, corners_m = np.zeros(3), RING_M[::25]  # a square on its corner
+    view = render_eye_view(
+        "left", DISPLAY, eye_m, eye_m, RING_M[:0], corners_m, is_true=True, image=world
+    )
+    canvas.show_view(view)
+    canvas.show_whole(True)
+    sides_px = np.diff(np.vstack([view.cursor_px, view.cursor_px[:1]]), axis=0)
+    long_px = SIZE[0] / canvas.crop_px.width() * np.linalg.norm(sides_px, axis=1).sum()
+    is_cursor = np.abs(_pixels(canvas).astype(int) - rgb(colors().cursor)).max(axis=2) < 10
+    assert is_cursor.sum() > 1.5 * long_px
