@@ -27,6 +27,7 @@ from handcal_gui.panels.cloud.box_axes import Box, draw_box, draw_scale
 from handcal_gui.panels.cloud.orbit import Direction, Orbit
 from handcal_gui.theme import SPACING_PX, colors, number_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.paint_turns import update_in_turn
 from handcal_gui.widgets.splat import rgb, splat
 
 _RAD_PER_PX = 0.01
@@ -93,18 +94,18 @@ class CloudView(QWidget):
             if self._box is None or not self._box.still_fits(smallest):
                 self._box = smallest
         self.setAccessibleDescription(text)
-        self.update()
+        update_in_turn(self)
 
     def show_lines(self, from_mm: Float64, to_mm: Float64) -> None:
         """Show lines over the points, between (M, 3) start points and (M, 3) end points."""
         self._from_mm, self._to_mm = from_mm, to_mm
-        self.update()
+        update_in_turn(self)
 
     def look(self, direction: Direction) -> None:
         """Show the whole scene from one of the given directions."""
         self._orbit = self._orbit.looking(direction)
         self._is_fitted = True
-        self.update()
+        update_in_turn(self)
 
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw box, points, lines, scale and caption, or the message."""
@@ -170,13 +171,13 @@ class CloudView(QWidget):
 
     def _turn(self, yaw_rad: float, pitch_rad: float) -> None:
         self._orbit = self._orbit.turned(yaw_rad, pitch_rad)
-        self.update()
+        update_in_turn(self)
 
     def _change(self, orbit: Orbit) -> None:
         """Set a zoom or position chosen by the user; the view is no longer fitted."""
         self._orbit = orbit
         self._is_fitted = False
-        self.update()
+        update_in_turn(self)
 
     def _paint_points(self, painter: QPainter) -> None:
         ratio, size = self.devicePixelRatio(), self._device_size()

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal_gui.theme import colors, number_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.paint_turns import update_in_turn
 
 _FROM_DEG, _SPAN_DEG = 210.0, 240.0
 """Start of the scale, counter-clockwise from three o'clock, and its extent clockwise."""
@@ -51,7 +52,7 @@ class RotationDial(QWidget):
         if word != self._word:
             self._word = word
             self.setAccessibleDescription(word)
-        self.update()
+        update_in_turn(self)
 
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw the arc, its limit, the digits and the word."""

@@ -16,6 +16,7 @@ from handcal.station.wearer_view import EyeView
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.legend import role_color
+from handcal_gui.widgets.paint_turns import update_in_turn
 
 LINES = {
     "hand": ("text", (1.0, Qt.PenStyle.SolidLine)),
@@ -75,7 +76,7 @@ class EyeCanvas(QWidget):
         """Show another part of the display, until the view changes."""
         if part_px != self._shown:
             self._shown = part_px
-            self.update()
+            update_in_turn(self)
 
     def show_view(self, view: EyeView | None, message: str = "") -> None:
         """Show a view, or a message over its dimmed image."""
@@ -86,24 +87,24 @@ class EyeCanvas(QWidget):
         self._view, self._message = view, message
         self.setAccessibleDescription(message)
         self._choose_crop()
-        self.update()
+        update_in_turn(self)
 
     def show_whole(self, is_whole: bool) -> None:
         """Show the whole display, or crop it to the hand."""
         self._is_whole = is_whole
         self._crop = self._shown = QRectF()
         self._choose_crop()
-        self.update()
+        update_in_turn(self)
 
     def show_offline(self, is_shown: bool) -> None:
         """Show or hide the outline drawn with the offline projection."""
         self._is_offline_shown = is_shown
-        self.update()
+        update_in_turn(self)
 
     def show_drawn(self, is_shown: bool) -> None:
         """Show or hide the outline that the headset draws."""
         self._is_drawn_shown = is_shown
-        self.update()
+        update_in_turn(self)
 
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw the world and the outlines, or the message."""
