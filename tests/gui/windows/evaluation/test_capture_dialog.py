@@ -136,7 +136,10 @@ def test_captures_are_taken_one_after_the_other(
     technician = make(entries)
     folder = Path(entries.captures)
     assert technician.said == "Choose the camera, and press Show."
-    technician.start()
+    assert (technician.start_button.isVisible(), technician.button.isVisible()) == (True, False)
+    technician.wait(technician.start_button.isEnabled)
+    technician.press_space()
+    technician.wait(technician.button.isVisible)
     assert technician.said == "Press Take once the image shows this."
     assert technician.told == "centre: show the grid on the display, darken the room."
     technician.press_space()

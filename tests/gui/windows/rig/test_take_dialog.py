@@ -18,6 +18,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraError
 from handcal.rig.choose import ChooseSettings
+from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.windows.rig.shots import read_color
 from handcal_gui.windows.rig.take_dialog import TakeDialog
@@ -116,6 +117,24 @@ def test_what_to_do_stands_above_and_moves_no_button(qtbot: QtBot, dialog: TakeD
     assert told() == "Images are taken automatically. Close when there are enough."
     qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
     assert places() == before
+
+
+def test_the_large_button_does_what_the_sentence_asks_for(
+    qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
+) -> None:
+    def large() -> list[str]:
+        return [one.text() for one in dialog.findChildren(MainButton) if one.isVisible()]
+
+    assert large() == ["&Show"]
+    QTest.keyClick(dialog, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: large() == ["Take"])
+    assert not list(tmp_path.rglob("*.png"))
+    QTest.keyClick(dialog, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: len(list(tmp_path.rglob("*.png"))) == 2)
+    source = dialog.findChildren(QComboBox, "source")[1]
+    source.setCurrentIndex(source.findText("RealSense, colour"))
+    assert dialog.shown_images is None, "of another camera than the one chosen"
+    assert large() == ["&Show"]
 
 
 def test_a_failing_camera_is_reported_and_can_be_shown_again(
