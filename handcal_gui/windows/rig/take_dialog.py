@@ -150,9 +150,16 @@ class TakeDialog(QDialog):
 
     def _keep_if_new(self, images: Images) -> str:
         """Save images if useful, otherwise return why not; runs in the job's thread."""
-        why_not = self._selector.consider(see_board(images, self._board))
+        seen = see_board(images, self._board)
+        why_not = self._selector.consider(seen)
         if not why_not:
             keep_images(images, tuple(self._folders.values()))
+        cameras = zip(self._folders, seen, strict=True)
+        blind = [title.lower() for title, board in cameras if board is None]
+        if blind:
+            return tr(
+                "the board is not seen by the {}: bring it into view, and see to focus and light"
+            ).format(tr(" and the ").join(blind))
         return why_not
 
     def _on_searched(self, _images: Images, why_not: str) -> None:
