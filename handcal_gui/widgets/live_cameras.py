@@ -134,11 +134,9 @@ class LiveCameras(QWidget):
         self._show_message(tr("No image"))
         self.images_changed.emit()
 
-    def show_through(self, warp: Callable[[UInt8], UInt8] | None, caption: str) -> None:
-        """Show all images warped, with a caption; `images` are not."""
+    def show_through(self, warp: Callable[[UInt8], UInt8] | None) -> None:
+        """Show all images warped; `images` are not."""
         self._warp = warp
-        for shown in self._views.values():
-            shown.show_text(message=shown.message, caption=caption)
 
     def show_only_images(self, is_only: bool) -> None:
         """Hide or show the choices of cameras."""
@@ -174,7 +172,7 @@ class LiveCameras(QWidget):
 
     def _show_message(self, message: str) -> None:
         for shown in self._views.values():
-            shown.show_text(message=message, caption=shown.caption)
+            shown.show_text(message=message)
 
     def _refresh(self) -> None:
         for title, field in self._recorded.items():

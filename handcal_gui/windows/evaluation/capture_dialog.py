@@ -86,6 +86,7 @@ class CaptureDialog(PreparationDialog):
         self.form.show_entries(entries)
         self._camera = LiveCameras((tr("Camera"),), open_source=open_source)
         self._list = CaptureList()
+        self._axes = paragraph("axes")
         self._instruction = paragraph("instruction")
         self._found = FindingLine("capture")
         self._bar = JobBar()
@@ -227,20 +228,23 @@ class CaptureDialog(PreparationDialog):
         position = "" if chosen is None else chosen.where.split("/")[0]
         if position and position != self._warp[0]:
             self._warp = position, None
-            self._camera.show_through(None, _NOT_TURNED)
+            self._show_through(None, _NOT_TURNED)
             self._turn.ask(position)
 
     def _show_turned(self, position: str, warp: RotationWarp | None) -> None:
         self._warp = position, warp
         if warp is None:
-            self._camera.show_through(
-                None, tr("{}: capture the display's grid first").format(_NOT_TURNED)
-            )
+            first = tr("{}: capture the display's grid first").format(_NOT_TURNED)
+            self._show_through(None, f"{first}.")
         else:
-            self._camera.show_through(self._warped, _TURNED)
+            self._show_through(self._warped, _TURNED)
 
     def _show_not_turned(self, why: str) -> None:
-        self._camera.show_through(None, f"{_NOT_TURNED}: {why}")
+        self._show_through(None, f"{_NOT_TURNED}; {why}.")
+
+    def _show_through(self, warp: Callable[[UInt8], UInt8] | None, axes: str) -> None:
+        self._camera.show_through(warp)
+        self._axes.setText(axes)
 
     def _warped(self, image: UInt8) -> UInt8:
         warp = self._warp[1]
@@ -302,7 +306,11 @@ class CaptureDialog(PreparationDialog):
         if self._looked_for is None:
             self._show_failure(why)
         else:
-            self._found.show_finding(Finding("", Health.LIMITED, tr("not taken: {}").format(why)))
+            advice = tr("show what is asked for, with enough light, and take it again")
+            found = tr("not taken: {}").format(why)
+            self._found.show_finding(
+                Finding("", Health.LIMITED, found, "" if ": " in why else advice)
+            )
 
     def _show_camera_failure(self, why: str) -> None:
         advice = tr("press Show to open the camera again")
@@ -342,6 +350,7 @@ class CaptureDialog(PreparationDialog):
         vbox(
             self.form,
             (middle, 1),
+            self._axes,
             self._instruction,
             self._found,
             foot,
