@@ -55,7 +55,7 @@ class ViewSelector:
         self._before = first
         found = [one for one in seen if one is not None]
         if first is None or len(found) < len(seen):
-            return "the board is not seen"
+            return "the board is not seen: bring it into view, and see to focus and light"
         rest_share = settings.rest_share
         if rest_share is not None and (before is None or _moved_share(before, first) > rest_share):
             return "the board moves: hold it still for a moment"

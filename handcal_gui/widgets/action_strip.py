@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QWidget
 
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
@@ -38,6 +38,17 @@ def action_strip(
     middle = [1] if bar is None else [(bar, 1)]
     hbox(*others, *middle, key, main, on=strip, margins=0, spacing=SPACING_PX)
     return strip
+
+
+def one_of_strips(*mains: MainButton, keys: str) -> QStackedWidget:
+    """Return main buttons with their key in one place, for one of them to be shown at a time."""
+    strips = QStackedWidget()
+    strips.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+    width_px = max(main.sizeHint().width() for main in mains)
+    for main in mains:
+        main.setMinimumWidth(width_px)
+        strips.addWidget(action_strip(main, keys=keys))
+    return strips
 
 
 class _Strip(QWidget):

@@ -1,4 +1,4 @@
-"""A form with two columns of fields for the entries of a dataclass."""
+"""A form with one or two columns of fields for the entries of a dataclass."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, TypeVar, cast
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -18,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.fields import label_for
+from handcal_gui.widgets.layouts import fit_soon
 from handcal_gui.widgets.path_field import PathField
 
 Entries = TypeVar("Entries")
@@ -34,6 +36,8 @@ class EntriesForm(QWidget):
     Attributes
     ----------
     changed : Signal()
+    narrow_px : int
+        Width below which the fields stand in one column.
     """
 
     changed = Signal()
@@ -43,19 +47,21 @@ class EntriesForm(QWidget):
     ) -> None:
         super().__init__(parent)
         self._fields = {name: field for name, (_, field) in fields.items()}
-        grid = QGridLayout(self)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(SPACING_PX)
-        grid.setVerticalSpacing(SPACING_PX // 2)
-        half = (len(fields) + 1) // 2
-        for number, (text, field) in enumerate(fields.values()):
-            row, column = number % half, 3 * (number // half)
-            grid.addWidget(label_for(field, text), row, column)
-            grid.addWidget(field, row, column + 1)
-            grid.setColumnStretch(column + 1, 1)
+        self._labels = [label_for(field, text) for text, field in fields.values()]
+        self.narrow_px = 0
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(SPACING_PX)
+        self._grid.setVerticalSpacing(SPACING_PX // 2)
+        self._fit_soon = fit_soon(self._fit, self)
+        self._fit()
+        for field in self._fields.values():
             _change_of(field).connect(self.changed)
-        if grid.columnCount() > 2:
-            grid.setColumnMinimumWidth(2, SPACING_PX)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Use as many columns as there is room for."""
+        super().resizeEvent(event)
+        self._fit_soon.start()
 
     def show_entries(self, entries: object) -> None:
         """Show the fields' values."""
@@ -71,6 +77,18 @@ class EntriesForm(QWidget):
         """Return the entered values."""
         shown = {name: _value(field) for name, field in self._fields.items()}
         return cast(Entries, replace(cast(Any, entries), **shown))
+
+    def _fit(self) -> None:
+        columns = 1 if self.width() < self.narrow_px else 2
+        rows = -(-len(self._fields) // columns)
+        columns = -(-len(self._fields) // rows)
+        for number, field in enumerate(self._fields.values()):
+            row, column = number % rows, 3 * (number // rows)
+            self._grid.addWidget(self._labels[number], row, column)
+            self._grid.addWidget(field, row, column + 1)
+        self._grid.setColumnStretch(1, 1)
+        self._grid.setColumnStretch(4, columns - 1)
+        self._grid.setColumnMinimumWidth(2, SPACING_PX * (columns - 1))
 
 
 def _change_of(field: QWidget) -> Any:

@@ -68,6 +68,7 @@ class LiveCameras(QWidget):
         self.are_stored = False
         self._realsense, self._tell, self._open_source = realsense, tell, open_source
         self._live: LiveImages | None = None
+        self._opened: dict[str, str] = {}
         self._warp: Callable[[UInt8], UInt8] | None = None
         self._sources = {title: choice("source", title, _SOURCES) for title in titles}
         self._recorded = {
@@ -83,6 +84,9 @@ class LiveCameras(QWidget):
         self._timer.timeout.connect(self._poll)
         for source in self._sources.values():
             source.currentIndexChanged.connect(self._refresh)
+            source.currentIndexChanged.connect(self._stop_another)
+        for field in self._recorded.values():
+            field.changed.connect(self._stop_another)
         self._lay_out()
         self._refresh()
         self._show_message(tr("No image yet"))
@@ -98,7 +102,7 @@ class LiveCameras(QWidget):
     def start(self) -> None:
         """Show images of the chosen cameras."""
         self.stop()
-        sources = {title: self._source(title) for title in self._sources}
+        sources = self._opened = self._chosen()
         if "" in sources.values():
             self.failed.emit(tr("choose the recording or video"))
             return
@@ -130,16 +134,22 @@ class LiveCameras(QWidget):
         self._show_message(tr("No image"))
         self.images_changed.emit()
 
-    def show_through(self, warp: Callable[[UInt8], UInt8] | None, caption: str) -> None:
-        """Show all images warped, with a caption; `images` are not."""
+    def show_through(self, warp: Callable[[UInt8], UInt8] | None) -> None:
+        """Show all images warped; `images` are not."""
         self._warp = warp
-        for shown in self._views.values():
-            shown.show_text(message=shown.message, caption=caption)
 
     def show_only_images(self, is_only: bool) -> None:
         """Hide or show the choices of cameras."""
         for field in (*self._sources.values(), *self._recorded.values(), *self._labels):
             field.setVisible(not is_only)
+
+    def _chosen(self) -> dict[str, str]:
+        return {title: self._source(title) for title in self._sources}
+
+    def _stop_another(self) -> None:
+        """Stop once another camera is chosen than the one shown."""
+        if self._live is not None and self._chosen() != self._opened:
+            self.stop()
 
     def _source(self, title: str) -> str:
         """Return a camera's source for `open_view_source`; empty if no recording is chosen."""
@@ -162,7 +172,7 @@ class LiveCameras(QWidget):
 
     def _show_message(self, message: str) -> None:
         for shown in self._views.values():
-            shown.show_text(message=message, caption=shown.caption)
+            shown.show_text(message=message)
 
     def _refresh(self) -> None:
         for title, field in self._recorded.items():

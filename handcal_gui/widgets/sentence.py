@@ -4,8 +4,9 @@ from __future__ import annotations
 
 
 def sentence(text: str) -> str:
-    """Return a text with its first letter capitalized."""
-    return text[:1].upper() + text[1:]
+    """Return a text with its first letter capitalized, unless it begins with a file's name."""
+    first = text.partition(" ")[0].rstrip(".:;,")
+    return text if {".", "/", "\\"} & set(first) else text[:1].upper() + text[1:]
 
 
 def with_advice(text: str, advice: str) -> str:

@@ -202,7 +202,10 @@ def position_warp(settings: CubeTestSettings, folder: Path, position: str) -> Ro
     HandcalError
         If the camera's intrinsics or the image of the grid cannot be used.
     """
-    camera = read_intrinsics(_file(settings.camera, folder / "camera.json"))
+    file = _file(settings.camera, folder / "camera.json")
+    if not file.exists():
+        raise FileError(f"there is no {file}: choose the file of the camera's intrinsics")
+    camera = read_intrinsics(file)
     grid = cube_and_grid(settings, folder)[1]
     return display_warp(folder / position, camera, grid)
 

@@ -29,7 +29,7 @@ from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.action_strip import action_strip
+from handcal_gui.widgets.action_strip import one_of_strips
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, main_button, paragraph, whole_number, with_name
 from handcal_gui.widgets.finding_line import FindingLine
@@ -86,12 +86,13 @@ class CaptureDialog(PreparationDialog):
         self.form.show_entries(entries)
         self._camera = LiveCameras((tr("Camera"),), open_source=open_source)
         self._list = CaptureList()
+        self._axes = paragraph("axes")
         self._instruction = paragraph("instruction")
         self._found = FindingLine("capture")
         self._bar = JobBar()
-        self._start = button("startCamera", tr("&Show"))
+        self._start = main_button("startCamera", tr("&Show"))
         self._take = main_button("takeCapture", tr("Take again"))
-        self._take.setMinimumWidth(self._take.sizeHint().width())
+        self._mains = one_of_strips(self._start, self._take, keys="Space")
         self._by_itself = with_name(
             QCheckBox(_BY_ITSELF),
             "byItself",
@@ -136,6 +137,7 @@ class CaptureDialog(PreparationDialog):
         self._bar.busy_changed.connect(self._refresh)
         self._bar.failed.connect(self._show_not_done)
         self._lay_out()
+        self._list.setFocus()  # unlike a text field, it does not consume the space bar
         self._ask()
         self._found.show_finding(
             Finding("", Health.LIMITED, tr("choose the camera, and press Show"))
@@ -148,7 +150,7 @@ class CaptureDialog(PreparationDialog):
             Finding("", Health.LIMITED, tr("press Take once the image shows this"))
         )
         self._camera.start()
-        self._list.setFocus()  # unlike a text field, it does not consume the space bar
+        self._list.setFocus()
 
     def take(self) -> None:
         """Keep the present image as the selected capture, if it has the expected content."""
@@ -226,20 +228,23 @@ class CaptureDialog(PreparationDialog):
         position = "" if chosen is None else chosen.where.split("/")[0]
         if position and position != self._warp[0]:
             self._warp = position, None
-            self._camera.show_through(None, _NOT_TURNED)
+            self._show_through(None, _NOT_TURNED)
             self._turn.ask(position)
 
     def _show_turned(self, position: str, warp: RotationWarp | None) -> None:
         self._warp = position, warp
         if warp is None:
-            self._camera.show_through(
-                None, tr("{}: capture the display's grid first").format(_NOT_TURNED)
-            )
+            first = tr("{}: capture the display's grid first").format(_NOT_TURNED)
+            self._show_through(None, f"{first}.")
         else:
-            self._camera.show_through(self._warped, _TURNED)
+            self._show_through(self._warped, _TURNED)
 
     def _show_not_turned(self, why: str) -> None:
-        self._camera.show_through(None, f"{_NOT_TURNED}: {why}")
+        self._show_through(None, f"{_NOT_TURNED}; {why}.")
+
+    def _show_through(self, warp: Callable[[UInt8], UInt8] | None, axes: str) -> None:
+        self._camera.show_through(warp)
+        self._axes.setText(axes)
 
     def _warped(self, image: UInt8) -> UInt8:
         warp = self._warp[1]
@@ -301,7 +306,11 @@ class CaptureDialog(PreparationDialog):
         if self._looked_for is None:
             self._show_failure(why)
         else:
-            self._found.show_finding(Finding("", Health.LIMITED, tr("not taken: {}").format(why)))
+            advice = tr("show what is asked for, with enough light, and take it again")
+            found = tr("not taken: {}").format(why)
+            self._found.show_finding(
+                Finding("", Health.LIMITED, found, "" if ": " in why else advice)
+            )
 
     def _show_camera_failure(self, why: str) -> None:
         advice = tr("press Show to open the camera again")
@@ -315,6 +324,7 @@ class CaptureDialog(PreparationDialog):
         is_seen = self._camera.images is not None and self._list.chosen is not None
         self._start.setEnabled(self._looked_for is not None)
         self._take.setEnabled(is_ready and is_seen)
+        self._mains.setCurrentIndex(int(self._camera.images is not None))
         are_stored = self._camera.are_stored  # and would be paired as they come, not as asked for
         self._by_itself.setText(_NOT_BY_ITSELF if are_stored else _BY_ITSELF)
         self._by_itself.setEnabled(not are_stored)
@@ -335,11 +345,12 @@ class CaptureDialog(PreparationDialog):
         scale_font(self._instruction, 1.6, is_bold=True)
         self._instruction.setMinimumHeight(self._instruction.fontMetrics().height())
         middle = hbox((self._camera, 1), self._list, spacing=2 * SPACING_PX)
-        others = self._close, self._start, self._by_itself, self._large
-        foot = action_strip(self._take, *others, bar=self._bar, keys="Space")
+        others = self._close, self._by_itself, self._large
+        foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
         vbox(
             self.form,
             (middle, 1),
+            self._axes,
             self._instruction,
             self._found,
             foot,

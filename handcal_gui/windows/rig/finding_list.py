@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRect, QSize, Qt
 from PySide6.QtGui import QIcon, QPixmap
-from PySide6.QtWidgets import QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
+from PySide6.QtWidgets import (
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 
 from handcal.rig.report import RigFinding
 from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.translation import tr
+
+_FOUND, _EXPECTED = 1, 2
 
 
 class FindingList(QTreeWidget):
@@ -28,12 +37,16 @@ class FindingList(QTreeWidget):
         self.setAccessibleName(name)
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
+        self.setWordWrap(True)
         self.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self.setHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
         flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.header().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        for column in (_FOUND, _EXPECTED):
+            self.header().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
+            self.setItemDelegateForColumn(column, _Wrapped(self))
         self.header().setStretchLastSection(False)
+        self.header().sectionResized.connect(self.scheduleDelayedItemsLayout)
         self._findings: tuple[RigFinding, ...] = ()
         follow_theme(self, self._refresh)
 
@@ -60,3 +73,18 @@ class FindingList(QTreeWidget):
                 item.setToolTip(column, item.text(column))
             item.setData(0, Qt.ItemDataRole.AccessibleDescriptionRole, word)
             self.addTopLevelItem(item)
+        self.setColumnHidden(_EXPECTED, all(one.is_fine for one in self._findings))
+
+
+class _Wrapped(QStyledItemDelegate):
+    """Makes a row as high as its texts are when wrapped; Qt's trees do so for one line only."""
+
+    def __init__(self, shown: FindingList) -> None:
+        super().__init__(shown)
+        self._list = shown
+
+    def sizeHint(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> QSize:
+        option.rect = QRect(0, 0, self._list.columnWidth(index.column()), 1)
+        return super().sizeHint(option, index)

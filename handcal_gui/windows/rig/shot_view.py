@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.rig.board import BoardView
 from handcal.rig.views import BoardImage
@@ -15,7 +15,9 @@ from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr
+from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.layouts import vbox
 from handcal_gui.windows.rig.shots import Shot, read_color
 
 _ARM = 0.006  # of a corner's cross, relative to the image's width
@@ -35,24 +37,23 @@ class ShotView(QWidget):
         self._titles = titles
         self._shot: Shot | None = None
         self._images = tuple(ImageView(title) for title in titles)
+        # Above the images, as over the maps: on small ones, they would hide what they are about.
+        self._captions = tuple(paragraph("shotCaption") for _ in titles)
         self._read = LatestJob(_read, self)
         self._read.answered.connect(self._show_images)
-        self._read.failed.connect(self._show_failure)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(SPACING_PX)
-        for image in self._images:
-            layout.addWidget(image)
+        self._read.failed.connect(self._show_message)
+        parts = zip(self._captions, self._images, strict=True)
+        pairs = [
+            (vbox(caption, (image, 1), spacing=SPACING_PX // 2), 1) for caption, image in parts
+        ]
+        vbox(*pairs, on=self, margins=0, spacing=SPACING_PX)
         self.show_shot(None)
 
     def show_shot(self, shot: Shot | None) -> None:
         """Load and show a shot; None clears the view."""
         self._shot = shot
         if shot is None:
-            for image in self._images:
-                image.show_image(None)
-                image.show_overlay(None)
-                image.show_text(message=tr("The selected image will appear here"))
+            self._show_message(tr("The selected image will appear here"))
         else:
             self._read.ask(shot.files)
 
@@ -63,18 +64,21 @@ class ShotView(QWidget):
     def _show_images(self, files: tuple[Path, ...], images: tuple[UInt8, ...]) -> None:
         if self._shot is None or files != self._shot.files:
             return
-        parts = zip(self._images, self._titles, self._shot.views, images, strict=True)
-        for shown, title, view, image in parts:
+        texts = zip(self._captions, self._titles, strict=True)
+        parts = zip(self._images, texts, self._shot.views, images, strict=True)
+        for shown, (caption, title), view, image in parts:
             shown.show_image(image)
             found = view.found
             shown.show_overlay(None if found is None else partial(_draw_corners, found))
-            shown.show_text(caption=f"{title}: {_caption(view)}")
+            shown.show_text()
+            caption.setText(f"{title}: {_caption(view)}")
 
-    def _show_failure(self, why: str) -> None:
-        for shown in self._images:
+    def _show_message(self, message: str) -> None:
+        for caption, shown in zip(self._captions, self._images, strict=True):
+            caption.clear()
             shown.show_image(None)
             shown.show_overlay(None)
-            shown.show_text(message=why)
+            shown.show_text(message=message)
 
 
 def _read(files: tuple[Path, ...]) -> tuple[UInt8, ...]:

@@ -14,8 +14,7 @@ from handcal.rig_types import Origin
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import main_button, with_name
+from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import vbox
@@ -36,8 +35,9 @@ class SolveBox(QWidget):
     button : MainButton
         The Solve button, placed and connected by the page.
     bar : JobBar
+    numbers : QWidget
+        The table and the lens models compared, placed by the page.
     table : NumberTable
-        The numbers, placed by the page.
     shown : Signal()
         Another result is shown, or none.
     """
@@ -52,12 +52,13 @@ class SolveBox(QWidget):
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
-        self._lenses = with_name(ElidedLabel(), "lenses")  # whole, it would hide the images
+        self._lenses = paragraph("lenses")
         self.table = NumberTable("numbers", tr("Numbers"))
+        self.numbers = QWidget()
+        vbox((self.table, 1), self._lenses, on=self.numbers, spacing=SPACING_PX)
         self._shown = Finding("", Health.LIMITED, tr("Not solved yet"))
         self._need = ""
-        parts = self._verdict, self._worst, self._lenses
-        vbox(*parts, on=self, margins=0, spacing=SPACING_PX // 2)
+        vbox(self._verdict, self._worst, on=self, margins=0, spacing=SPACING_PX // 2)
         self.show_origin(None)
 
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:

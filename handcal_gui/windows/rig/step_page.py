@@ -23,6 +23,8 @@ from handcal_gui.windows.rig.take_dialog import TakeDialog
 
 _FIRST_PANEL = 2
 """Place of the first panel of images among the tabs."""
+_NARROW_PX = 112 * SPACING_PX
+"""Width below which two columns of inputs are too narrow for paths."""
 
 
 class StepPage(QWidget):
@@ -139,12 +141,13 @@ class StepPage(QWidget):
         setup, inputs = QWidget(), QWidget()
         setups = [(panel.setup, 1) for panel in self.panels]
         hbox(*setups, on=setup, margins=SPACING_PX, spacing=3 * SPACING_PX)
+        self.form.narrow_px = _NARROW_PX
         vbox(self.form, 1, on=inputs, margins=SPACING_PX)
         self._tabs.addTab(setup, tr("Set-&up"))
         self._tabs.addTab(inputs, tr("&Inputs"))
         for title, panel in zip(self._titles, self.panels, strict=True):
             self._tabs.addTab(panel, title)
-        self._tabs.addTab(self.box.table, tr("Numbe&rs"))
+        self._tabs.addTab(self.box.numbers, tr("Numbe&rs"))
         searches = (panel.search for panel in self.panels)
         tabs = scrollable(self._tabs)
         vbox((tabs, 1), *searches, self.box, on=self, margins=0, spacing=SPACING_PX // 2)

@@ -19,11 +19,11 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.action_strip import action_strip
+from handcal_gui.widgets.action_strip import one_of_strips
 from handcal_gui.widgets.fields import button, main_button, one_of, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
 
@@ -79,8 +79,9 @@ class TakeDialog(QDialog):
         )
         self._found = FindingLine("taken")
         self._bar = JobBar()
-        self._start = button("startCameras", tr("&Show"))
+        self._start = main_button("startCameras", tr("&Show"))
         self._take = main_button("takeImage", tr("Take"))
+        self._mains = one_of_strips(self._start, self._take, keys="Space")
         self._by_itself = with_name(
             QCheckBox(tr("&Automatically")),
             "byItself",
@@ -149,9 +150,16 @@ class TakeDialog(QDialog):
 
     def _keep_if_new(self, images: Images) -> str:
         """Save images if useful, otherwise return why not; runs in the job's thread."""
-        why_not = self._selector.consider(see_board(images, self._board))
+        seen = see_board(images, self._board)
+        why_not = self._selector.consider(seen)
         if not why_not:
             keep_images(images, tuple(self._folders.values()))
+        cameras = zip(self._folders, seen, strict=True)
+        blind = [title.lower() for title, board in cameras if board is None]
+        if blind:
+            return tr(
+                "the board is not seen by the {}: bring it into view, and see to focus and light"
+            ).format(tr(" and the ").join(blind))
         return why_not
 
     def _on_searched(self, _images: Images, why_not: str) -> None:
@@ -194,10 +202,11 @@ class TakeDialog(QDialog):
         is_shown = self.shown_images is not None
         self._task.setCurrentIndex(1 + self._by_itself.isChecked() if is_shown else 0)
         self._take.setEnabled(is_shown and not self._bar.is_busy)
+        self._mains.setCurrentIndex(int(is_shown))
 
     def _lay_out(self) -> None:
-        others = self._close, self._start, self._by_itself
-        foot = action_strip(self._take, *others, bar=self._bar, keys="Space")
+        others = self._close, self._by_itself
+        foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
         vbox(
             self._task,
             (self._cameras, 1),

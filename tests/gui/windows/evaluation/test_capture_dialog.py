@@ -69,6 +69,7 @@ class Technician:
         )
         self.start_button = self._child(QPushButton, "startCamera")
         self.button = self._child(QPushButton, "takeCapture")
+        self.axes = self._child(QLabel, "axes")
 
     @property
     def said(self) -> str:
@@ -136,7 +137,10 @@ def test_captures_are_taken_one_after_the_other(
     technician = make(entries)
     folder = Path(entries.captures)
     assert technician.said == "Choose the camera, and press Show."
-    technician.start()
+    assert (technician.start_button.isVisible(), technician.button.isVisible()) == (True, False)
+    technician.wait(technician.start_button.isEnabled)
+    technician.press_space()
+    technician.wait(technician.button.isVisible)
     assert technician.said == "Press Take once the image shows this."
     assert technician.told == "centre: show the grid on the display, darken the room."
     technician.press_space()
@@ -192,7 +196,8 @@ def test_an_image_in_which_nothing_is_seen_is_not_kept(
     technician.start()
     technician.put(np.zeros((360, 640, 3), np.uint8))
     technician.button.click()
-    technician.wait(lambda: technician.said == "Not taken: the image is too dark.")
+    told = "Not taken: the image is too dark. Show what is asked for, with enough light, "
+    technician.wait(lambda: technician.said == f"{told}and take it again.")
     technician.wait(technician.button.isEnabled)
     assert technician.told == "centre/pose-1: switch the display off."
     assert not any(Path(entries.captures).rglob("*.png"))
@@ -243,18 +248,28 @@ def test_captures_at_rest_are_taken_by_themselves_and_the_view_is_turned(
     technician = make(entries)
     technician.camera.image = cv2.resize(grid_seen(), (634, 360), interpolation=cv2.INTER_AREA)
     technician.start()
-    view = technician.live.findChild(ImageView)
+    axes, view = technician.axes, technician.live.findChild(ImageView)
     assert isinstance(view, ImageView)
-    technician.wait(lambda: view.caption.endswith("capture the display's grid first"))
+    technician.wait(lambda: axes.text().endswith("capture the display's grid first."))
     by_itself = technician.dialog.findChild(QCheckBox, "byItself")
     assert isinstance(by_itself, QCheckBox)
     by_itself.setChecked(True)
     technician.wait_for_instruction("centre/pose-1: switch the display off.")
-    technician.wait(lambda: view.caption == "Turned to the display's axes")
+    technician.wait(lambda: axes.text() == "Turned to the display's axes")
+    assert not view.caption, "it would hide part of what is aligned"
     technician.wait(lambda: technician.said.startswith("Waiting: "))
     technician.camera.image = cube_seen()  # of another size than the intrinsics
     technician.wait_for_instruction("centre/pose-1: show the virtual cube, cover the real one.")
-    assert "640×360" in view.caption
+    assert "640×360" in axes.text()
+
+
+def test_missing_intrinsics_are_named_with_what_to_do(
+    make: Callable[[CubeEntries], Technician], entries: CubeEntries
+) -> None:
+    technician = make(entries)
+    file = Path(entries.captures, "camera.json")
+    told = f"there is no {file}: choose the file of the camera's intrinsics."
+    technician.wait(lambda: technician.axes.text() == f"Along the camera's axes; {told}")
 
 
 def test_stored_images_which_do_not_wait_are_not_taken_by_themselves(

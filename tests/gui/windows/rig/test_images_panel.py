@@ -62,6 +62,10 @@ def item(panel: ImagesPanel, row: int) -> QTreeWidgetItem:
     return found
 
 
+def captions(panel: ImagesPanel) -> list[QLabel]:
+    return panel.findChildren(QLabel, "shotCaption")
+
+
 def text(panel: QWidget, name: str) -> str:
     label = panel.findChild(QLabel, name)
     assert isinstance(label, QLabel)
@@ -77,8 +81,19 @@ def test_what_was_found_is_listed(qtbot: QtBot, full: ImagesPanel) -> None:
     assert problem == f"{full.shots[8].problem[0].upper()}{full.shots[8].problem[1:]}"
     images = full.findChildren(ImageView)
     qtbot.waitUntil(lambda: all(image.has_image for image in images))
-    assert images[0].caption.startswith("Depth camera: ")
-    assert "corners" in images[1].caption
+    first, second = captions(full)
+    assert first.text().startswith("Depth camera: ")
+    assert "corners" in second.text()
+
+
+def test_captions_are_whole_and_not_over_small_images(qtbot: QtBot, full: ImagesPanel) -> None:
+    full.resize(735, 290)  # as in a window of 960x540
+    qtbot.waitUntil(lambda: all(one.text() for one in captions(full)))
+    QApplication.processEvents()
+    for caption, image in zip(captions(full), full.findChildren(ImageView), strict=True):
+        assert not image.caption
+        assert caption.height() >= caption.heightForWidth(caption.width())
+        assert not caption.geometry().intersects(image.geometry())
 
 
 def test_a_dropped_pair_no_longer_counts(qtbot: QtBot, full: ImagesPanel) -> None:

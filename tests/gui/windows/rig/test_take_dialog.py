@@ -18,6 +18,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraError
 from handcal.rig.choose import ChooseSettings
+from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.windows.rig.shots import read_color
 from handcal_gui.windows.rig.take_dialog import TakeDialog
@@ -82,11 +83,11 @@ def test_both_cameras_images_are_taken(
     start(qtbot, dialog)
     QTest.keyClick(dialog, Qt.Key.Key_Space)
     qtbot.waitUntil(lambda: "corners" in said(dialog))
-    assert said(dialog).startswith("Depth-001.png: ")
+    assert said(dialog).startswith("depth-001.png: ")
     cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
     qtbot.waitUntil(lambda: dialog.shown_images is not None and dialog.shown_images[1].max() == 90)
     button(dialog, "takeImage").click()
-    qtbot.waitUntil(lambda: "headset-002.png" in said(dialog).lower())
+    qtbot.waitUntil(lambda: said(dialog).startswith("headset-002.png: "))
     assert "Take another" in said(dialog)
     depth = read_color(tmp_path / "depth" / "depth-002.png")
     np.testing.assert_array_equal(depth, cameras["0"].image)
@@ -116,6 +117,24 @@ def test_what_to_do_stands_above_and_moves_no_button(qtbot: QtBot, dialog: TakeD
     assert told() == "Images are taken automatically. Close when there are enough."
     qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
     assert places() == before
+
+
+def test_the_large_button_does_what_the_sentence_asks_for(
+    qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
+) -> None:
+    def large() -> list[str]:
+        return [one.text() for one in dialog.findChildren(MainButton) if one.isVisible()]
+
+    assert large() == ["&Show"]
+    QTest.keyClick(dialog, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: large() == ["Take"])
+    assert not list(tmp_path.rglob("*.png"))
+    QTest.keyClick(dialog, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: len(list(tmp_path.rglob("*.png"))) == 2)
+    source = dialog.findChildren(QComboBox, "source")[1]
+    source.setCurrentIndex(source.findText("RealSense, colour"))
+    assert dialog.shown_images is None, "of another camera than the one chosen"
+    assert large() == ["&Show"]
 
 
 def test_a_failing_camera_is_reported_and_can_be_shown_again(
@@ -151,5 +170,6 @@ def test_what_is_not_taken_by_itself_is_explained(
     by_itself = dialog.findChild(QCheckBox, "byItself")
     assert isinstance(by_itself, QCheckBox)
     by_itself.click()
-    qtbot.waitUntil(lambda: said(dialog) == "0 taken; the board is not seen.")
+    told = "0 taken; the board is not seen by the headset camera: bring it into view, "
+    qtbot.waitUntil(lambda: said(dialog) == f"{told}and see to focus and light.")
     assert not (tmp_path / "depth").exists()
