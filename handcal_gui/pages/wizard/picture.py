@@ -78,6 +78,11 @@ class GuidePicture(QWidget):
         """True if the picture is of the eyes' views."""
         return self.step not in _OF_THE_HAND
 
+    @property
+    def is_result_beside(self) -> bool:
+        """True if the result is beside the eyes, not below them."""
+        return self._layout.direction() is QBoxLayout.Direction.LeftToRight
+
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the picture of a snapshot that fits the step."""
         verifying = snapshot.procedure.verifying
@@ -157,8 +162,7 @@ class GuidePicture(QWidget):
             self.result.show_snapshot(snapshot)
         if is_new:
             self._arrange()
-        is_below = self._layout.direction() is QBoxLayout.Direction.TopToBottom
-        has_eyes = not (is_result and is_below and self._has_only_result)
+        has_eyes = not (is_result and not self.is_result_beside and self._has_only_result)
         self._both.setVisible(has_eyes)
         self.result.offer_blinking(has_eyes)
         self._fit_eyes()
@@ -166,8 +170,8 @@ class GuidePicture(QWidget):
 
     def _fit_eyes(self) -> None:
         """Make the eyes no higher than their picture, so that the result stands right below."""
-        is_below = self._layout.direction() is QBoxLayout.Direction.TopToBottom
-        is_fitted = is_below and not self.result.isHidden() and self._aspect > 0.0
+        is_below = not self.is_result_beside and not self.result.isHidden()
+        is_fitted = is_below and self._aspect > 0.0
         shown = sum(not column.isHidden() for column in self._columns.values())
         width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
         title_px = self._titles["left"].sizeHint().height()
