@@ -13,7 +13,7 @@ from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas, show_alike
-from handcal_gui.panels.wearer_view.panel import origin_text
+from handcal_gui.panels.wearer_view.panel import origin_text, outline_legend
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.image_view import ImageView
@@ -55,6 +55,7 @@ class GuidePicture(QWidget):
         for eye, column in self._columns.items():
             self._eyes[eye].setMinimumSize(*_LEAST_PX)
             vbox(self._titles[eye], (self._eyes[eye], 1), on=column, margins=0, spacing=0)
+        self._legend = outline_legend()
         self.result = ResultBar()
         self.result.hide()
         self._aspect = 0.0  # height over width of the views, the largest beside one result
@@ -65,13 +66,16 @@ class GuidePicture(QWidget):
         views = QWidget()
         self._both = QWidget()
         columns = ((one, 1) for one in self._columns.values())
-        hbox(*columns, on=self._both, margins=0, spacing=SPACING_PX)
+        eyes = hbox(*columns, margins=0, spacing=SPACING_PX)
+        # From the left, so that no entry moves when another is added.
+        legend = hbox(*self._legend.values(), 1, margins=0, spacing=2 * SPACING_PX)
+        vbox((eyes, 1), legend, on=self._both, margins=0, spacing=0)
         self._layout = vbox((self._both, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
         self._views = views
         self._stack = QStackedLayout(self)
         for page in (self._camera, self._views):
             self._stack.addWidget(page)
-        self._show_before(False)
+        self._set_blinking(False)
 
     @property
     def wants_views(self) -> bool:
@@ -152,6 +156,7 @@ class GuidePicture(QWidget):
             when = (tr(", before the calibration") if self._is_before else tr(", now")) * is_result
             origin = origin_text(view, is_solved=is_solved)
             self._titles[eye].setText(f"{EYE_NAMES[eye]}{origin}{when}")
+        self._legend["cursor"].setVisible(snapshot.procedure.cursor is not None)
         part_px = show_alike([self._eyes[eye] for eye in eyes])
         is_new = is_result and self.result.isHidden()
         self.result.setVisible(is_result)
@@ -175,7 +180,8 @@ class GuidePicture(QWidget):
         shown = sum(not column.isHidden() for column in self._columns.values())
         width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
         title_px = self._titles["left"].sizeHint().height()
-        fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1])
+        legend_px = self._legend["hand"].sizeHint().height()
+        fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1]) + legend_px
         self._both.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
 
     def _set_blinking(self, is_blinking: bool) -> None:
@@ -183,6 +189,7 @@ class GuidePicture(QWidget):
             self._blink.start()
         else:
             self._blink.stop()
+        self._legend["offline"].setVisible(is_blinking)
         self._show_before(is_blinking)
 
     def _show_before(self, is_before: bool) -> None:
