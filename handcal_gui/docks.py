@@ -178,7 +178,7 @@ def arrange_docks(window: QMainWindow, docks: Docks, *, is_small: bool) -> None:
 
 
 def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
-    """Divide the window among the docks of a page whose layout the user has not changed.
+    """Divide the window among the docks of a page as in its default layout.
 
     `page_px` is the width of a page that needs little space; None leaves it a share of the window.
     """
@@ -188,7 +188,7 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
         min(max(width * percent // 100, _NARROWEST_PX), _WIDEST_PX) for percent in (26, 30)
     )
     if page_px is not None:
-        has_right = window.dockWidgetArea(docks["results"]) is _RIGHT
+        has_right = has_columns(window, docks)
         rest_px = max(width - page_px, 2)
         left = rest_px * 45 // 100 if has_right else rest_px
         right = rest_px - left if has_right else rest_px  # or all docks are tabs of one column
@@ -197,6 +197,11 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
     window.resizeDocks(column, [height * percent // 100 for percent in (38, 33, 29)], down)
     results = height * 53 // 100  # with its tabs
     window.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
+
+
+def has_columns(window: QMainWindow, docks: Docks) -> bool:
+    """Return whether docks are on both sides of the page; in a small window all are tabs."""
+    return window.dockWidgetArea(docks["results"]) is _RIGHT
 
 
 def draw_title_buttons(docks: Docks) -> None:

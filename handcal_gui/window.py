@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Literal
 
-from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, Signal
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
@@ -16,6 +16,7 @@ from PySide6.QtGui import (
     QKeySequence,
     QPainter,
     QPaintEvent,
+    QResizeEvent,
 )
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -35,6 +36,7 @@ from handcal_gui.docks import (
     Panels,
     arrange_docks,
     draw_title_buttons,
+    has_columns,
     hide_tabs,
     leave_titles_to_tabs,
     make_docks,
@@ -45,7 +47,7 @@ from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
-from handcal_gui.widgets.layouts import scrollable, vbox
+from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
 from handcal_gui.widgets.placement import keep_on_screen
 
 Page = Literal["start", "live", "review"]
@@ -53,6 +55,8 @@ Arrangement = Literal["panels", "station"]
 _LAYOUT_VERSION = 2
 _SMALL = 100.0, 57.5
 """Width and height below which all docks of a window are tabs, in sizes of the font."""
+_GUIDE = 40.0
+"""Width, in sizes of the font, that the guide needs at every step."""
 _REVIEW_PERCENT = 36
 """Of a large window's width, for the page of a stored session with its residual map."""
 _MENUS = {
@@ -106,23 +110,20 @@ class MainWindow(QMainWindow):
         for page in self._pages.values():
             self._stack.addWidget(scrollable(page))
         middle = QWidget()
-        self._middle = vbox(
-            self.banner,
-            (self._stack, 1),
-            on=middle,
-            margins=(SPACING_PX // 2, SPACING_PX // 2, SPACING_PX // 2, 0),
-        )
+        margins = (*3 * (SPACING_PX // 2,), 0)
+        self._middle = vbox(self.banner, (self._stack, 1), on=middle, margins=margins)
         self.setCentralWidget(middle)
         self._bar = wizard.bar
         self.setStatusBar(_Strip(self._bar))
         self._docks = make_docks(self, panels)
         PanelLetters(self._docks, self)
-        self._titles_timer = QTimer(self, interval=0, singleShot=True)
-        self._titles_timer.timeout.connect(self._leave_titles_to_tabs)
+        self._leave_titles_to_tabs = partial(leave_titles_to_tabs, self, self._docks)
+        self._titles_timer = fit_soon(self._leave_titles_to_tabs, self)
         for dock in self._docks.values():
             dock.installEventFilter(self)
             dock.visibilityChanged.connect(self._titles_timer.start)
             dock.dockLocationChanged.connect(self._titles_timer.start)
+        self._widen_soon = fit_soon(self._widen_guide, self)
         self._layouts: dict[Page, QByteArray] = {}
         self._page: Page = "start"
         self._arrangement: Arrangement = "panels"
@@ -187,6 +188,7 @@ class MainWindow(QMainWindow):
             review_px = max(least_px, self.width() * _REVIEW_PERCENT // 100)
             share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
+        self._widen_guide()
         self._leave_titles_to_tabs()
         self._find_least_size()
         if self.size() != size_px:  # Qt enlarges a window for its docks
@@ -291,6 +293,11 @@ class MainWindow(QMainWindow):
                 return event.isAccepted()
         return super().eventFilter(watched, event)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave the guide its usual width in a window that is made narrower."""
+        super().resizeEvent(event)
+        self._widen_soon.start()
+
     def closeEvent(self, event: QCloseEvent) -> None:
         """Emit `closing` before the window closes, if it may."""
         if not self.may_close():
@@ -310,12 +317,23 @@ class MainWindow(QMainWindow):
         default = self._default_layouts[is_small]
         hide_tabs(self)
         self.restoreState(self._layouts.get(page, default), _LAYOUT_VERSION)
-        if self.minimumSizeHint().boundedTo(room_px) != self.minimumSizeHint():
+        is_unfit = self.minimumSizeHint().boundedTo(room_px) != self.minimumSizeHint()
+        if is_small and has_columns(self, self._docks):
+            is_unfit |= self._is_guide_narrow()
+        if is_unfit:
             if self._docks_of_page:  # or it is kept, for the arrangement with panels
                 self._layouts.pop(page, None)
             self.restoreState(default, _LAYOUT_VERSION)
             self._find_least_size()
             self.resize(size_px)  # Qt has enlarged it
+
+    def _is_guide_narrow(self) -> bool:
+        return self._page == "live" and self._stack.width() < _GUIDE * font_px()
+
+    def _widen_guide(self) -> None:
+        """Give the guide its usual room where a layout, of a larger window, leaves it less."""
+        if self._docks_of_page and self._is_guide_narrow():
+            share_room(self, self._docks, None)
 
     def _find_least_size(self) -> None:
         """Compute the least size for the docks shown, at once."""
@@ -325,9 +343,6 @@ class MainWindow(QMainWindow):
     def _is_small(self) -> bool:
         width, height = _SMALL
         return self.width() < width * font_px() or self.height() < height * font_px()
-
-    def _leave_titles_to_tabs(self) -> None:
-        leave_titles_to_tabs(self, self._docks)
 
     def _make_menus(self) -> None:
         self.menus = {name: self.menuBar().addMenu(title) for name, title in _MENUS.items()}

@@ -13,7 +13,7 @@ from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas, show_alike
-from handcal_gui.panels.wearer_view.panel import origin_text
+from handcal_gui.panels.wearer_view.panel import origin_text, outline_legend
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.image_view import ImageView
@@ -55,6 +55,7 @@ class GuidePicture(QWidget):
         for eye, column in self._columns.items():
             self._eyes[eye].setMinimumSize(*_LEAST_PX)
             vbox(self._titles[eye], (self._eyes[eye], 1), on=column, margins=0, spacing=0)
+        self._legend = outline_legend()
         self.result = ResultBar()
         self.result.hide()
         self._aspect = 0.0  # height over width of the views, the largest beside one result
@@ -65,18 +66,26 @@ class GuidePicture(QWidget):
         views = QWidget()
         self._both = QWidget()
         columns = ((one, 1) for one in self._columns.values())
-        hbox(*columns, on=self._both, margins=0, spacing=SPACING_PX)
+        eyes = hbox(*columns, margins=0, spacing=SPACING_PX)
+        # From the left, so that no entry moves when another is added.
+        legend = hbox(*self._legend.values(), 1, margins=0, spacing=2 * SPACING_PX)
+        vbox((eyes, 1), legend, on=self._both, margins=0, spacing=0)
         self._layout = vbox((self._both, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
         self._views = views
         self._stack = QStackedLayout(self)
         for page in (self._camera, self._views):
             self._stack.addWidget(page)
-        self._show_before(False)
+        self._set_blinking(False)
 
     @property
     def wants_views(self) -> bool:
         """True if the picture is of the eyes' views."""
         return self.step not in _OF_THE_HAND
+
+    @property
+    def is_result_beside(self) -> bool:
+        """True if the result is beside the eyes, not below them."""
+        return self._layout.direction() is QBoxLayout.Direction.LeftToRight
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the picture of a snapshot that fits the step."""
@@ -147,6 +156,7 @@ class GuidePicture(QWidget):
             when = (tr(", before the calibration") if self._is_before else tr(", now")) * is_result
             origin = origin_text(view, is_solved=is_solved)
             self._titles[eye].setText(f"{EYE_NAMES[eye]}{origin}{when}")
+        self._legend["cursor"].setVisible(snapshot.procedure.cursor is not None)
         part_px = show_alike([self._eyes[eye] for eye in eyes])
         is_new = is_result and self.result.isHidden()
         self.result.setVisible(is_result)
@@ -157,8 +167,7 @@ class GuidePicture(QWidget):
             self.result.show_snapshot(snapshot)
         if is_new:
             self._arrange()
-        is_below = self._layout.direction() is QBoxLayout.Direction.TopToBottom
-        has_eyes = not (is_result and is_below and self._has_only_result)
+        has_eyes = not (is_result and not self.is_result_beside and self._has_only_result)
         self._both.setVisible(has_eyes)
         self.result.offer_blinking(has_eyes)
         self._fit_eyes()
@@ -166,12 +175,13 @@ class GuidePicture(QWidget):
 
     def _fit_eyes(self) -> None:
         """Make the eyes no higher than their picture, so that the result stands right below."""
-        is_below = self._layout.direction() is QBoxLayout.Direction.TopToBottom
-        is_fitted = is_below and not self.result.isHidden() and self._aspect > 0.0
+        is_below = not self.is_result_beside and not self.result.isHidden()
+        is_fitted = is_below and self._aspect > 0.0
         shown = sum(not column.isHidden() for column in self._columns.values())
         width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
         title_px = self._titles["left"].sizeHint().height()
-        fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1])
+        legend_px = self._legend["hand"].sizeHint().height()
+        fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1]) + legend_px
         self._both.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
 
     def _set_blinking(self, is_blinking: bool) -> None:
@@ -179,6 +189,7 @@ class GuidePicture(QWidget):
             self._blink.start()
         else:
             self._blink.stop()
+        self._legend["offline"].setVisible(is_blinking)
         self._show_before(is_blinking)
 
     def _show_before(self, is_before: bool) -> None:

@@ -33,12 +33,12 @@ _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
 _LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
 """Width and height from which the guide has larger texts, and their scale."""
-_LOW_WINDOW = 43.5
+_LOW_WINDOW = 45.5
 """Height of the window, in sizes of the font, below which the guide has smaller gaps, and its
 preconditions are side by side; no message may move its buttons."""
-_LOW = 33.5, 29.5
-"""Heights of the room for the guide, without its messages, below which it has no details, and no
-small views of the eyes; in sizes of the font."""
+_DETAILED, _SEEN = {False: 42.0, True: 33.5}, 29.5
+"""Heights of the room for the guide, without its messages, from which its result has details, below
+the views of the eyes and beside them, and from which it has these views; in sizes of the font."""
 _ARCMIN, _FAR_ARCMIN, _GROWTH = 1.0, 5.0, 0.002
 _NUDGES: dict[tuple[str, str], tuple[float, float, float]] = {
     (tr("Move the outline left"), "Left"): (-_ARCMIN, 0.0, 0.0),
@@ -177,9 +177,9 @@ class WizardPanel(QWidget):
         said = (one for one in (self._fact, self._note) if not one.isHidden())
         said_px = sum(one.heightForWidth(self._sentence.width()) for one in said)
         height = ((self.parentWidget() or self).height() - said_px) / font_px()
-        has_details, has_eyes = (height >= least for least in _LOW)
+        has_details = height >= _DETAILED[self.picture.is_result_beside]
         is_low = self.window().height() / font_px() < _LOW_WINDOW
-        self.picture.fit(has_details=has_details, has_eyes=has_eyes)
+        self.picture.fit(has_details=has_details, has_eyes=height >= _SEEN)
         gap_px = SPACING_PX // 2 if is_low else SPACING_PX
         if (layout := self.layout()) is not None:
             layout.setContentsMargins(*4 * (2 * gap_px,))
@@ -293,7 +293,6 @@ class WizardPanel(QWidget):
         hbox(plan_label, self._plan, on=self._choice, margins=0, spacing=SPACING_PX)
         head = hbox(self._title, 0, self._choice, self.picture.result.buttons, hold)
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
-        layout.addSpacing(SPACING_PX)
         layout.addLayout(head)
         self._ring.setToolTip(
             tr("Green: alignments made, or eyes verified. Blue: time until the step runs by itself")

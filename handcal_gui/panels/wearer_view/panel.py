@@ -52,10 +52,7 @@ class WearerViewPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("wearer-view-panel")
         self._eyes = {eye: _EyeColumn(eye) for eye in EYES}
-        self._entries = {
-            what: LegendEntry(what, QLabel(name), LINES[what][0], tooltip, LINES[what][1])
-            for what, (name, tooltip) in _LEGEND.items()
-        }
+        self._entries = outline_legend()
         whole, before = QCheckBox(tr("&Whole display")), QCheckBox(tr("Before &calibration"))
         whole.setObjectName("wearer-view-whole")
         whole.setToolTip(tr("Show each whole display instead of the part with the hand"))
@@ -138,6 +135,14 @@ class _EyeColumn(QWidget):
         is_known = view is not None and (view.is_true or is_solved) and not message
         self._now.show_overlay(view.drawn if view and is_known else None)
         self._before.show_overlay(view.offline if view and is_known else None)
+
+
+def outline_legend() -> dict[str, LegendEntry]:
+    """Return the legend's entries by the kinds of outlines, see `LINES`."""
+    return {
+        what: LegendEntry(what, QLabel(name), LINES[what][0], tooltip, LINES[what][1])
+        for what, (name, tooltip) in _LEGEND.items()
+    }
 
 
 def origin_text(view: EyeView | None, *, is_solved: bool) -> str:

@@ -153,6 +153,31 @@ def test_an_eye_that_is_aligned_or_verified_has_room_below_a_message(
         assert all(one.fontMetrics().horizontalAdvance(one.text()) <= one.width() for one in texts)
 
 
+@pytest.mark.parametrize(("size_px", "eye_px"), [((960, 540), 100), ((960, 510), 80)])
+def test_the_eyes_above_a_result_have_room_in_a_small_window_with_a_message(
+    program: Program,
+    snapshot: Maker,
+    record: SessionRecord,
+    size_px: tuple[int, int],
+    eye_px: int,
+) -> None:
+    window, picture = program.window, program.wizard_panel.picture
+    window.resize(*size_px)
+    window.show_page("live")
+    window.banner.show_message("Frames per second: often below the 8 needed; close other programs")
+    seen = snapshot(State.APPLIED)
+    for view in all_views(snapshot, record):
+        if view.step not in OF_THE_RESULT or view.main.action is Action.VERIFIED or view.fact:
+            continue
+        say(program, seen, view)
+        picture.show_snapshot(seen)
+        for _ in range(3):
+            QApplication.processEvents()
+        heights_px = [one.height() for one in picture.findChildren(EyeCanvas) if one.isVisible()]
+        assert len(heights_px) == 2
+        assert min(heights_px) >= eye_px, view.sentence
+
+
 @EACH_TEXT
 @pytest.mark.parametrize("size_px", SMALL_PX)
 def test_no_panel_needs_scrolling(

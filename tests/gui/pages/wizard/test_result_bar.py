@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.legend import LegendEntry
 from tests.gui.helpers import button, child, show, text
 
 Maker = Callable[..., Snapshot]
@@ -83,10 +85,57 @@ def test_the_result_stands_right_below_the_eyes_where_there_is_height(
 
     def is_close() -> bool:
         drawn_px = eye.width() * eye.crop_px.height() / eye.crop_px.width()
-        gap_px = picture.result.y() - eye.mapTo(picture, eye.rect().topLeft()).y() - drawn_px
-        return picture.result.x() == 0 and gap_px < 2 * SPACING_PX
+        key = child(picture, LegendEntry, "legend-hand")
+        key_top = key.mapTo(picture, key.rect().topLeft()).y()
+        above_px = key_top - eye.mapTo(picture, eye.rect().topLeft()).y() - drawn_px
+        below_px = picture.result.y() - key_top - key.height()
+        return picture.result.x() == 0 and above_px + below_px < 2 * SPACING_PX
 
     qtbot.waitUntil(is_close)
+
+
+def shown_key(picture: GuidePicture) -> dict[str, int]:
+    """Return where each entry of the legend that is shown begins."""
+    QApplication.processEvents()
+    entries = picture.findChildren(LegendEntry)
+    return {one.text.split()[0]: one.x() for one in entries if one.isVisible()}
+
+
+def test_a_key_tells_which_outlines_can_be_seen(qtbot: QtBot, snapshot: Maker) -> None:
+    picture = show(qtbot, GuidePicture(), 700, 500)
+    qtbot.addWidget(picture.result.buttons)
+    picture.show_snapshot(snapshot())
+    assert shown_key(picture) == {}, "of the camera's image"
+    picture.step = Step.ALIGN
+    picture.show_snapshot(snapshot(State.ALIGN))
+    aligning = shown_key(picture)
+    assert list(aligning) == ["Hand", "Drawn", "Cursor"]
+    picture.step = Step.VERIFY
+    picture.show_snapshot(snapshot(State.APPLIED))
+    verified = shown_key(picture)
+    assert list(verified) == ["Hand", "Drawn"]
+    button(picture.result.buttons, QToolButton, "Blink before/after").click()
+    blinking = shown_key(picture)
+    assert list(blinking) == ["Hand", "Drawn", "Before"]
+    assert aligning.items() >= verified.items(), "nothing moves"
+    assert blinking.items() >= verified.items()
+
+
+def test_the_key_shows_the_style_of_each_line(qtbot: QtBot, snapshot: Maker) -> None:
+    picture = show(qtbot, GuidePicture(), 700, 500)
+    picture.step = Step.ALIGN
+    picture.show_snapshot(snapshot(State.ALIGN))
+    strokes = {}
+    for what in ("hand", "drawn", "offline"):
+        entry = child(picture, LegendEntry, f"legend-{what}")
+        entry.show()
+        QApplication.processEvents()
+        image = entry.grab().toImage()
+        width_px = 22
+        row = [image.pixelColor(x, image.height() // 2).lightness() for x in range(width_px)]
+        middle = (min(row) + max(row)) / 2
+        strokes[what] = sum(a > middle >= b for a, b in pairwise([255, *row]))
+    assert strokes["hand"] <= 1 < strokes["drawn"] < strokes["offline"]
 
 
 def test_before_and_after_are_shown_in_turn(qtbot: QtBot, snapshot: Maker) -> None:
