@@ -4880,6 +4880,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>show what is asked for, with enough light, and take it again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>not taken: {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6181,6 +6185,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Take an image whenever the board is at rest, sharp, and at a position not covered by earlier images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the board is not seen by the {}: bring it into view, and see to focus and light</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source> and the </source>
         <translation type="unfinished"></translation>
     </message>
     <message>
