@@ -26,7 +26,7 @@ LINES = {
 }
 """Colour of each kind of outline, and width in pixels and style of its line."""
 _HALO_PX = 2.0
-"""How much wider the ground is on which a line lies over an image."""
+"""Added to the width of a line for that of its ground over an image."""
 _FEW_POINTS = 120
 """Outlines of so few points, such as a target, are drawn as they are."""
 _SMOOTHED_POINTS = 5
