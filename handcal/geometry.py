@@ -42,7 +42,7 @@ def rotation_matrix(rotation_rad: Float64) -> Float64:
 def rotation_vector(R: Float64) -> Float64:
     """Return the vector, (3,), rad, of a rotation by less than half a turn.
 
-    SciPy, which makes any matrix a rotation first, takes a hundred times as long.
+    SciPy, which makes any matrix a rotation first, takes sixty times as long.
     """
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R.tolist()
     axis = 0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01)
@@ -57,7 +57,7 @@ def is_rigid(T: Float64, reach_m: float, tolerance: float = _ROTATION_TOLERANCE)
     Its rotation must be right-handed and orthonormal to `tolerance`, by default the accuracy of
     float32, and each component of its translation below `reach_m`.
     """
-    *upper, last = T.tolist()  # NumPy takes ten times as long for so few numbers
+    *upper, last = T.tolist()  # NumPy takes five times as long for so few numbers
     (x, y, z) = rows = [row[:3] for row in upper]
     return (
         last == [0.0, 0.0, 0.0, 1.0]
