@@ -67,6 +67,7 @@ class EvaluationPage(QWidget):
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
         self._preparing = [PreparationButton(one) for one in spec.preparations]
+        self._request = paragraph("preparationRequest")
         self._bar = JobBar()
         self._found = FindingLine("readiness")
         keep_space(self._found)
@@ -168,6 +169,9 @@ class EvaluationPage(QWidget):
         readiness = self._readiness
         for prepare in self._preparing:
             prepare.follow(None if self.is_busy else self._entries)
+        requests = (prepare.request(self._entries) for prepare in self._preparing)
+        self._request.setText(" ".join(filter(None, requests)))
+        self._request.setVisible(bool(self._request.text()) and not self.is_busy)
         can_run = readiness is not None and readiness.can_run and not self._waits_for
         self._button.setEnabled(can_run)
         if readiness is not None:
@@ -196,7 +200,7 @@ class EvaluationPage(QWidget):
             self.form,
             self._found,
             (self._results, 1),
-            action_strip(self._button, *self._preparing, bar=self._bar),
+            action_strip(self._button, *self._preparing, self._request, bar=self._bar),
             on=self,
             margins=0,
             spacing=SPACING_PX,
