@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal.errors import HandcalError
 from handcal.station.doctor import Finding, Health
@@ -17,7 +17,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import main_button, paragraph
+from handcal_gui.widgets.fields import main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import keep_space, vbox
@@ -67,7 +67,7 @@ class EvaluationPage(QWidget):
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
         self._preparing = [PreparationButton(one) for one in spec.preparations]
-        self._request = paragraph("preparationRequest")
+        self._request = with_name(QLabel(), "preparationRequest")
         self._bar = JobBar()
         self._found = FindingLine("readiness")
         keep_space(self._found)
