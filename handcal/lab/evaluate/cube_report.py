@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -167,7 +168,7 @@ def _draw_boxes(
     width = _BOX_WIDTH / len(drawn)
     for number, name in enumerate(drawn):
         color, line = _STYLES[number % len(_STYLES)]
-        style = {"color": color, "linestyle": line}
+        style: dict[str, Any] = {"color": color, "linestyle": line}
         offset = (number + 0.5) * width - 0.5 * _BOX_WIDTH
         ax.boxplot(
             [

@@ -275,8 +275,16 @@ def _draw(
                 elinewidth=0.6,
             )
         else:
-            style = {"color": color, "marker": marker, "linestyle": line, "markersize": 3}
-            ax.plot(values, means, label=method, linewidth=1.0, **style)
+            ax.plot(
+                values,
+                means,
+                color=color,
+                label=method,
+                marker=marker,
+                markersize=3,
+                linestyle=line,
+                linewidth=1.0,
+            )
             ax.fill_between(values, low, high, color=color, alpha=0.2, linewidth=0.0)
     ax.axhline(LINE_MM, color="0.3", linewidth=0.6)
     ax.set_ylim(bottom=0.0)
