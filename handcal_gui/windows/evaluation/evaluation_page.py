@@ -68,6 +68,8 @@ class EvaluationPage(QWidget):
         self._button = main_button("run", tr("Run"))
         self._preparing = [PreparationButton(one) for one in spec.preparations]
         self._request = with_name(QLabel(), "preparationRequest")
+        # It stands beside the bar for a moment as a job starts, and would widen a small window.
+        self._request.setMinimumWidth(1)
         self._bar = JobBar()
         self._found = FindingLine("readiness")
         keep_space(self._found)

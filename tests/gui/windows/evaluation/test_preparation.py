@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.lab.settings import NoiseStudySettings
@@ -58,6 +58,10 @@ def test_it_is_offered_where_the_entries_suffice(window: EvaluationWindow) -> No
     assert not button(window).isEnabled()
     request = child(window, QLabel, "preparationRequest")
     assert (request.text(), request.isVisible()) == ("Enter a seed.", True)
+    width_px = window.minimumSizeHint().width()
+    request.setText(50 * request.text())
+    QApplication.processEvents()
+    assert window.minimumSizeHint().width() == width_px, "a small window stays small"
     window.page.form.enter(seed=2)
     assert button(window).isEnabled()
     assert not request.isVisible()
