@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import QObject, QRect, Qt
 from PySide6.QtWidgets import QAbstractButton, QLabel, QMenuBar, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -32,6 +32,12 @@ def child(parent: QObject, kind: type[Child], name: str = "") -> Child:
 def text(parent: QObject, name: str) -> str:
     """Return the text of the label of a name."""
     return child(parent, QLabel, name).text()
+
+
+def height_px(widget: QWidget, text: str, width_px: int) -> int:
+    """Return the height of a text in a widget's font, with lines of a width."""
+    room, wraps = QRect(0, 0, width_px, 9999), Qt.TextFlag.TextWordWrap.value
+    return widget.fontMetrics().boundingRect(room, wraps, text).height()
 
 
 def letters(window: QWidget, *, is_shown: bool = False) -> list[str]:

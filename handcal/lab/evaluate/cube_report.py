@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -52,7 +53,15 @@ _COMPARED = (
     "err_t_xy_arcmin",
     "err_R_deg",
 )
-_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+_STYLES = (
+    ("#0072B2", "-"),
+    ("#D55E00", "--"),
+    ("#009E73", ":"),
+    ("#CC79A7", "-."),
+    ("#56B4E9", (0, (8, 1))),
+    ("#E69F00", (0, (1, 3))),
+)
+"""Colour and line of each way of drawing: not everyone can tell colours apart."""
 _BOX_WIDTH = 0.8
 
 
@@ -158,7 +167,8 @@ def _draw_boxes(
     """Draw groups of boxes, one box in each for each way of drawing; of rows' named errors."""
     width = _BOX_WIDTH / len(drawn)
     for number, name in enumerate(drawn):
-        color = _COLORS[number % len(_COLORS)]
+        color, line = _STYLES[number % len(_STYLES)]
+        style: dict[str, Any] = {"color": color, "linestyle": line}
         offset = (number + 0.5) * width - 0.5 * _BOX_WIDTH
         ax.boxplot(
             [
@@ -168,13 +178,13 @@ def _draw_boxes(
             positions=[place + offset for place in range(len(groups))],
             widths=0.8 * width,
             manage_ticks=False,
-            boxprops={"color": color},
+            boxprops=style,
             medianprops={"color": color, "linewidth": 1.6},
-            whiskerprops={"color": color},
+            whiskerprops=style,
             capprops={"color": color},
             flierprops={"marker": ".", "markersize": 3, "markeredgecolor": color},
         )
-        ax.plot([], [], color=color, label=name)
+        ax.plot([], [], label=name, **style)
     ax.set_xticks(range(len(groups)), list(groups))
     ax.set_xlim(-0.5, len(groups) - 0.5)
     ax.set_ylim(bottom=0.0)

@@ -24,15 +24,16 @@ LINE_MM = 4.0
 _PUBLISHED_DEG = 9.0
 # Rotations at which rcICP and ICP are compared.
 _COMPARED_DEG = 5.0, 9.0, 20.0, 40.0, 60.0
-_COLORS = {
-    "consistent": "#0072b2",
-    "paper": "#d55e00",
-    BEST_ITERATE: "#cc79a7",
-    "linear": "#e69f00",
-    "icp": "#7f7f7f",
-    "icp-open3d": "#56b4e9",
-    FLOOR: "#009e73",
+_STYLES = {
+    "consistent": ("#0072b2", "o", "-"),
+    "paper": ("#d55e00", "s", "--"),
+    BEST_ITERATE: ("#cc79a7", "^", "-."),
+    "linear": ("#e69f00", "v", ":"),
+    "icp": ("#7f7f7f", "D", "--"),
+    "icp-open3d": ("#56b4e9", "x", "-."),
+    FLOOR: ("#009e73", "*", ":"),
 }
+"""Colour, marker and line of each method: not everyone can tell colours apart."""
 _INTERVALS = (
     "Intervals are of 95 % confidence. Errors of one person's hand are correlated, "
     "so that people count as independent, not alignments: intervals are of the mean of people's "
@@ -105,7 +106,7 @@ def noise_report(settings: NoiseSettings, rows: Sequence[StudyRow]) -> Report:
 def _counts(settings: NoiseSettings, rows: Sequence[StudyRow]) -> dict[str, str]:
     solved = {
         method: f"{sum(row['method'] == method for row in rows):,}"
-        for method in _COLORS
+        for method in _STYLES
         if method not in (FLOOR, BEST_ITERATE) and (settings.open3d or method != "icp-open3d")
     }
     return {
@@ -199,7 +200,7 @@ def _section(settings: NoiseSettings, name: str, points: Sequence[_Point]) -> Se
         Figure(
             slug,
             f"Mean |Δφ| with its confidence interval. Left: all methods, on a logarithmic scale. "
-            f"Right: without icp. Dashed: {LINE_MM:g} mm.",
+            f"Right: without icp. Grey, without markers: {LINE_MM:g} mm.",
             partial(_draw_lengths, name, coarse, fine),
             rows,
             height_mm=70.0,
@@ -254,7 +255,7 @@ def _draw(
     ax: Axes, name: str, points: Sequence[_Point], interval: Callable[[_Point], MeanInterval]
 ) -> None:
     """Draw a line with a band for each method, or a dot with a bar for each person."""
-    for method, color in _COLORS.items():
+    for method, (color, marker, line) in _STYLES.items():
         of_method = sorted((p for p in points if p.method == method), key=lambda p: p.value)
         if not of_method:
             continue
@@ -267,16 +268,25 @@ def _draw(
                 values,
                 means,
                 [means - low, high - means],
-                fmt=".",
+                fmt=marker,
                 color=color,
                 label=method,
                 markersize=3,
                 elinewidth=0.6,
             )
         else:
-            ax.plot(values, means, color=color, label=method, linewidth=1.0)
+            ax.plot(
+                values,
+                means,
+                color=color,
+                label=method,
+                marker=marker,
+                markersize=3,
+                linestyle=line,
+                linewidth=1.0,
+            )
             ax.fill_between(values, low, high, color=color, alpha=0.2, linewidth=0.0)
-    ax.axhline(LINE_MM, color="0.3", linestyle="--", linewidth=0.8)
+    ax.axhline(LINE_MM, color="0.3", linewidth=0.6)
     ax.set_ylim(bottom=0.0)
 
 
@@ -299,7 +309,7 @@ def _figure_row(name: str, point: _Point) -> StudyRow:
 
 def _table(name: str, points: Sequence[_Point]) -> Table:
     """Return mean |Δφ| with its interval by value and method."""
-    methods = [method for method in _COLORS if any(point.method == method for point in points)]
+    methods = [method for method in _STYLES if any(point.method == method for point in points)]
     cells = {(point.value, point.method): _cell(point.length) for point in points}
     section = SECTIONS[name]
     return Table(

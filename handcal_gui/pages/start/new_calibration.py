@@ -175,6 +175,8 @@ class NewCalibration(Card):
         is_covered = QApplication.activeModalWidget() is not None
         if self.isVisible() and not self._is_opening and not is_covered:
             self._check.ask(self._question())
+            if not self._button.isEnabled() and not self._problem.text():
+                self._problem.setText(tr("Checking camera, headset and files…"))
         if self.isVisible():
             self._again.start(self._again_ms())
 

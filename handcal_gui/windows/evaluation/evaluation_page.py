@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal.errors import HandcalError
 from handcal.station.doctor import Finding, Health
@@ -17,7 +17,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import main_button, paragraph
+from handcal_gui.widgets.fields import main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import keep_space, vbox
@@ -67,6 +67,9 @@ class EvaluationPage(QWidget):
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
         self._preparing = [PreparationButton(one) for one in spec.preparations]
+        self._request = with_name(QLabel(), "preparationRequest")
+        # It stands beside the bar for a moment as a job starts, and would widen a small window.
+        self._request.setMinimumWidth(1)
         self._bar = JobBar()
         self._found = FindingLine("readiness")
         keep_space(self._found)
@@ -168,6 +171,9 @@ class EvaluationPage(QWidget):
         readiness = self._readiness
         for prepare in self._preparing:
             prepare.follow(None if self.is_busy else self._entries)
+        requests = (prepare.request(self._entries) for prepare in self._preparing)
+        self._request.setText(" ".join(filter(None, requests)))
+        self._request.setVisible(bool(self._request.text()) and not self.is_busy)
         can_run = readiness is not None and readiness.can_run and not self._waits_for
         self._button.setEnabled(can_run)
         if readiness is not None:
@@ -196,7 +202,7 @@ class EvaluationPage(QWidget):
             self.form,
             self._found,
             (self._results, 1),
-            action_strip(self._button, *self._preparing, bar=self._bar),
+            action_strip(self._button, *self._preparing, self._request, bar=self._bar),
             on=self,
             margins=0,
             spacing=SPACING_PX,

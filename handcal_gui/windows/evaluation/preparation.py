@@ -37,6 +37,8 @@ class Preparation:
     """Creates the dialog, given entries and a parent."""
     name: str = "prepare"
     """Object name of the button."""
+    request: str = ""
+    """What to enter first, in a sentence; shown while the dialog cannot be opened."""
 
 
 class PreparationButton(QPushButton):
@@ -67,6 +69,10 @@ class PreparationButton(QPushButton):
         """Set the entries; None disables the button."""
         self._entries = entries
         self.setEnabled(entries is not None and self._preparation.is_possible(entries))
+
+    def request(self, entries: Any) -> str:
+        """Return what to enter first; empty if nothing is missing."""
+        return "" if self._preparation.is_possible(entries) else self._preparation.request
 
     def stop(self) -> None:
         """Close the dialog, if it is open."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices, QPalette
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.report.document import Figure, Report, Table
@@ -130,11 +130,9 @@ def _table_page(table: Table) -> QWidget:
 def _figure_page(title: str, figure: Figure, picture: UInt8) -> QWidget:
     view = ImageView(tr("Figure {}").format(title))
     view.setAccessibleDescription(figure.caption)
-    paper = view.palette()
-    paper.setColor(QPalette.ColorRole.Window, Qt.GlobalColor.white)
-    view.setPalette(paper)
     view.show_image(picture)
-    return _page(view, figure.caption)
+    file = tr("White as on paper: this is the exported figures/{}.png.").format(figure.name)
+    return _page(view, f"{figure.caption} {file}".lstrip())
 
 
 def _page(view: QWidget, caption: str) -> QWidget:

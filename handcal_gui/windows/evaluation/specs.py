@@ -70,6 +70,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                     tr("Take the captures with a camera; enter their folder first."),
                     lambda entries: bool(entries.captures),
                     CaptureDialog,
+                    request=tr("To capture, choose a folder in Captures."),
                 ),
                 Preparation(
                     tr("&Track…"),
@@ -100,6 +101,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                     ),
                     lambda entries: bool(entries.sessions),
                     TrialsDialog,
+                    request=tr("To record, choose a session in Sessions."),
                 ),
             ),
         ),

@@ -1,4 +1,5 @@
 import numpy as np
+from matplotlib.figure import Figure as Canvas
 
 from handcal.lab.evaluate.cube import CubeMisalignment
 from handcal.lab.evaluate.cube_report import cube_report
@@ -47,3 +48,18 @@ def test_the_report_holds_what_the_summary_says() -> None:
     ]
     assert all(figure.rows == test.rows for figure in report.figures)
     assert [draw_figure(figure).svg[:5] for figure in report.figures] == 2 * [b"<?xml"]
+
+
+def test_drawings_differ_by_more_than_their_colours() -> None:
+    test = made_up()
+    report = cube_report(test, cube_summary(test.rows), Cube(), CAMERA)
+    for figure in report.figures:
+        axes = [Canvas().add_subplot() for _ in range(figure.columns)]
+        figure.draw(axes)
+        for ax in axes:
+            named = {line.get_label(): line.get_linestyle() for line in ax.get_lines()}
+            assert named["offline"] != named["solved"]
+            boxes = [
+                line.get_linestyle() for line in ax.get_lines() if np.size(line.get_xdata()) > 2
+            ]
+            assert set(boxes) >= {named["offline"], named["solved"]}

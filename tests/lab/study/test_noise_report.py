@@ -112,6 +112,16 @@ def test_figures_are_drawn_with_the_line(report: Report) -> None:
     assert "consistent" in right
 
 
+def test_methods_differ_by_more_than_their_colours(report: Report) -> None:
+    left, _ = _drawn(report, "rotation")
+    looks = [
+        (line.get_marker(), line.get_linestyle())
+        for line in left.get_lines()
+        if not str(line.get_label()).startswith("_")
+    ]
+    assert len(set(looks)) == len(looks) == len(SLOPES_MM)
+
+
 def _drawn(report: Report, name: str) -> list[Axes]:
     (figure,) = [figure for figure in report.figures if figure.name == name]
     axes = [Canvas().add_subplot() for _ in range(figure.columns)]

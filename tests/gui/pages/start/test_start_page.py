@@ -189,6 +189,24 @@ def test_a_part_that_is_broken_prevents_the_start_until_it_is_fixed(
     assert not button(page, "cameraFix").isVisible()
 
 
+def test_a_page_that_checks_says_so_beside_the_grey_button(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
+) -> None:
+    inspector.healths["camera"] = Health.BROKEN
+    page = open_page()
+    assert text(page, "startProblem") == "Fix first: Camera."
+    inspector.healths["camera"] = Health.GOOD
+    page.new.check()
+    assert text(page, "startProblem") == "Fix first: Camera.", "until it is known to be fixed"
+    qtbot.waitUntil(button(page, "start").isEnabled)
+    page.new.check()
+    assert text(page, "startProblem") == "", "it can be started meanwhile"
+    with qtbot.waitSignal(page.start_requested):
+        button(page, "start").click()
+        assert text(page, "startProblem") == "Checking camera, headset and files…"
+    assert text(page, "startProblem") == ""
+
+
 def test_what_breaks_after_the_last_look_is_found_by_the_start(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage]
 ) -> None:

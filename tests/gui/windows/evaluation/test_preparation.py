@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.lab.settings import NoiseStudySettings
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.windows.evaluation.preparation import Preparation, PreparationDialog
 from handcal_gui.windows.evaluation.window import EvaluationWindow
+from tests.gui.helpers import child
 
 
 class ScenarioDialog(PreparationDialog):
@@ -26,7 +27,9 @@ class ScenarioDialog(PreparationDialog):
 @pytest.fixture
 def window(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator[EvaluationWindow]:
     """Show an evaluation that can be prepared with a seed other than 0."""
-    preparation = Preparation("Prepare…", "Do.", lambda one: one.seed != 0, ScenarioDialog)
+    preparation = Preparation(
+        "Prepare…", "Do.", lambda one: one.seed != 0, ScenarioDialog, request="Enter a seed."
+    )
     specs = {"noise": replace(numbers.spec, preparations=(preparation,))}
     window = EvaluationWindow(specs, EvaluationEntries(noise=entries))
     qtbot.addWidget(window)
@@ -53,8 +56,15 @@ def test_it_is_offered_where_the_entries_suffice(window: EvaluationWindow) -> No
     assert (button(window).text(), button(window).toolTip()) == ("Prepare…", "Do.")
     window.page.form.enter(seed=0)
     assert not button(window).isEnabled()
+    request = child(window, QLabel, "preparationRequest")
+    assert (request.text(), request.isVisible()) == ("Enter a seed.", True)
+    request.setText(50 * request.text())
+    window.resize(960, 540)
+    QApplication.processEvents()
+    assert window.width() == 960, "a small window stays small"
     window.page.form.enter(seed=2)
     assert button(window).isEnabled()
+    assert not request.isVisible()
 
 
 def test_prepared_data_is_checked_again(

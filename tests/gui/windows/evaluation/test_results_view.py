@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QTabWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.report.document import Column, Report, Section, Table
+from handcal.report.document import Column, Figure, Report, Section, Table
+from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.windows.evaluation.results_view import ResultsView
 from handcal_gui.windows.evaluation.work import Outcome
-from tests.gui.helpers import child, show
+from tests.gui.helpers import child, show, text
 
 
 @pytest.mark.parametrize(
@@ -54,3 +57,17 @@ def test_the_numbers_of_a_user_test_fit_beside_the_list_of_a_small_screen(qtbot:
     assert cell is not None
     assert "min–max, arcmin: 2.13–23.44" in cell.toolTip()
     assert "95 % interval, arcmin" in shown.as_text()
+
+
+def test_a_figure_is_a_sheet_of_paper_that_says_which_file_it_is(qtbot: QtBot) -> None:
+    figure = Figure("some-squares", "Grows.", lambda _: None, [])
+    view = show(qtbot, ResultsView(), 500, 400)
+    report = Report("", "", "", [Section("", [figure])])
+    view.show_outcome(Outcome(Path(), report, [np.full((20, 90, 3), 255, np.uint8)]))
+    assert "Grows. " in text(view, "caption")
+    assert "figures/some-squares.png" in text(view, "caption")
+    sheet = child(view, ImageView)
+    qtbot.waitExposed(sheet)
+    shown = sheet.grab().toImage()
+    assert shown.pixelColor(shown.rect().center()) == Qt.GlobalColor.white
+    assert shown.pixelColor(2, 2) == sheet.palette().window().color() != Qt.GlobalColor.white

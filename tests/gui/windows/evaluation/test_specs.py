@@ -46,6 +46,13 @@ def test_every_form_shows_and_returns_its_entries(qtbot: QtBot) -> None:
         assert form.take(getattr(EvaluationEntries(), name)) == getattr(entries, name)
 
 
+def test_what_cannot_be_prepared_yet_says_what_to_enter_first() -> None:
+    for name, spec in make_specs().items():
+        entries = getattr(EvaluationEntries(), name)
+        for one in spec.preparations:
+            assert one.is_possible(entries) or one.request
+
+
 def test_studies_are_those_of_the_commands() -> None:
     specs = make_specs()
     noise, methods = specs["noise"].evaluation, specs["methods"].evaluation

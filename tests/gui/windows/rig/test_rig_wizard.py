@@ -22,7 +22,6 @@ from PySide6.QtWidgets import (
     QSpinBox,
     QTabWidget,
     QTreeWidget,
-    QWidget,
 )
 from pytestqt.qtbot import QtBot
 
@@ -83,13 +82,6 @@ def show_tab(wizard: RigWizard, title: str) -> None:
     tabs = child(wizard, QTabWidget, "")
     (place,) = (i for i in range(tabs.count()) if tabs.tabText(i).replace("&", "") == title)
     tabs.setCurrentIndex(place)
-
-
-def height_px(widget: QWidget, text: str, width_px: int) -> int:
-    """Return the height of a text whose lines are as long as there is room for."""
-    room = QRect(0, 0, width_px, 9999)
-    wraps = Qt.TextFlag.TextWordWrap.value
-    return widget.fontMetrics().boundingRect(room, wraps, text).height()
 
 
 def marks(wizard: RigWizard) -> list[str]:
@@ -346,39 +338,6 @@ def test_on_a_small_screen_paths_have_the_whole_width(qtbot: QtBot, wizard: RigW
     qtbot.waitUntil(lambda: last.x() > first.x() + first.width())
     wizard.resize(960, 540)
     qtbot.waitUntil(lambda: first.x() == last.x() and last.width() > 450)
-
-
-def test_the_lenses_compared_are_whole_beside_the_numbers(qtbot: QtBot, wizard: RigWizard) -> None:
-    wizard.resize(960, 510)
-    solve(qtbot, wizard, VIEWPOINT)
-    show_tab(wizard, "Numbers")
-    QApplication.processEvents()
-    lenses = child(wizard, QLabel, "lenses")
-    assert "rational" in lenses.text()
-    assert lenses.height() >= height_px(lenses, lenses.text(), lenses.width()) > 20
-
-
-def test_a_long_finding_about_the_rig_is_whole(wizard: RigWizard) -> None:
-    origin = Origin("as told", "now", 3, 0.1, "good", " ".join(40 * ["told"]), ("a",), np.eye(1))
-    wizard.project.use_rig(replace(wizard.project.rig, origins={"left": origin}))
-    wizard.resize(960, 540)
-    wizard.show_step(RESULT)
-    QApplication.processEvents()
-    findings = child(wizard, QTreeWidget, "rigFindings")
-    rows = [findings.topLevelItem(row) for row in range(findings.topLevelItemCount())]
-    [row] = [row for row in rows if row.text(0) == "Calibration of the left display"]
-    needed_px = height_px(findings, row.text(1), findings.columnWidth(1))
-    assert findings.visualItemRect(row).height() >= needed_px > 20
-
-
-def test_no_column_is_empty(wizard: RigWizard) -> None:
-    wizard.show_step(RESULT)
-    findings = child(wizard, QTreeWidget, "rigFindings")
-    assert findings.isColumnHidden(2)
-    rig = wizard.project.rig
-    far = {**rig.eyes, "left": replace(rig.eyes["left"], z_C0_S_m=30.0)}
-    wizard.project.use_rig(replace(rig, eyes=far))
-    assert not findings.isColumnHidden(2)
 
 
 def test_without_images_nothing_is_solved_and_the_reason_is_in_sight(
