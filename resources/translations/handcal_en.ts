@@ -1103,6 +1103,10 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Checking camera, headset and files…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Opening camera and headset…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4296,6 +4300,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>To capture, choose a folder in Captures.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Track…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4305,6 +4313,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Record the trials of one session with a cube in the room; enter the session first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>To record, choose a session in Sessions.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5005,6 +5017,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Figure {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>White as on paper: this is the exported figures/{}.png.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
