@@ -23,5 +23,7 @@ class RecordTabs(QTabWidget):
     def _refresh(self) -> None:
         page = self.currentWidget()
         if isinstance(page, RecordTable):
+            for former in self._delete.actions():  # else both are a menu, with an arrow
+                self._delete.removeAction(former)
             self._delete.setDefaultAction(page.delete_action)
         self._delete.setVisible(isinstance(page, RecordTable))

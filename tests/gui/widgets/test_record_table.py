@@ -3,9 +3,11 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.record_table import RecordColumn, RecordTable
+from handcal_gui.widgets.record_tabs import RecordTabs
 
 COLUMNS = (RecordColumn("No.", "Number"), RecordColumn("What", "Anything", is_number=False))
 
@@ -112,3 +114,19 @@ def test_a_row_with_two_lines_is_higher(table: RecordTable) -> None:
     assert table.rowHeight(0) >= table.rowHeight(1) + table.fontMetrics().height()
     table.show_rows({1: ("1", "left"), 2: ("2", "left")})
     assert table.rowHeight(0) == table.rowHeight(1)
+
+
+def test_delete_in_the_corner_of_tabs_deletes_in_the_table_shown_and_has_no_menu(
+    qtbot: QtBot,
+) -> None:
+    tabs = RecordTabs()
+    qtbot.addWidget(tabs)
+    tables = [RecordTable(name, name, COLUMNS, "") for name in ("things", "others")]
+    for table in tables:
+        tabs.addTab(table, table.objectName())
+    delete = tabs.cornerWidget()
+    assert isinstance(delete, QToolButton)
+    for shown in (1, 0):
+        tabs.setCurrentIndex(shown)
+        assert delete.actions() == [tables[shown].delete_action]
+        assert delete.defaultAction() is tables[shown].delete_action
