@@ -28,6 +28,7 @@ class FindingLine(QWidget):
         self._icon = with_name(QLabel(), f"{name}Health")
         self._icon.setFixedSize(2 * SPACING_PX, 2 * SPACING_PX)
         self._text = paragraph(f"{name}Found")
+        self._text.setAlignment(Qt.AlignmentFlag.AlignTop)  # beside the icon
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._button = button(f"{name}Fix")
         self._button.hide()
@@ -46,7 +47,6 @@ class FindingLine(QWidget):
         assert layout is not None
         layout.setContentsMargins(0, 0, 0, 0)
         self.setMinimumHeight(max(3 * SPACING_PX, self._button.sizeHint().height()))
-        self._text.setAlignment(Qt.AlignmentFlag.AlignTop)
 
     def show_finding(
         self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
