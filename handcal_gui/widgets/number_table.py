@@ -21,6 +21,7 @@ from handcal_gui.theme import flat_header, number_font, set_style
 
 _PARTS = re.compile(" (?=±|mm)")
 """Between the parts of a cell that can have their own lines."""
+_ALIGNMENT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,8 @@ class NumberTable(QTableWidget):
         Where not all columns fit, the last ones are hidden and are in the tooltips; otherwise the
         table scrolls.
     wraps : bool
-        Where not all columns fit, uncertainties, units and parts of headings have their own lines.
+        Where not all columns fit, uncertainties, units and parts of headings have their own lines;
+        otherwise only the units of headings have.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class NumberTable(QTableWidget):
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.horizontalHeader().setSectionsClickable(False)
+        self.horizontalHeader().setDefaultAlignment(_ALIGNMENT)
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(self.verticalHeader().minimumSectionSize())
         self.verticalHeader().setSectionsClickable(False)
@@ -88,7 +91,7 @@ class NumberTable(QTableWidget):
         self.clearSpans()
         self.setColumnCount(len(columns))
         self.setRowCount(len(rows))
-        self.setHorizontalHeaderLabels(list(map(_heading, columns)))
+        self.setHorizontalHeaderLabels(columns)
         for number, row in enumerate(rows):
             self.setVerticalHeaderItem(number, QTableWidgetItem(row.label))
             for column, text in enumerate(row.cells):
@@ -117,12 +120,11 @@ class NumberTable(QTableWidget):
         columns, room_px = range(self.columnCount()), self.viewport().width()
         for column in columns:
             self.showColumn(column)  # a hidden one has no width
-        if self._wraps:
-            self._wrap(False)
-        needed_px = self._needed_px()
-        if self._wraps and sum(needed_px) > room_px:
-            self._wrap(True)
+        for breaks in range(3 if self._wraps else 2):
+            self._break_lines(breaks)
             needed_px = self._needed_px()
+            if sum(needed_px) <= room_px:
+                break
         fits = [c == 0 or sum(needed_px[: c + 1]) <= room_px for c in columns]
         shown = [column for column in columns if fits[column] or not self._hides]
         spare_px = max(0, room_px - sum(needed_px[column] for column in shown))
@@ -138,15 +140,15 @@ class NumberTable(QTableWidget):
             for column in range(self.columnCount())
         ]
 
-    def _wrap(self, is_wrapped: bool) -> None:
-        """Break the lines of cells and headings, or join them."""
+    def _break_lines(self, breaks: int) -> None:
+        """Break no lines (0), headings before their units (1), or all that can be broken (2)."""
         line_px = QFontMetrics(number_font()).lineSpacing()
         for column, title in enumerate(self._columns):
             if (heading := self.horizontalHeaderItem(column)) is not None:
-                text = _heading(title)
-                heading.setText(text.replace("-", "-\n") if is_wrapped else text)
+                text = title.replace(", ", "\n") if breaks else title
+                heading.setText(text.replace("-", "-\n") if breaks > 1 else text)
         for number, row in enumerate(self._rows):
-            texts = [_PARTS.sub("\n", cell) if is_wrapped else cell for cell in row.cells]
+            texts = [_PARTS.sub("\n", cell) if breaks > 1 else cell for cell in row.cells]
             for column, text in enumerate(texts):
                 if (item := self.item(number, column)) is not None:
                     item.setText(text)
@@ -170,13 +172,8 @@ def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:
     return "\n".join("\t".join(line) for line in lines)
 
 
-def _heading(column: str) -> str:
-    """Return a heading; a unit, which may follow a comma, has its own line and needs less width."""
-    return column.replace(", ", "\n")
-
-
 def _number_item(text: str) -> QTableWidgetItem:
     item = QTableWidgetItem(text)
     item.setFont(number_font())
-    item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    item.setTextAlignment(_ALIGNMENT)
     return item

@@ -21,6 +21,7 @@ def test_rows_are_shown_right_aligned_and_explained(qtbot: QtBot) -> None:
     assert label is not None
     assert item.text() == "−2.00 mm"
     assert item.textAlignment() & Qt.AlignmentFlag.AlignRight
+    assert table.horizontalHeader().defaultAlignment() == item.textAlignment()
     assert item.toolTip() == label.toolTip() == "how far right"
     assert (table.columnSpan(0, 0), table.columnSpan(1, 0)) == (1, 2)
 
@@ -78,6 +79,19 @@ def test_parts_of_cells_and_headings_have_their_own_lines_where_not_all_columns_
         heights_px.append(table.rowHeight(0))
         is_wide = width_px == 600
         assert cell.text() == ("−2.00 ± 0.10" if is_wide else "−2.00\n± 0.10")
-        assert heading.text() == ("icp-open3d\nmm" if is_wide else "icp-\nopen3d\nmm")
+        assert heading.text() == ("icp-open3d, mm" if is_wide else "icp-\nopen3d\nmm")
     assert heights_px[0] < heights_px[1]
     assert table.as_text() == "\ticp-open3d, mm\nφ1\t−2.00 ± 0.10"
+
+
+def test_the_unit_of_a_heading_has_its_own_line_only_where_not_all_columns_fit(
+    qtbot: QtBot,
+) -> None:
+    table = NumberTable("some-numbers", "Some numbers")
+    qtbot.addWidget(table)
+    table.show_rows(("Mean error, px", "Mean error, ′"), (Row("Left eye", ("7.2", "10.1")),))
+    table.show()
+    for width_px, between in ((600, ", "), (60, "\n")):
+        table.resize(width_px, 120)
+        titles = [table.model().headerData(i, Qt.Orientation.Horizontal) for i in range(2)]
+        assert titles == [f"Mean error{between}px", f"Mean error{between}′"]
