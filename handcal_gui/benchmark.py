@@ -25,6 +25,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from handcal.camera.camera import Camera
+from handcal.errors import HandcalError
 from handcal.geometry import rigid
 from handcal.io.closable import Closable
 from handcal.lab.bench.figure import BenchFigure
@@ -133,6 +134,8 @@ class _Measurement(QObject):
     delays_ms, ages_ms, memory_mb : list of float
         Delay of every heartbeat beyond its period, age of every frame when it is on the screen,
         and memory of the process every hundred frames.
+    failure : str
+        The reason why the program ended early, if it did.
     """
 
     def __init__(self, program: Program, replay: _ReplayFrames, frames: int) -> None:
@@ -142,6 +145,7 @@ class _Measurement(QObject):
         self.memory_mb: list[float] = []
         self.started_s = self.ended_s = 0.0
         self.taken = 0
+        self.failure = "the window was closed before the end"
         self._program = program
         self._replay = replay
         self._frames = frames
@@ -151,6 +155,7 @@ class _Measurement(QObject):
         self._heart = QTimer(timerType=Qt.TimerType.PreciseTimer, interval=_HEARTBEAT_MS)
         self._heart.timeout.connect(self._beat)
         program.live.polled.connect(self._take)
+        program.live.ended.connect(self._fail)
         program.window.installEventFilter(self)
         self._heart.start()
 
@@ -160,6 +165,10 @@ class _Measurement(QObject):
             shown_ns, self._shown_ns = self._shown_ns, 0
             QTimer.singleShot(0, lambda: self._painted(shown_ns))
         return super().eventFilter(watched, event)
+
+    def _fail(self, why: str) -> None:
+        self.failure = why or self.failure
+        QApplication.quit()
 
     def _beat(self) -> None:
         now_s = time.perf_counter()
@@ -200,6 +209,11 @@ def measure(frames: int, rate_hz: int) -> list[BenchFigure]:
     frames : int
     rate_hz : int
         Rate of the camera, one of `RATES_HZ`.
+
+    Raises
+    ------
+    HandcalError
+        If the calibration fails, or the window is closed.
     """
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
@@ -227,6 +241,8 @@ def measure(frames: int, rate_hz: int) -> list[BenchFigure]:
         with _headset(settings.port):
             app.exec()
         program.close()
+    if not watch.ended_s:
+        raise HandcalError(watch.failure)
     taken_hz = watch.taken / (watch.ended_s - watch.started_s)
     least_hz, delay_ms, age_ms = _LIMITS[rate_hz]
     grown = watch.memory_mb[-1] / watch.memory_mb[len(watch.memory_mb) // 4]
@@ -251,7 +267,10 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=20_000)
     parser.add_argument("--rate", type=int, default=RATES_HZ[0], choices=RATES_HZ)
     arguments = parser.parse_args()
-    measured = measure(arguments.frames, arguments.rate)
+    try:
+        measured = measure(arguments.frames, arguments.rate)
+    except HandcalError as error:
+        sys.exit(str(error))
     figures: list[dict[str, Any]] = [figure.to_json() for figure in measured]
     print(json.dumps({"figures": figures}))  # noqa: T201 (the output of this command)
 

@@ -150,6 +150,8 @@ def _bench_window(frames: int, rate_hz: int, progress: Progress) -> dict[str, An
                 progress.at(int(seen) / frames, "frames of the window")
         output = process.stdout.read()  # a line, written at the end
     if process.returncode != 0:
-        raise HandcalError(f"cannot measure the desktop program; it needs a display: {last}")
+        # Without a display, Qt ends it by a signal.
+        advice = "; it needs a display" if process.returncode < 0 else ""
+        raise HandcalError(f"cannot measure the desktop program{advice}: {last}")
     measured: dict[str, Any] = json.loads(output)
     return measured
