@@ -30,10 +30,17 @@ ALIKE = ChooseSettings(most=5, apart_share=0.0)
 
 
 class ViewSelector:
-    """A selector of views, taken one after the other by one camera or by the two of a pair."""
+    """A selector of views, taken one after the other by one camera or by the two of a pair.
 
-    def __init__(self, settings: ChooseSettings | None = None) -> None:
-        self._settings = settings or ChooseSettings()
+    Parameters
+    ----------
+    settings : ChooseSettings, optional
+    cameras : sequence of str
+        Their names in reasons, such as "depth camera"; empty to name none.
+    """
+
+    def __init__(self, settings: ChooseSettings | None = None, cameras: Sequence[str] = ()) -> None:
+        self._settings, self._cameras = settings or ChooseSettings(), cameras
         self._kept: list[BoardView] = []
         self._before: BoardView | None = None
 
@@ -55,7 +62,10 @@ class ViewSelector:
         self._before = first
         found = [one for one in seen if one is not None]
         if first is None or len(found) < len(seen):
-            return "the board is not seen: bring it into view, and see to focus and light"
+            cameras = zip(self._cameras, seen, strict=False)
+            blind = " and the ".join(name for name, one in cameras if one is None)
+            by = f" by the {blind}" if blind else ""
+            return f"the board is not seen{by}: bring it into view, and see to focus and light"
         rest_share = settings.rest_share
         if rest_share is not None and (before is None or _moved_share(before, first) > rest_share):
             return "the board moves: hold it still for a moment"

@@ -60,8 +60,7 @@ class TakeDialog(QDialog):
         self.setObjectName("takeDialog")
         self.setWindowTitle(tr("Take images"))
         self._folders, self._board, self._choose = dict(folders), board, choose
-        self._selector = ViewSelector(choose)
-        self._kept = 0
+        self._selector, self._kept = self._new_selector(), 0
         self._is_searching = False
         self._cameras = LiveCameras(
             tuple(folders),
@@ -142,7 +141,10 @@ class TakeDialog(QDialog):
 
     def _reset(self) -> None:
         self._stop_search()
-        self._selector, self._kept = ViewSelector(self._choose), 0
+        self._selector, self._kept = self._new_selector(), 0
+
+    def _new_selector(self) -> ViewSelector:
+        return ViewSelector(self._choose, [title.lower() for title in self._folders])
 
     def _stop_search(self) -> None:
         self._search.stop()
@@ -150,16 +152,9 @@ class TakeDialog(QDialog):
 
     def _keep_if_new(self, images: Images) -> str:
         """Save images if useful, otherwise return why not; runs in the job's thread."""
-        seen = see_board(images, self._board)
-        why_not = self._selector.consider(seen)
+        why_not = self._selector.consider(see_board(images, self._board))
         if not why_not:
             keep_images(images, tuple(self._folders.values()))
-        cameras = zip(self._folders, seen, strict=True)
-        blind = [title.lower() for title, board in cameras if board is None]
-        if blind:
-            return tr(
-                "the board is not seen by the {}: bring it into view, and see to focus and light"
-            ).format(tr(" and the ").join(blind))
         return why_not
 
     def _on_searched(self, _images: Images, why_not: str) -> None:
