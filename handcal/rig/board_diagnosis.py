@@ -30,6 +30,7 @@ _FAMILIES = (
 # Boards number their markers from 0; to compare candidates with all 1000 takes four times longer.
 _COMPARED_MARKERS = 250
 
+OTHER_BOARD = "show the board entered, or enter this one"
 FindCorners: TypeAlias = Callable[[UInt8, Board], tuple[NDArray[np.int64], Float64]]
 
 
@@ -58,14 +59,17 @@ def light_trouble(gray: UInt8) -> str:
     if high - low >= 25:
         return ""
     if high < 60:
-        return "the image is too dark"
-    return "the image is too bright" if low > 195 else "the image has no contrast"
+        return "the image is too dark: add light, or expose longer"
+    if low > 195:
+        return "the image is too bright: take light away, or expose shorter"
+    return "the image has no contrast: uncover and focus the lens, and see to the light"
 
 
 def why_not_plain(gray: UInt8) -> str:
     """Return a message if the checkerboard found has markers; else an empty text."""
     seen = _markers_of_some_family(gray)
-    return f"a board with markers ({seen}) is seen, not a plain checkerboard" if seen else ""
+    found = f"a board with markers ({seen}) is seen, not a plain checkerboard: {OTHER_BOARD}"
+    return found if seen else ""
 
 
 def _why_no_checkerboard(gray: UInt8, board: Board) -> str:
@@ -78,7 +82,7 @@ def _why_no_checkerboard(gray: UInt8, board: Board) -> str:
     if other and other != tuple(sorted(board.squares)):
         return (
             f"a checkerboard of {other[1]}×{other[0]} squares is seen, "
-            f"not one of {board.squares[0]}×{board.squares[1]}"
+            f"not one of {board.squares[0]}×{board.squares[1]}: {OTHER_BOARD}"
         )
     return (
         "no checkerboard is seen: all of it must be in the image with a white margin, sharp and "
@@ -99,17 +103,19 @@ def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     on_board = (board.squares[0] * board.squares[1]) // 2
     if len(ids) >= _ENOUGH_MARKERS:
         if max(ids) >= on_board:
-            return f"marker {max(ids)} is seen, but the board has only {on_board}: another board"
+            return f"marker {max(ids)} is seen, but the board has only {on_board}: {OTHER_BOARD}"
         return (
-            f"{len(ids)} markers are seen, but too few corners between them: another number of "
-            "squares, or the board is covered or bent"
+            f"{len(ids)} markers are seen, but too few corners between them: check the number of "
+            "squares, and that the board is flat and uncovered"
         )
     seen = _markers_of_some_family(gray)
     if seen and not seen.startswith(board.dictionary[:8]):
-        return f"markers of another dictionary are seen ({seen}), not {board.dictionary}"
+        found = f"markers of another dictionary are seen ({seen}), not {board.dictionary}"
+        return f"{found}: {OTHER_BOARD}"
     other = _size(_checkerboard(gray))
     if other and not seen:
-        return f"a plain checkerboard of {other[1]}×{other[0]} squares is seen, without markers"
+        found = f"a plain checkerboard of {other[1]}×{other[0]} squares is seen, without markers"
+        return f"{found}: {OTHER_BOARD}"
     if ids:
         return f"only {len(ids)} markers are seen: come closer, or uncover and light the board"
     return "no board is seen: it must be sharp, evenly lit and large enough in the image"

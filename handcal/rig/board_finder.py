@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from handcal.rig.board import MIN_CORNERS, Board, BoardError, BoardView, Int64, charuco, corners_m
-from handcal.rig.board_diagnosis import explain_missing, why_not_plain
+from handcal.rig.board_diagnosis import OTHER_BOARD, explain_missing, why_not_plain
 from handcal.types import Float32, Float64, UInt8
 
 # In squares: corners farther than this from the place predicted by the others are rejected.
@@ -53,7 +53,7 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     if board.kind == "checkerboard" and fits.all() and _goes_on(gray, pixels, board):
         columns, rows = board.squares
         goes_on = f"the checkerboard continues: it has more squares than {columns}×{rows}"
-        raise BoardError(why_not_plain(gray) or goes_on)
+        raise BoardError(why_not_plain(gray) or f"{goes_on}; {OTHER_BOARD}")
     pixels = _refine(gray, pixels, board)
     return BoardView(
         points_m=corners_m(board)[ids],

@@ -171,7 +171,7 @@ def _explain_missing(image: UInt8, cube: Cube, ids: list[int]) -> str:
             "faces show, sharp and evenly lit"
         )
     if ids:
-        return f"marker {ids[0]} is seen, which is not on this cube"
+        return f"marker {ids[0]} is seen, which is not on this cube: show the cube described"
     return "no marker of the cube is seen: it must be in the image, sharp and evenly lit"
 
 

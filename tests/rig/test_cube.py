@@ -73,7 +73,7 @@ def test_a_pose_is_found_from_exact_corners(turn: tuple[float, ...], markers: tu
 def test_another_object_than_the_cube_is_reported() -> None:
     with pytest.raises(CubeError, match="too dark"):
         find_cube(np.zeros((360, 640), np.uint8), CUBE)
-    with pytest.raises(CubeError, match="which is not on this cube"):
+    with pytest.raises(CubeError, match="which is not on this cube: show"):
         find_cube(paint(), Cube(ids=(10, 11, 12, 13, 14, 15)))
     straight_on = rigid(translation_m=[0.0, 0.0, 0.45])
     with pytest.raises(CubeError, match=r"only one face \(marker 0\)"):

@@ -306,11 +306,8 @@ class CaptureDialog(PreparationDialog):
         if self._looked_for is None:
             self._show_failure(why)
         else:
-            advice = tr("show what is asked for, with enough light, and take it again")
             found = tr("not taken: {}").format(why)
-            self._found.show_finding(
-                Finding("", Health.LIMITED, found, "" if ": " in why else advice)
-            )
+            self._found.show_finding(Finding("", Health.LIMITED, found))
 
     def _show_camera_failure(self, why: str) -> None:
         advice = tr("press Show to open the camera again")
