@@ -49,7 +49,7 @@ _PACKAGES = (
     "PySide6-Essentials",
     "pyqtgraph",
 )
-CAMERA_EXTRAS = {"oak": ("depthai", "OAK-D"), "orbbec": ("pyorbbecsdk", "Orbbec")}
+CAMERA_EXTRAS = {"oak": ("depthai", "OAK-D"), "orbbec": ("pyorbbecsdk", "Orbbec camera")}
 """Extras that cameras need: the module of each, and the cameras."""
 _CAMERA_LATENCY_S = CalibrationSettings().camera_latency_s
 _SETTLE_S = 2.0
@@ -240,7 +240,7 @@ def _camera_extras() -> list[Finding]:
     for extra, (module, camera) in CAMERA_EXTRAS.items():
         what = f"{camera} library"
         if importlib.util.find_spec(module) is None:
-            advice = f"needed for {camera} cameras: pip install 'handcal[{extra}]'"
+            advice = f"needed for an {camera}: pip install 'handcal[{extra}]'"
             findings.append(Finding(what, Health.LIMITED, f"{module} is not installed", advice))
         else:
             findings.append(Finding(what, Health.GOOD, f"{module} is installed"))

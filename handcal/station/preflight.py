@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib.util import find_spec
@@ -18,6 +16,7 @@ from handcal.camera.ros import ros_recording
 from handcal.camera.sdk_devices import choose_device, devices_by_child, librealsense
 from handcal.errors import HandcalError, LinkError
 from handcal.hand.settings import REACH_M
+from handcal.io.files import folder_problem
 from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
@@ -135,8 +134,7 @@ def _camera(settings: StationSettings, progress: Progress) -> Finding:
         case "hololens2":
             return _hololens2(settings)
         case "oak" | "orbbec" as kind:
-            library, camera = CAMERA_EXTRAS[kind]
-            name = camera if kind == "oak" else f"{camera} camera"
+            library, name = CAMERA_EXTRAS[kind]
             if find_spec(library) is None:
                 install = f"install it: pip install 'handcal[{kind}]'"
                 return _broken(f"the library of the {name}, {library}, is missing", install)
@@ -242,11 +240,7 @@ def _sessions(settings: StationSettings) -> Finding:
         return _broken(f"{settings.sessions_path.parts[0]} is no user's folder", "choose another")
     folder = settings.sessions_path.absolute()
     there = next(path for path in (folder, *folder.parents) if path.exists())
-    if not there.is_dir():
-        return _broken(f"{there} is a file", "choose a folder")
-    if not os.access(there, os.W_OK | os.X_OK):
-        return _broken(f"cannot write to {there}", "choose another folder")
-    if shutil.disk_usage(there).total == 0:  # such as /proc, which lets its owner write
-        return _broken(f"nothing can be stored in {there}", "choose another folder")
+    if (problem := folder_problem(folder)) is not None:
+        return _broken(*problem)
     disk = examine_disk(there)
     return disk if there == folder else replace(disk, found=f"{disk.found}; will be created")

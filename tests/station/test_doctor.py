@@ -183,7 +183,7 @@ def test_a_missing_camera_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("what", "module", "extra"),
-    [("OAK-D library", "depthai", "oak"), ("Orbbec library", "pyorbbecsdk", "orbbec")],
+    [("OAK-D library", "depthai", "oak"), ("Orbbec camera library", "pyorbbecsdk", "orbbec")],
 )
 def test_the_libraries_of_other_cameras(
     what: str, module: str, extra: str, monkeypatch: pytest.MonkeyPatch
