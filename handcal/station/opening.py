@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,13 +11,16 @@ from handcal.camera.camera import Camera
 from handcal.camera.live import open_hololens2, open_live
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording
-from handcal.errors import CameraError
+from handcal.errors import CameraError, FileError
 from handcal.io.settings import settings_json
 from handcal.register.prior import PriorSettings
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
 from handcal.session.facts import SessionFacts
+from handcal.session.journal import JOURNAL, JOURNAL_END
+from handcal.session.record import replay
 from handcal.session.session import Session
+from handcal.session.state import SessionEvent
 from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
@@ -26,15 +31,47 @@ from handcal.station.settings import StationSettings
 from handcal.station.solve_again import stored_solve_settings
 from handcal.types import EYES, PlanName
 
+_FIRST_FILES = {"alignments", "rig.yaml", "settings.json", JOURNAL, JOURNAL_END, "lock"}
+_FIRST_EVENTS = {SessionEvent.CREATED, SessionEvent.FACTS_SAVED, SessionEvent.FINE_TUNED}
 
-def resume_or_create(settings: StationSettings, wearer: str, resume: Path | None) -> Session:
-    """Resume a session, or create one; FileError if it cannot be read or created."""
+
+@contextmanager
+def resume_or_create(
+    settings: StationSettings, wearer: str, resume: Path | None
+) -> Iterator[Session]:
+    """Resume a session, or create one, which is removed if its station cannot be opened.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read or created.
+    """
     if resume is not None:
-        return Session(resume)
+        with Session(resume) as session:
+            yield session
+        return
     rig = read_rig(settings.rig_path)
     station = settings_json(settings)
     stored = {"calibration": station.pop("calibration"), "station": station}
-    return Session.create(settings.sessions_path, rig, stored, wearer=wearer)
+    with Session.create(settings.sessions_path, rig, stored, wearer=wearer) as session:
+        try:
+            yield session
+        except BaseException:
+            session.close()
+            _discard_if_empty(session.path)
+            raise
+
+
+def _discard_if_empty(path: Path) -> None:
+    """Remove a session, unless it holds more than what a station stores as it is opened."""
+    with suppress(FileError, OSError):
+        events = {event.name for event in replay(path).journal.events}
+        files = {file.name for file in path.iterdir()}
+        if events <= _FIRST_EVENTS and files <= _FIRST_FILES:
+            (path / "alignments").rmdir()  # first: it fails if there are any
+            for name in files - {"alignments"}:
+                (path / name).unlink()
+            path.rmdir()
 
 
 def with_session_prior(

@@ -7,6 +7,7 @@ import os
 import signal
 import weakref
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import pytest
 import handcal.station.opening
 from handcal.errors import CameraError, FileError, LinkError
 from handcal.io.settings import settings_json
+from handcal.link.pairing import new_pairing_key
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.rig.example import example_rig
@@ -26,6 +28,7 @@ from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.delay import DelaySettings
 from handcal.station.faults import Fault
+from handcal.station.opening import resume_or_create
 from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
@@ -270,9 +273,36 @@ def test_a_station_that_cannot_be_opened_leaves_nothing_behind(
         Station(replace(settings, rig="nowhere.yaml"))
     with pytest.raises(ValueError, match="pairing key"):
         Station(replace(settings, headset="network", port=0), resume=begun)
+    nowhere = replace(settings, headset="network", host="203.0.113.1")
+    with pytest.raises(LinkError):
+        Station(replace(nowhere, plan=PlanSettings("recommended")), pairings=new_pairing_key())
+    assert list(begun.parent.iterdir()) == [begun]
     Session(begun).close()  # the lock is free
     with pytest.raises(ValueError, match="unpack"):
         headset_of(os.getpid())
+
+
+@pytest.mark.parametrize(
+    "store",
+    [
+        lambda session: session.save_trial(
+            make_trial(example_rig().eyes["left"], "left", 0.5, np.zeros(3), np.zeros(3))
+        ),
+        lambda session: session.save_notes("wears glasses"),
+        lambda session: session.record("link"),
+        lambda session: (session.path / "mine.txt").touch(),
+        lambda session: (session.path / "alignments" / "1.npz").touch(),
+    ],
+    ids=["trial", "notes", "event", "file", "alignment"],
+)
+def test_a_session_with_anything_in_it_is_kept_whatever_fails(
+    settings: StationSettings, store: Callable[[Session], object]
+) -> None:
+    with suppress(LinkError), resume_or_create(settings, "Ada", None) as session:
+        store(session)
+        files = set(session.path.rglob("*"))
+        raise LinkError("the headset did not start")
+    assert files <= set(session.path.rglob("*"))
 
 
 def test_a_resumed_session_keeps_the_prior_it_began_with(
