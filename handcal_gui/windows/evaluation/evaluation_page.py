@@ -63,6 +63,7 @@ class EvaluationPage(QWidget):
         self._entries = entries
         self._readiness: Readiness | None = None
         self._failure = self._waits_for = ""
+        self._is_done = False
         self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
@@ -79,7 +80,7 @@ class EvaluationPage(QWidget):
         self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
         for prepare in self._preparing:
-            prepare.closed.connect(self._restart)
+            prepare.closed.connect(self._take_entries)
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._change_busy)
         self._look.answered.connect(self._on_readiness)
@@ -98,7 +99,7 @@ class EvaluationPage(QWidget):
     def run(self) -> None:
         """Start or resume the evaluation."""
         entries = self._entries
-        self._failure = ""
+        self._failure, self._is_done = "", False
         self._results.show_outcome(None)
         self._bar.run(
             tr("Starting"),
@@ -128,12 +129,12 @@ class EvaluationPage(QWidget):
         self._ask()
 
     def _on_entries_changed(self) -> None:
-        self._restart(self.form.take(self._entries))
-
-    def _restart(self, entries: Any) -> None:
-        self._entries = entries
-        self._failure = ""
         self._results.show_outcome(None)
+        self._take_entries(self.form.take(self._entries))
+
+    def _take_entries(self, entries: Any) -> None:
+        self._entries = entries
+        self._failure, self._is_done = "", False
         self._ask()
 
     def _ask(self) -> None:
@@ -156,6 +157,7 @@ class EvaluationPage(QWidget):
 
     def _show_outcome(self, outcome: Outcome) -> None:
         self._results.show_outcome(outcome)
+        self._is_done = True
         self._refresh()
 
     def _show_failure(self, why: str) -> None:
@@ -189,7 +191,7 @@ class EvaluationPage(QWidget):
         if self._waits_for:
             found = tr("{} is running").format(self._waits_for)
             return Finding("", Health.LIMITED, found, tr("only one can run at a time"))
-        if not self._results.is_empty:
+        if self._is_done:
             return Finding("", Health.GOOD, tr("Done"))
         return self._readiness.finding if self._readiness else None
 

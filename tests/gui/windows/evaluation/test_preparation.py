@@ -82,6 +82,21 @@ def test_prepared_data_is_checked_again(
     assert window.entries.noise == dialog.entries
 
 
+def test_a_result_stays_until_it_is_made_again_with_what_was_prepared(
+    qtbot: QtBot, window: EvaluationWindow, entries: NoiseStudySettings
+) -> None:
+    run, found = child(window, QPushButton, "run"), child(window, QLabel, "readinessFound")
+    lead = child(window, QLabel, "lead")
+    qtbot.waitUntil(run.isEnabled)
+    run.click()
+    qtbot.waitUntil(lambda: found.text() == "Done." and run.isEnabled())
+    open_dialog(window).accept()
+    qtbot.waitUntil(lambda: "contains the complete study" in found.text())
+    assert (lead.text(), lead.isVisible()) == ("Squares grow.", True)
+    window.page.form.enter(seed=2)
+    assert not lead.isVisible(), "that of other entries"
+
+
 def test_it_closes_with_the_window_which_remembers_it(
     window: EvaluationWindow, entries: NoiseStudySettings
 ) -> None:
