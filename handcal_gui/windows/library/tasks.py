@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from handcal.errors import CancelledError, FileError, InUseError
 from handcal.progress import Progress
@@ -24,6 +25,8 @@ from handcal_gui.widgets.sentence import with_advice
 from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.library.sessions_model import SessionRow, make_row
 
+Change: TypeAlias = Mapping[Path, str] | tuple[Path, ...]
+"""What undoes a change of sessions: their former names, or their places after a deletion."""
 _MOST_NAMED = 3
 _MOST_LINES = 8
 _RUNS_HERE = tr("{} is running in this window. Finish it first.")
@@ -107,6 +110,31 @@ def correct_names(names: Mapping[Path, str], progress: Progress) -> str:
     is_named = any(name.strip() for name in names.values())
     said = tr("Name corrected in {}.") if is_named else tr("Name removed from {}.")
     return _with_lines(said.format(count), lines)
+
+
+def undo(change: Change, progress: Progress) -> str:
+    """Bring back former names or deleted sessions; return a message."""
+    if isinstance(change, Mapping):
+        return correct_names(change, progress)
+    return restore_sessions(change, progress)
+
+
+def undoable(changes: Sequence[Change], contents: Contents) -> list[Change]:
+    """Return what is left to undo of changes, in their order."""
+    wearers = {row.entry.path: row.entry.wearer for row in contents.rows}
+    restorable = {path.parent.parent / path.name for path in contents.deleted}
+    left: list[Change] = [
+        {
+            path: name
+            for path, name in change.items()
+            # Else it was not corrected, is undone, or is gone.
+            if path in restorable or wearers.get(path, name) != name
+        }
+        if isinstance(change, Mapping)
+        else tuple(path for path in change if path in contents.deleted)
+        for change in changes
+    ]
+    return list(filter(None, left))
 
 
 def _each(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -44,13 +44,15 @@ from handcal_gui.widgets.session_rows import RESUME_HELP
 from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
+    Change,
     Contents,
     check_sessions,
     correct_names,
     delete_sessions,
     read_contents,
     repair_beside,
-    restore_sessions,
+    undo,
+    undoable,
 )
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of, trend_text
 
@@ -89,8 +91,7 @@ class LibraryWindow(QDialog):
         self.setWindowTitle(tr("Sessions"))
         self._folder = folder
         self._contents = Contents()
-        self._deleted_last: tuple[Path, ...] = ()
-        self._former_names: dict[Path, str] = {}
+        self._changes: list[Change] = [()]
         self._is_read = False
         self._sessions = SessionsModel()
         self._search = with_name(QLineEdit(), "search", tr("Search"))
@@ -144,20 +145,12 @@ class LibraryWindow(QDialog):
 
     def _show(self, contents: Contents) -> None:
         before, self._contents = self._contents, contents
-        deleted = [path for path in contents.deleted if path not in before.deleted]
-        kept = [path for path in self._deleted_last if path in contents.deleted]
-        self._deleted_last = tuple(
-            (self._is_read and deleted) or kept or contents.deleted[-1:]  # together, or the newest
-        )
+        if self._is_read:  # those that were deleted together are restored together
+            self._changes.append(tuple(p for p in contents.deleted if p not in before.deleted))
+        self._changes = undoable(self._changes, contents) or [contents.deleted[-1:]]
         shown = {row.entry.path for row in before.rows}
         made = {row.entry.path for row in contents.rows} - shown if self._is_read else set()
         self._is_read = True
-        wearers = {row.entry.path: row.entry.wearer for row in contents.rows}
-        self._former_names = {
-            path: name
-            for path, name in self._former_names.items()
-            if wearers.get(path, name) != name  # else it was not corrected, or is undone
-        }
         if contents.rows != before.rows:
             self._sessions.show_rows(contents.rows)
             self._table.fit_columns()
@@ -200,15 +193,16 @@ class LibraryWindow(QDialog):
         self._show_trend(chosen[0].wearer if chosen else "")
 
     def _refresh_undo(self) -> None:
-        """Offer to undo the correction made in this window, else the last deletion."""
-        if self._former_names:
-            names = ", ".join(sorted({name or NOTHING for name in self._former_names.values()}))
+        """Offer to undo the last change made in this window, else the last deletion."""
+        last = self._changes[-1]
+        if isinstance(last, Mapping):
+            names = ", ".join(sorted({name or NOTHING for name in last.values()}))
             verb, text = tr("&Undo"), tr("Name before: {}").format(names)
         else:
-            count = len(self._deleted_last)
+            count = len(last)
             sessions = pluralize(count, tr("session"), tr("sessions"))
-            last = self._contents.last if count == 1 else sessions
-            verb, text = tr("Re&store"), tr("Last deleted: {}").format(last) if count else ""
+            name = self._contents.last if count == 1 else sessions
+            verb, text = tr("Re&store"), tr("Last deleted: {}").format(name) if count else ""
         self._undo.setText(verb)
         self._undo.setToolTip(plain_tooltip(tr("{} (Ctrl+Z)").format(text)))
         self._undo.setVisible(bool(text))
@@ -242,7 +236,6 @@ class LibraryWindow(QDialog):
         self._start(partial(repair_beside, self.chosen[0].path))
 
     def _delete_chosen(self) -> None:
-        self._former_names = {}
         self._start(partial(delete_sessions, [entry.path for entry in self.chosen]))
 
     def _ask_name(self) -> None:
@@ -270,7 +263,7 @@ class LibraryWindow(QDialog):
         dialog.open()
 
     def _correct_names(self, entries: Sequence[LibraryEntry], name: str) -> None:
-        self._former_names = {entry.path: entry.wearer for entry in entries}
+        self._changes.append({entry.path: entry.wearer for entry in entries})
         self._start(partial(correct_names, {entry.path: name for entry in entries}))
 
     def _show_folder_of_chosen(self) -> None:
@@ -282,10 +275,7 @@ class LibraryWindow(QDialog):
         copy_text(self._table, "\n".join(paths), tr("Copied: {}").format(count))
 
     def _undo_last(self) -> None:
-        if self._former_names:
-            self._start(partial(correct_names, self._former_names))
-        else:
-            self._start(partial(restore_sessions, self._deleted_last))
+        self._start(partial(undo, self._changes[-1]))
 
     def _start(self, work: Work) -> None:
         if not self._jobs.is_busy:

@@ -125,6 +125,28 @@ def test_a_name_is_corrected_and_brought_back(
     assert answer_name(qtbot, window, "Eve")[:2] == ["Ada", "ada"]  # former names are offered
 
 
+def test_changes_are_undone_one_after_the_other(qtbot: QtBot, window: LibraryWindow) -> None:
+    choose(window, "Bea")
+    answer_name(qtbot, window, "Eve")
+    qtbot.waitUntil(lambda: "Eve" in wearers(window), timeout=PATIENCE_MS)
+    undo = child(window, QPushButton, "restoreSession")
+    both = ["Ada", "Ada"]
+
+    def wait_until_left(left: list[str]) -> None:
+        qtbot.waitUntil(lambda: sorted(wearers(window)) == left, timeout=PATIENCE_MS)
+
+    for deleted, left in ((["Ada"], ["Cid", "Eve"]), (["Eve", "Cid"], [])):
+        choose(window, *deleted)
+        press(window, "deleteSessions")
+        wait_until_left(left)
+        qtbot.waitUntil(undo.isEnabled, timeout=PATIENCE_MS)
+    for left in (["Cid", "Eve"], [*both, "Cid", "Eve"], [*both, "Bea", "Cid"]):
+        undo.click()
+        wait_until_left(left)
+        qtbot.waitUntil(lambda: undo.isEnabled() or undo.isHidden(), timeout=PATIENCE_MS)
+    assert undo.isHidden()
+
+
 def test_an_emptied_name_is_said_to_be_removed(qtbot: QtBot, window: LibraryWindow) -> None:
     choose(window, "Bea")
     answer_name(qtbot, window, " ")
@@ -162,7 +184,7 @@ def test_a_name_is_no_markup(qtbot: QtBot, window: LibraryWindow) -> None:
     qtbot.waitUntil(lambda: window.chosen[0].wearer == "<b>Bea", timeout=PATIENCE_MS)
     index = table(window).selectionModel().selectedRows()[0]
     assert "&lt;b&gt;Bea" in index.data(Qt.ItemDataRole.ToolTipRole)
-    window._former_names = {window.chosen[0].path: "<b>Bea"}
+    window._changes = [{window.chosen[0].path: "<b>Bea"}]
     window._refresh()
     assert "Name before: &lt;b&gt;Bea" in child(window, QPushButton, "restoreSession").toolTip()
     [told] = [one for one in window.findChildren(QLabel) if one.text() == "Name before: <b>Bea"]
