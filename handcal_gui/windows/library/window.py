@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QInputDialog,
+    QLabel,
     QLineEdit,
     QPushButton,
     QSplitter,
@@ -28,6 +29,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text, limit_length
 from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.error_bars import PICTURE_HELP, PICTURE_LEGEND
 from handcal_gui.widgets.fields import (
     button,
     choice,
@@ -99,6 +101,7 @@ class LibraryWindow(QDialog):
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
         self._table = SessionsTable(self._sessions)
+        self._legend = with_name(QLabel(PICTURE_LEGEND), "legend", help_text=PICTURE_HELP)
         self._count = paragraph("count", tr("Reading {}…").format(folder))
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(_TREND_PX)
@@ -151,6 +154,7 @@ class LibraryWindow(QDialog):
         shown = {row.entry.path for row in before.rows}
         made = {row.entry.path for row in contents.rows} - shown if self._is_read else set()
         self._is_read = True
+        self._legend.setVisible(any(row.entry.eyes for row in contents.rows))
         if contents.rows != before.rows:
             self._sessions.show_rows(contents.rows)
             self._table.fit_columns()
@@ -368,7 +372,7 @@ class LibraryWindow(QDialog):
         actions = hbox(1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
-            hbox((self._search, 1), self._kind, spacing=SPACING_PX),
+            hbox((self._search, 1), self._kind, self._legend, spacing=SPACING_PX),
             (halves, 1),
             counts,
             self._said,

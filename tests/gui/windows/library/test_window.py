@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
-from handcal.session.library import LibraryEntry, read_library
+from handcal.session.library import LibraryEntry, delete_session, read_library
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel, make_row
@@ -44,6 +44,17 @@ def test_the_newest_is_first_and_measured_is_not_expected(window: LibraryWindow)
     assert newer[5:7] == ["– / –", "8.0 / 8.0"]
     assert rows(window)[0][4] == "Not solved"
     assert rows(window)[0][8] == "Damaged: 1 part"
+
+
+def test_the_bars_have_a_key_while_there_are_any(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    key = child(window, QLabel, "legend")
+    assert (key.text(), key.isVisible()) == ("Bars: error before, after", True)
+    for name in ("ada-1", "ada-2", "bea"):
+        delete_session(folder / name)
+    window.reload()
+    qtbot.waitUntil(key.isHidden, timeout=PATIENCE_MS)
 
 
 def test_search_filter_and_sorting(window: LibraryWindow) -> None:
