@@ -59,9 +59,9 @@ def light_trouble(gray: UInt8) -> str:
     if high - low >= 25:
         return ""
     if high < 60:
-        return "the image is too dark: add light, or expose longer"
+        return "the image is too dark: add light, or lengthen the exposure"
     if low > 195:
-        return "the image is too bright: take light away, or expose shorter"
+        return "the image is too bright: dim the light, or shorten the exposure"
     return "the image has no contrast: uncover and focus the lens, and see to the light"
 
 

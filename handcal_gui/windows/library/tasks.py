@@ -123,13 +123,12 @@ def undoable(changes: Sequence[Change], contents: Contents) -> list[Change]:
     """Return what is left to undo of changes, in their order."""
     wearers = {row.entry.path: row.entry.wearer for row in contents.rows}
     restorable = {path.parent.parent / path.name for path in contents.deleted}
+
+    def is_renamed(path: Path, former: str) -> bool:
+        return path in restorable or wearers.get(path, former) != former
+
     left: list[Change] = [
-        {
-            path: name
-            for path, name in change.items()
-            # Else it was not corrected, is undone, or is gone.
-            if path in restorable or wearers.get(path, name) != name
-        }
+        {path: name for path, name in change.items() if is_renamed(path, name)}
         if isinstance(change, Mapping)
         else tuple(path for path in change if path in contents.deleted)
         for change in changes

@@ -74,7 +74,7 @@ def test_it_takes_what_is_missing_and_asks_again_where_nothing_is_seen(tmp_path:
         "centre/pose-1: show the virtual cube, cover the real one (a)",
     ]
     assert said[1:] == [
-        "Not taken: the image is too dark: add light, or expose longer",
+        "Not taken: the image is too dark: add light, or lengthen the exposure",
         "centre/pose-1/real.png: 3 faces of the cube",
         "centre/pose-1/virtual-a.png: 3 faces of the cube",
     ]

@@ -196,7 +196,7 @@ def test_an_image_in_which_nothing_is_seen_is_not_kept(
     technician.start()
     technician.put(np.zeros((360, 640, 3), np.uint8))
     technician.button.click()
-    told = "Not taken: the image is too dark: add light, or expose longer."
+    told = "Not taken: the image is too dark: add light, or lengthen the exposure."
     technician.wait(lambda: technician.said == told)
     technician.wait(technician.button.isEnabled)
     assert technician.told == "centre/pose-1: switch the display off."
