@@ -26,7 +26,7 @@ from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.library.sessions_model import SessionRow, make_row
 
 Change: TypeAlias = Mapping[Path, str] | tuple[Path, ...]
-"""What undoes a change of sessions: their former names, or their places after a deletion."""
+"""The reverse of a change: former names of sessions, or the places of deleted ones."""
 _MOST_NAMED = 3
 _MOST_LINES = 8
 _RUNS_HERE = tr("{} is running in this window. Finish it first.")
