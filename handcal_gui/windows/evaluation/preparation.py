@@ -38,7 +38,7 @@ class Preparation:
     name: str = "prepare"
     """Object name of the button."""
     request: str = ""
-    """What to enter first, in a sentence; shown while the dialog cannot be opened."""
+    """Sentence that asks for what to enter first; shown while the dialog cannot be opened."""
 
 
 class PreparationButton(QPushButton):
