@@ -48,7 +48,7 @@ class NumberTable(QTableWidget):
         table scrolls.
     wraps : bool
         Where not all columns fit, uncertainties, units and parts of headings have their own lines;
-        otherwise only the units of headings have.
+        without it, only the units of headings.
     """
 
     def __init__(

@@ -52,7 +52,9 @@ def test_what_is_not_kept_is_explained(moment: list[BoardView | None], why: str)
         ([None, None], " by the depth camera and the headset camera"),
     ],
 )
-def test_the_cameras_that_do_not_see_the_board_are_named(moment: list[BoardView | None], by: str) -> None:
+def test_the_cameras_that_do_not_see_the_board_are_named(
+    moment: list[BoardView | None], by: str
+) -> None:
     selector = ViewSelector(cameras=["depth camera", "headset camera"])
     assert selector.consider(moment).startswith(f"the board is not seen{by}: bring it")
 
