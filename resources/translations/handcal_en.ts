@@ -4892,10 +4892,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>show what is asked for, with enough light, and take it again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>not taken: {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6201,14 +6197,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Take an image whenever the board is at rest, sharp, and at a position not covered by earlier images.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>the board is not seen by the {}: bring it into view, and see to focus and light</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source> and the </source>
         <translation type="unfinished"></translation>
     </message>
     <message>
