@@ -215,7 +215,7 @@ class Wizard:
                 tr("Now repeat this with {}.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("F&inish with one eye")),),
+                (ButtonSpec(Action.NEXT, tr("Fini&sh with one eye")),),
                 runs_after_s=READ_S,
             )
         each = (
@@ -247,7 +247,7 @@ class Wizard:
                 tr("Not accepted yet: align {} again, or keep the result as it is.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
+                (ButtonSpec(Action.NEXT, tr("Keep a&s it is")), *each),
                 runs_after_s=ADVICE_S if few else None,
             )
         if not is_usable:
@@ -256,7 +256,7 @@ class Wizard:
                 tr("Do not use this result. Follow the advice below, then add alignments."),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add alignment")),
-                (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
+                (ButtonSpec(Action.NEXT, tr("Keep a&s it is")), *each),
             )
         if not self._skipped:
             return WizardView(
