@@ -168,7 +168,6 @@ def solve_view(snapshot: Snapshot) -> WizardView:
         (aligned, *verdicts),
         send,
         others,
-        snapshot.problem,
         runs_after_s=READ_S,
     )
 
@@ -250,7 +249,6 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         preconditions,
         ButtonSpec(Action.FINISH, tr("Finish session")),
         others,
-        snapshot.problem,
         fact=kept_fact(snapshot.procedure),
         runs_after_s=None if snapshot.problem else READ_S,
         unearned=unearned,
