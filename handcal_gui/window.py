@@ -11,11 +11,8 @@ from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, Signal
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
-    QColor,
     QKeyEvent,
     QKeySequence,
-    QPainter,
-    QPaintEvent,
     QResizeEvent,
 )
 from PySide6.QtWidgets import (
@@ -25,7 +22,6 @@ from PySide6.QtWidgets import (
     QDockWidget,
     QMainWindow,
     QStackedWidget,
-    QStatusBar,
     QWidget,
 )
 
@@ -43,8 +39,9 @@ from handcal_gui.docks import (
     share_room,
 )
 from handcal_gui.pages.start.start_page import StartPage
+from handcal_gui.pages.wizard.action_bar import BottomStrip
 from handcal_gui.pages.wizard.wizard import WizardPanel
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px
+from handcal_gui.theme import SPACING_PX, follow_theme, font_px
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
@@ -114,7 +111,7 @@ class MainWindow(QMainWindow):
         self._middle = vbox(self.banner, (self._stack, 1), on=middle, margins=margins)
         self.setCentralWidget(middle)
         self._bar = wizard.bar
-        self.setStatusBar(_Strip(self._bar))
+        self.setStatusBar(BottomStrip(self._bar))
         self._docks = make_docks(self, panels)
         PanelLetters(self._docks, self)
         self._leave_titles_to_tabs = partial(leave_titles_to_tabs, self, self._docks)
@@ -370,23 +367,6 @@ class MainWindow(QMainWindow):
         for button in self.findChildren(QAbstractButton):
             if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
                 button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-
-
-class _Strip(QStatusBar):
-    """The window's bottom strip, below all docks; holds a bar and nothing else."""
-
-    def __init__(self, bar: QWidget) -> None:
-        super().__init__()
-        self.setSizeGripEnabled(False)  # it appears and disappears, and moves the bar
-        self.setContentsMargins(0, 0, 0, 0)
-        self.addPermanentWidget(bar, 1)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw a line above the bar."""
-        painter = QPainter(self)
-        painter.setPen(QColor(colors().muted))
-        painter.drawLine(0, 0, self.width(), 0)
-        painter.end()
 
 
 def _press(widget: QWidget | None) -> None:
