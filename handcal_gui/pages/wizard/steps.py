@@ -208,7 +208,8 @@ class Wizard:
                 ButtonSpec(Action.SOLVE, tr("Solve")),
                 (ButtonSpec(Action.ANOTHER, tr("&Add alignment")),),
             )
-        if not self._is_complete(snapshot):
+        is_usable = not any(one.verdict in UNUSABLE for one in preconditions)
+        if is_usable and not self._is_complete(snapshot):
             eyes = eye_names(self.eyes(snapshot))
             return WizardView(
                 Step.VERIFY,
@@ -222,7 +223,6 @@ class Wizard:
             ButtonSpec(Action.REPEAT_LEFT, tr("Add &left eye")),
             ButtonSpec(Action.REPEAT_RIGHT, tr("Add &right eye")),
         )
-        is_usable = not any(one.verdict in UNUSABLE for one in preconditions)
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
             return WizardView(
