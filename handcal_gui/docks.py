@@ -199,6 +199,16 @@ def share_room(window: QMainWindow, docks: Docks, page_px: int | None) -> None:
     window.resizeDocks([docks["results"], docks["fine_tune"]], [results, height - results], down)
 
 
+def widen_page(window: QMainWindow, docks: Docks, by_px: float) -> None:
+    """Take a width from the columns of docks beside the page, in proportion to theirs."""
+    in_sight = [dock for dock in docks.values() if dock.isVisible() and is_in_sight(dock)]
+    of_areas = {window.dockWidgetArea(dock): dock for dock in in_sight if not dock.isFloating()}
+    columns = [of_areas[area] for area in (_LEFT, _RIGHT) if area in of_areas]
+    share = by_px / max(sum(dock.width() for dock in columns), 1)
+    widths = [int(dock.width() * (1.0 - share)) for dock in columns]
+    window.resizeDocks(columns, widths, Qt.Orientation.Horizontal)
+
+
 def has_columns(window: QMainWindow, docks: Docks) -> bool:
     """Return whether docks are on both sides of the page; in a small window all are tabs."""
     return window.dockWidgetArea(docks["results"]) is _RIGHT

@@ -5,17 +5,16 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import inf
 from typing import Literal
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, Qt, Signal
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
-    QColor,
     QKeyEvent,
     QKeySequence,
-    QPainter,
-    QPaintEvent,
+    QMouseEvent,
     QResizeEvent,
 )
 from PySide6.QtWidgets import (
@@ -25,7 +24,6 @@ from PySide6.QtWidgets import (
     QDockWidget,
     QMainWindow,
     QStackedWidget,
-    QStatusBar,
     QWidget,
 )
 
@@ -41,10 +39,12 @@ from handcal_gui.docks import (
     leave_titles_to_tabs,
     make_docks,
     share_room,
+    widen_page,
 )
 from handcal_gui.pages.start.start_page import StartPage
+from handcal_gui.pages.wizard.action_bar import BottomStrip
 from handcal_gui.pages.wizard.wizard import WizardPanel
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px
+from handcal_gui.theme import SPACING_PX, follow_theme, font_px
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
@@ -52,9 +52,12 @@ from handcal_gui.widgets.placement import keep_on_screen
 
 Page = Literal["start", "live", "review"]
 Arrangement = Literal["panels", "station"]
-_LAYOUT_VERSION = 2
+_SHARED, _OWN = 3, 2
+"""Versions of stored layouts: divided by the program, or by the user, who dragged a splitter."""
 _SMALL = 100.0, 57.5
 """Width and height below which all docks of a window are tabs, in sizes of the font."""
+_SETTLED_MS = 100
+"""Time without a new size after which the panels share it: that takes as long as a resize."""
 _GUIDE = 40.0
 """Width, in sizes of the font, that the guide needs at every step."""
 _REVIEW_PERCENT = 36
@@ -114,7 +117,7 @@ class MainWindow(QMainWindow):
         self._middle = vbox(self.banner, (self._stack, 1), on=middle, margins=margins)
         self.setCentralWidget(middle)
         self._bar = wizard.bar
-        self.setStatusBar(_Strip(self._bar))
+        self.setStatusBar(BottomStrip(self._bar))
         self._docks = make_docks(self, panels)
         PanelLetters(self._docks, self)
         self._leave_titles_to_tabs = partial(leave_titles_to_tabs, self, self._docks)
@@ -123,7 +126,10 @@ class MainWindow(QMainWindow):
             dock.installEventFilter(self)
             dock.visibilityChanged.connect(self._titles_timer.start)
             dock.dockLocationChanged.connect(self._titles_timer.start)
-        self._widen_soon = fit_soon(self._widen_guide, self)
+            dock.topLevelChanged.connect(self._own_layout)
+        self._is_own, self._least_px = False, inf
+        self._share_soon = fit_soon(self._share_room, self)
+        self._share_soon.setInterval(_SETTLED_MS)
         self._layouts: dict[Page, QByteArray] = {}
         self._page: Page = "start"
         self._arrangement: Arrangement = "panels"
@@ -131,7 +137,7 @@ class MainWindow(QMainWindow):
         self._default_layouts: dict[bool, QByteArray] = {}
         for is_small in (True, False):
             arrange_docks(self, self._docks, is_small=is_small)
-            self._default_layouts[is_small] = self.saveState(_LAYOUT_VERSION)
+            self._default_layouts[is_small] = self.saveState(_SHARED)
         self._make_menus()
         self._keep_focus_off_clicked_buttons()
         self.show_page("start")
@@ -184,11 +190,8 @@ class MainWindow(QMainWindow):
             dock.toggleViewAction().setEnabled(belongs)
             self._go_to[name].setEnabled(belongs)
         if page not in self._layouts:
-            least_px = self._pages["review"].minimumSizeHint().width() + 5 * SPACING_PX
-            review_px = max(least_px, self.width() * _REVIEW_PERCENT // 100)
-            share_room(self, self._docks, review_px if page == "review" else None)
             self._docks["results"].raise_()
-        self._widen_guide()
+        self._share_room()
         self._leave_titles_to_tabs()
         self._find_least_size()
         if self.size() != size_px:  # Qt enlarges a window for its docks
@@ -218,6 +221,7 @@ class MainWindow(QMainWindow):
     def reset_layout(self) -> None:
         """Restore the default layout of the page's docks."""
         self._layouts.pop(self._page, None)
+        self._least_px = inf
         page, self._page = self._page, "start"  # so that the current layout is not saved
         self.show_page(page)
 
@@ -232,7 +236,8 @@ class MainWindow(QMainWindow):
         """Restore the layouts of an earlier run; those that do not fit are ignored."""
         for page, text in layouts.items():
             state = QByteArray.fromBase64(text.encode())
-            if page in _DOCKS_OF_PAGE and self.restoreState(state, _LAYOUT_VERSION):
+            versions = (_SHARED, _OWN) if page in _DOCKS_OF_PAGE else ()
+            if any(self.restoreState(state, version) for version in versions):
                 self._layouts[page] = state
         page, self._page = self._page, "start"
         self.show_page(page)
@@ -276,9 +281,13 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Pass key events to the bar, which detects keys that are held down."""
+        """Pass key events to the bar, which detects keys that are held down; note a dragging."""
         if isinstance(event, QKeyEvent):
             self._bar.notice_key(event)
+        if isinstance(event, QMouseEvent) and event.type() == QEvent.Type.MouseButtonPress:
+            self._is_own |= self.isSeparator(event.position().toPoint())
+        elif event.type() == QEvent.Type.MouseButtonRelease and self._is_own:
+            self._least_px = self._stack.width()
         return super().event(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -294,9 +303,9 @@ class MainWindow(QMainWindow):
         return super().eventFilter(watched, event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leave the guide its usual width in a window that is made narrower."""
+        """Share the new room, once the window is no longer being resized."""
         super().resizeEvent(event)
-        self._widen_soon.start()
+        self._share_soon.start()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Emit `closing` before the window closes, if it may."""
@@ -308,7 +317,7 @@ class MainWindow(QMainWindow):
 
     def _keep_layout(self) -> None:
         if self._docks_of_page:
-            self._layouts[self._page] = self.saveState(_LAYOUT_VERSION)
+            self._layouts[self._page] = self.saveState(_OWN if self._is_own else _SHARED)
 
     def _restore_layout(self, page: Page, *, is_small: bool) -> None:
         """Restore a page's layout, or the default where it needs a larger screen."""
@@ -316,24 +325,35 @@ class MainWindow(QMainWindow):
         room_px = self.screen().availableSize() - (self.frameGeometry().size() - size_px)
         default = self._default_layouts[is_small]
         hide_tabs(self)
-        self.restoreState(self._layouts.get(page, default), _LAYOUT_VERSION)
+        layout = self._layouts.get(page, default)
+        self._is_own = self.restoreState(layout, _OWN)
+        self.restoreState(layout, _SHARED)  # or nothing, where it is the user's
         is_unfit = self.minimumSizeHint().boundedTo(room_px) != self.minimumSizeHint()
-        if is_small and has_columns(self, self._docks):
-            is_unfit |= self._is_guide_narrow()
+        is_unfit |= is_small and has_columns(self, self._docks) and self._missing_px() > 0
         if is_unfit:
             if self._docks_of_page:  # or it is kept, for the arrangement with panels
                 self._layouts.pop(page, None)
-            self.restoreState(default, _LAYOUT_VERSION)
+            self.restoreState(default, _SHARED)
+            self._is_own = False
             self._find_least_size()
             self.resize(size_px)  # Qt has enlarged it
 
-    def _is_guide_narrow(self) -> bool:
-        return self._page == "live" and self._stack.width() < _GUIDE * font_px()
+    def _missing_px(self) -> float:
+        """Return the width that the guide lacks."""
+        least_px = min(_GUIDE * font_px(), self._least_px)
+        return least_px - self._stack.width() if self._page == "live" else 0.0
 
-    def _widen_guide(self) -> None:
-        """Give the guide its usual room where a layout, of a larger window, leaves it less."""
-        if self._docks_of_page and self._is_guide_narrow():
-            share_room(self, self._docks, None)
+    def _own_layout(self) -> None:
+        self._is_own = True
+
+    def _share_room(self) -> None:
+        """Divide the window as by default, or leave it, with a guide as wide as it needs to be."""
+        if self._docks_of_page and not self._is_own:
+            least_px = self._pages["review"].minimumSizeHint().width() + 5 * SPACING_PX
+            review_px = max(least_px, self.width() * _REVIEW_PERCENT // 100)
+            share_room(self, self._docks, review_px if self._page == "review" else None)
+        elif (missing_px := self._missing_px()) > 0:
+            widen_page(self, self._docks, missing_px)
 
     def _find_least_size(self) -> None:
         """Compute the least size for the docks shown, at once."""
@@ -370,23 +390,6 @@ class MainWindow(QMainWindow):
         for button in self.findChildren(QAbstractButton):
             if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
                 button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-
-
-class _Strip(QStatusBar):
-    """The window's bottom strip, below all docks; holds a bar and nothing else."""
-
-    def __init__(self, bar: QWidget) -> None:
-        super().__init__()
-        self.setSizeGripEnabled(False)  # it appears and disappears, and moves the bar
-        self.setContentsMargins(0, 0, 0, 0)
-        self.addPermanentWidget(bar, 1)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw a line above the bar."""
-        painter = QPainter(self)
-        painter.setPen(QColor(colors().muted))
-        painter.drawLine(0, 0, self.width(), 0)
-        painter.end()
 
 
 def _press(widget: QWidget | None) -> None:

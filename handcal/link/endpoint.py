@@ -102,12 +102,13 @@ class Endpoint(Closable):
         """
         with self._changed:
             self._wait_for(lambda: message.state is not Delivery.PENDING, timeout_s)
-            name = message.slot.name.lower().replace("_", " ")
+            name = " ".join(reversed(message.slot.name.lower().split("_")))  # left projection
             if message.state is Delivery.SUPERSEDED:
                 raise LinkError(f"the {name} was replaced by a newer one before it arrived")
             if message.state is not Delivery.ACKED:
                 raise LinkError(
-                    f"the {name} was not acknowledged; check that the other end is still running"
+                    f"the headset did not answer: the {name} was not acknowledged; check that it "
+                    "is on and that its app runs"
                 )
 
     def close(self) -> None:

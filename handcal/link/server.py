@@ -8,7 +8,7 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from handcal.errors import FileError
+from handcal.errors import FileError, PosePendingError
 from handcal.link import greetings, messages, nudges, version1, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.clock import ClockEstimator
@@ -231,7 +231,12 @@ class HeadsetServer(Sender):
         """
         with self._changed:
             self._require_running()
-            return self._poses.at(self._clock.to_headset_ns(t_host_ns))
+            try:
+                return self._poses.at(self._clock.to_headset_ns(t_host_ns))
+            except PosePendingError:
+                if self.connected:
+                    raise
+                raise PosePendingError("the headset sends no poses") from None
 
     def statistics(self) -> LinkStatistics:
         """Return the link's counters and estimates."""

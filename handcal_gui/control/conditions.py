@@ -73,7 +73,8 @@ class Conditions:
         ended = link_problem if self._is_virtual and self._has_started else ""
         found = (
             (tr("{}; press Restart headset in Link").format(ended.rstrip(".")) if ended else "")
-            or snapshot.problem
+            or snapshot.not_stored
+            or (tr("{}; see Link").format(snapshot.problem) if snapshot.problem else "")
             or camera.problem
             or link_problem
             or (_FEW_POSES if 0.0 < link.pose_rate_hz < _FEW_POSES_HZ else "")

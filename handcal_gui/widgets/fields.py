@@ -179,8 +179,10 @@ def main_button(name: str, text: str = "") -> MainButton:
 def tool_button(action: QAction) -> QToolButton:
     """Return an action's tool button, which stands out while checked, also in the dark theme."""
     made = QToolButton()
+    if "&" in action.text():
+        action.setIconText(action.text())  # Qt leaves the letter out of its own
     made.setDefaultAction(action)
-    made.setAccessibleName(action.text())
+    made.setAccessibleName(action.text().replace("&", ""))
     set_style(
         made,
         "QToolButton:checked { background: palette(highlight); color: palette(highlighted-text);"

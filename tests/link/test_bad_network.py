@@ -48,8 +48,10 @@ def test_a_projection_that_cannot_arrive_is_clearly_refused() -> None:
             server.wait_connected(5.0)
         eventually(lambda: not server.connected)
         message = server.send_projection(Projection("left", P, 1268, 720))
-        with pytest.raises(LinkError, match="projection left was not acknowledged"):
+        with pytest.raises(LinkError, match="headset did not answer: the left projection was not"):
             server.wait_acked(message, 3.0)
+        with pytest.raises(PosePendingError, match="sends no poses"):
+            server.pose_at_host_ns(time.monotonic_ns())
         assert message.state is Delivery.FAILED
         assert server.statistics().failed == 1
 

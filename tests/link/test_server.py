@@ -277,7 +277,7 @@ def test_a_replaced_message_says_so(server: HeadsetServer) -> None:
     P = np.eye(3, 4)
     older = server.send_projection(Projection("left", P, 1268, 720))
     server.send_projection(Projection("left", P, 1268, 720))
-    with pytest.raises(LinkError, match="projection left was replaced"):
+    with pytest.raises(LinkError, match="left projection was replaced"):
         server.wait_acked(older, 1.0)
 
 

@@ -15,7 +15,7 @@ from handcal.session.session import Session
 from handcal.station.procedure import Calibration
 from handcal.station.solve_again import solve
 from handcal.station.states import ProcedureError, State
-from handcal.types import EYES, Eye, Float64, Verdict
+from handcal.types import EYES, Eye, Float64, Verdict, VerdictName
 from tests.helpers import eventually
 from tests.station.stage import (
     RIG,
@@ -53,11 +53,14 @@ def test_a_silent_headset_can_be_applied_to_again_when_it_is_back(
             np.testing.assert_array_equal(back.state().projections[eye].P, expected)
 
 
-def test_keep_leaves_the_offline_calibration_in_the_headset(stage: Stage, session: Session) -> None:
+@pytest.mark.parametrize("name", ["keep", "implausible", "contradicted"])
+def test_a_result_not_used_leaves_the_offline_calibration_in_the_headset(
+    stage: Stage, session: Session, name: VerdictName
+) -> None:
     stage.align()
     solved = stage.calibration.solve()
     verdicts: dict[Eye, Verdict] = {
-        "left": Verdict("keep", "as told"),
+        "left": Verdict(name, "as told"),
         "right": Verdict("repeat", "as told"),
     }
     stage.calibration.results = replace(solved, verdicts=verdicts)

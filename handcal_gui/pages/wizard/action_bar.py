@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QPalette
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPalette
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
@@ -12,13 +12,14 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
+    QStatusBar,
     QTextEdit,
     QWidget,
 )
 
 from handcal_gui.keys import add_action, native
 from handcal_gui.pages.wizard.view import ButtonSpec, WizardView
-from handcal_gui.theme import SPACING_PX, follow_theme
+from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import main_button, with_name
 from handcal_gui.widgets.key_cap import KeyCap
@@ -174,6 +175,23 @@ class ActionBar(QWidget):
     def _color_main(self) -> None:
         # Without a palette of its own, the button has the accent colour of its class.
         self._main.setPalette(QApplication.palette() if self._is_quiet else QPalette())
+
+
+class BottomStrip(QStatusBar):
+    """The window's bottom strip, below all docks; holds a bar and nothing else."""
+
+    def __init__(self, bar: QWidget) -> None:
+        super().__init__()
+        self.setSizeGripEnabled(False)  # it appears and disappears, and moves the bar
+        self.setContentsMargins(0, 0, 0, 0)
+        self.addPermanentWidget(bar, 1)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        """Draw a line above the bar."""
+        painter = QPainter(self)
+        painter.setPen(QColor(colors().muted))
+        painter.drawLine(0, 0, self.width(), 0)
+        painter.end()
 
 
 def _takes_text(widget: QWidget | None) -> bool:

@@ -185,7 +185,6 @@ class PlannedWizard(Wizard):
             eyes_accepted(snapshot),
             main,
             (redo,) if snapshot.procedure.alignments else (),
-            snapshot.problem,
         )
 
     def _ask_to_verify(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
@@ -212,7 +211,7 @@ class PlannedWizard(Wizard):
             text = f"{sentence(planned.text)}."
         main = ButtonSpec(Action.TAKE_STEP, _SENDING, False)
         back = (ButtonSpec(Action.BACK, tr("&Back")),)
-        return WizardView(step, text, eyes_accepted(snapshot), main, back, snapshot.problem)
+        return WizardView(step, text, eyes_accepted(snapshot), main, back)
 
     def _done(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         procedure, preconditions = snapshot.procedure, eyes_accepted(snapshot)
@@ -247,7 +246,6 @@ class PlannedWizard(Wizard):
                 ButtonSpec(Action.ANOTHER, tr("&Add alignment")),
                 *(_VERIFY_AGAIN[eye] for eye in self.usable_eyes),
             ),
-            snapshot.problem,
             fact=_drawn_otherwise(procedure) or kept_fact(procedure),
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPagedPaintDevice, QTextDocument
 from PySide6.QtWidgets import QWidget
 
@@ -44,16 +44,15 @@ class ResultBar(QWidget):
         self._record: SessionRecord | None = None
         self.card = ResultCard()
         self._blink = add_action(
-            self, tr("Blink before/after"), "", tooltip=tr("Show both in turn")
+            self, tr("Bl&ink before/after"), "", tooltip=tr("Show both in turn")
         )
         self._blink.setCheckable(True)
         self._blink.toggled.connect(self.blink_toggled)
-        actions = (
-            self._blink,
-            add_action(self, tr("Copy"), "", self.copy, tooltip=tr("Copy the result as text")),
-            add_action(self, tr("Print…"), "", self._ask_printer, tooltip=tr("Print the result")),
-        )
-        self._blink_button, *others = map(tool_button, actions)
+        copy = add_action(self, tr("Cop&y"), "", self.copy, tooltip=tr("Copy the result as text"))
+        window = Qt.ShortcutContext.WindowShortcut
+        ask = add_action(self, tr("Print the result"), "Ctrl+P", self._ask_printer, context=window)
+        ask.setIconText(tr("Print… (Ctrl+P)"))
+        self._blink_button, *others = map(tool_button, (self._blink, copy, ask))
         self.buttons = QWidget()
         hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)
         vbox(self.card, on=self, margins=0)

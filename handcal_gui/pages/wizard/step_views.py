@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handcal.register.results import USED, Results
 from handcal.report.cells import signed
 from handcal.station.snapshot import Procedure, Snapshot
 from handcal.station.states import State
@@ -39,7 +40,6 @@ _LEAST_LOOK_NS = 1_500_000_000
 _GATE_MARGIN_M = 0.05
 """From the depth gate to where the hand is to be held: its palm, with fingers before and behind."""
 _FOREARM_M = 0.45
-_SENDS_UNUSABLE = tr("Draws with a result that should not be used")
 
 
 def connect_view(snapshot: Snapshot) -> WizardView:
@@ -146,30 +146,29 @@ def solve_view(snapshot: Snapshot) -> WizardView:
             (aligned, *verdicts),
             ButtonSpec(Action.APPLY, tr("Sending…"), False),
         )
-    names = {eye: verdict.name for eye, verdict in procedure.results.verdicts.items()}
-    others: tuple[ButtonSpec, ...] = (redo,)
-    send = ButtonSpec(Action.APPLY, tr("Send to the headset"))
+    label = tr("Send to the headset")
     instruction = tr("Send the corrected projections to the headset.")
-    kept = tuple(eye for eye, name in names.items() if name == "keep")
-    if UNUSABLE.intersection(names.values()):
-        instruction = tr("Do not use this result. Follow the advice below, then repeat.")
-        send = ButtonSpec(Action.APPLY, tr("Send to the headset"), False)
-        others += (ButtonSpec(Action.APPLY, tr("Send &anyway"), discards=_SENDS_UNUSABLE),)
-    elif len(kept) == len(names):
+    kept = _kept(procedure.results)
+    if len(kept) == len(verdicts):
         instruction = tr("Keep the offline calibration of {}.").format(eye_names(kept))
-        send = ButtonSpec(Action.APPLY, tr("Keep offline"))
+        label = tr("Keep offline")
     elif kept:
         instruction = tr(
             "Send the projections to the headset; {} keeps the offline calibration."
+        ).format(eye_names(kept))
+    is_faulty = any(one.verdict in UNUSABLE for one in verdicts)
+    if is_faulty:
+        instruction = tr(
+            "Do not use this result: keep the offline calibration of {}, and follow the advice "
+            "below."
         ).format(eye_names(kept))
     return WizardView(
         Step.SOLVE,
         instruction,
         (aligned, *verdicts),
-        send,
-        others,
-        snapshot.problem,
-        runs_after_s=READ_S,
+        ButtonSpec(Action.APPLY, label),
+        (redo,),
+        runs_after_s=None if is_faulty else READ_S,
     )
 
 
@@ -250,7 +249,6 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         preconditions,
         ButtonSpec(Action.FINISH, tr("Finish session")),
         others,
-        snapshot.problem,
         fact=kept_fact(snapshot.procedure),
         runs_after_s=None if snapshot.problem else READ_S,
         unearned=unearned,
@@ -262,12 +260,18 @@ def kept_fact(procedure: Procedure) -> str:
     results = procedure.results
     if results is None or procedure.state is not State.APPLIED:
         return ""
-    kept = tuple(eye for eye, verdict in results.verdicts.items() if verdict.name == "keep")
+    kept = _kept(results)
     if not kept:
         return ""
     return tr("The headset uses the offline calibration for {}: φ is 0 there.").format(
         eye_names(kept)
     )
+
+
+def _kept(results: Results) -> tuple[Eye, ...]:
+    """Return the eyes for which the headset draws with the offline calibration."""
+    verdicts = results.verdicts
+    return tuple(eye for eye in verdicts if verdicts[eye].name not in USED)
 
 
 def _looked(text: str, shown_ns: int) -> Precondition:

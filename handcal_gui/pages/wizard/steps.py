@@ -208,21 +208,21 @@ class Wizard:
                 ButtonSpec(Action.SOLVE, tr("Solve")),
                 (ButtonSpec(Action.ANOTHER, tr("&Add alignment")),),
             )
-        if not self._is_complete(snapshot):
+        is_usable = not any(one.verdict in UNUSABLE for one in preconditions)
+        if is_usable and not self._is_complete(snapshot):
             eyes = eye_names(self.eyes(snapshot))
             return WizardView(
                 Step.VERIFY,
                 tr("Now repeat this with {}.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("F&inish with one eye")),),
+                (ButtonSpec(Action.NEXT, tr("Fini&sh with one eye")),),
                 runs_after_s=READ_S,
             )
         each = (
             ButtonSpec(Action.REPEAT_LEFT, tr("Add &left eye")),
             ButtonSpec(Action.REPEAT_RIGHT, tr("Add &right eye")),
         )
-        is_usable = not any(one.verdict in UNUSABLE for one in preconditions)
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
             return WizardView(
@@ -247,7 +247,7 @@ class Wizard:
                 tr("Not accepted yet: align {} again, or keep the result as it is.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
+                (ButtonSpec(Action.NEXT, tr("Keep a&s it is")), *each),
                 runs_after_s=ADVICE_S if few else None,
             )
         if not is_usable:
@@ -256,7 +256,7 @@ class Wizard:
                 tr("Do not use this result. Follow the advice below, then add alignments."),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add alignment")),
-                (ButtonSpec(Action.NEXT, tr("Keep as it &is")), *each),
+                (ButtonSpec(Action.NEXT, tr("Keep a&s it is")), *each),
             )
         if not self._skipped:
             return WizardView(

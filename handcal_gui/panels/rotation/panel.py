@@ -61,6 +61,8 @@ class RotationPanel(QWidget):
         self._limit_line = self._plot.add_line("red", dashed=True)
         self._angle_line = self._plot.add_line("live")
         self._limit_rad = 0.0
+        self._refused = ("", "")
+        self._fitted: object = None
         self._lay_out()
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
@@ -81,6 +83,7 @@ class RotationPanel(QWidget):
         elif observation is not None:
             self._show_observation(observation)
             self._show_history(1e-9 * snapshot.t_host_ns, observation.rotation_rad)
+        self._fit()
 
     def _show_observation(self, observation: Observation) -> None:
         if observation.rotation_rad is None:
@@ -136,16 +139,30 @@ class RotationPanel(QWidget):
 
     def _show_refusals(self, count: int, last: str) -> None:
         """Show the count of the journal, which the report shows too, and the last reason."""
-        if not count and not last:
-            self._refusals.setText(tr("No confirmation refused."))
-        else:
+        refused = tr("No confirmation refused.")
+        if count or last:
             # The journal may follow the refusal by a frame.
-            refused = pluralize(max(count, 1), tr("confirmation"), tr("confirmations"))
-            self._refusals.setText(tr("{} refused. {}").format(refused, sentence(last)).strip())
+            counted = pluralize(max(count, 1), tr("confirmation"), tr("confirmations"))
+            refused = tr("{} refused.").format(counted)
+        self._refused = refused, f"{refused} {sentence(last)}".strip()
+
+    def _fit(self) -> None:
+        """Leave out what there is no room for: the last refusal's reason, then the history."""
+        advice_px = self._advice.heightForWidth(self._advice.width())
+        if self._fitted == (fitted := (self.size(), advice_px, self._refused)):
+            return
+        self._fitted = fitted
+        count, reason = self._refused
+        self._refusals.setToolTip(reason)
+        for refused, has_history in ((reason, True), (count, True), (count, False)):
+            self._refusals.setText(refused)
+            self._plot.setVisible(has_history)
+            if self._box.minimumHeightForWidth(self.width()) <= self.height():
+                break
 
     def _lay_out(self) -> None:
         top = hbox((self._dial, 3), (self._hand, 2), spacing=SPACING_PX)
-        vbox(
+        self._box = vbox(
             (top, 3),
             self._advice,
             (self._plot, 2),
@@ -164,5 +181,5 @@ def _text_label(name: str, scale: float = 1.0) -> QLabel:
     label.setWordWrap(True)
     label.setAlignment(Qt.AlignmentFlag.AlignTop)
     scale_font(label, scale)
-    label.setMinimumHeight(2 * label.fontMetrics().lineSpacing())
+    label.setMinimumHeight(2 * label.fontMetrics().lineSpacing() + 2)
     return label

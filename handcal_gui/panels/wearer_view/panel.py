@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import QSize
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QCheckBox, QHBoxLayout, QLabel, QWidget
 
@@ -74,6 +75,14 @@ class WearerViewPanel(QWidget):
             is_solved = procedure.results is not None and eye in procedure.results.eyes
             column.show_view(snapshot.views.get(eye), message, is_solved=is_solved)
         show_alike([column.canvas for column in self._eyes.values()])
+
+    def minimumSizeHint(self) -> QSize:
+        """Return that of eyes side by side: where there is little height, they stand so."""
+        size = super().minimumSizeHint()
+        if self._both.direction() is QBoxLayout.Direction.TopToBottom:
+            one_px = self._eyes["left"].minimumSizeHint().height()
+            size.setHeight(size.height() - one_px - self._both.spacing())
+        return size
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Place the eyes side by side, or one below the other if that makes them larger."""

@@ -79,8 +79,11 @@ def test_a_silent_headset_is_reported_and_sending_repeated(live: Technician, stu
     live.wait_for_state(State.APPLYING)
     live.wait_for_state(State.SOLVED)
     live.wait(lambda: "no headset is connected" in live.snapshot.link_problem)
-    assert "acknowledge" in live.banner
-    assert "acknowledge" in live.child(QLabel, "wizardNote").text()
+    live.wait(lambda: live.banner.startswith("the headset did not answer"))
+    assert live.banner.endswith("check that it is on and that its app runs; see Link")
+    assert live.child(QLabel, "wizardNote").text() == "", "it is said once"
+    assert live.snapshot.observation is not None
+    assert live.snapshot.observation.problem == "the headset sends no poses"
     live.program.window.docks["link"].raise_()
     state = live.child(QLabel, "link-state")
     live.wait(lambda: state.text().startswith("No headset is connected"))

@@ -87,3 +87,7 @@ def press(window: MainWindow, key: Qt.Key, modifiers: Qt.KeyboardModifier = _NON
 def shown(window: MainWindow) -> set[str]:
     """Return the names of the docks that are shown."""
     return {name for name, dock in window.docks.items() if not dock.isHidden()}
+
+
+def is_in_front(window: MainWindow, name: str) -> bool:
+    return not window.docks[name].visibleRegion().isEmpty()

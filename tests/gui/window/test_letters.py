@@ -9,6 +9,7 @@ from functools import partial
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QApplication,
     QCheckBox,
     QLineEdit,
@@ -24,6 +25,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.states import State
 from handcal_gui.docks import is_in_sight
 from handcal_gui.pages.review_page import ReviewPage
+from handcal_gui.pages.wizard import result_bar
 from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
 from tests.gui.helpers import button, child, letters
@@ -83,6 +85,51 @@ def test_each_letter_of_a_calibration_leads_to_one_place(
         for shown in panels:
             found = [*menus, *around, *shown]
             assert len(set(found)) == len(found), (view.sentence, "".join(found))
+
+
+def test_every_button_of_the_guide_shows_its_letter_or_key(
+    program: Program, snapshot: Maker, record: SessionRecord
+) -> None:
+    begin(program, snapshot, (1280, 690))
+    guide = program.wizard_panel
+    main = child(guide.bar, QPushButton, "wizardMain")  # its key is drawn beside it
+    for view in all_views(snapshot, record):
+        say(program, snapshot(State.APPLIED), view)
+        buttons = [one for part in (guide, guide.bar) for one in part.findChildren(QAbstractButton)]
+        for one in buttons:
+            told = re.search(r"&|\(.+\)", one.text())
+            assert told or one is main or not one.isVisible(), one.text()
+
+
+@pytest.mark.parametrize(
+    ("key", "modifier", "done"),
+    [
+        (Qt.Key.Key_P, Qt.KeyboardModifier.ControlModifier, "ask_printer"),
+        (Qt.Key.Key_Y, Qt.KeyboardModifier.AltModifier, "copy_text"),
+    ],
+)
+def test_keys_print_and_copy_a_result_in_sight_only(
+    qtbot: QtBot,
+    program: Program,
+    snapshot: Maker,
+    record: SessionRecord,
+    monkeypatch: pytest.MonkeyPatch,
+    key: Qt.Key,
+    modifier: Qt.KeyboardModifier,
+    done: str,
+) -> None:
+    calls: list[object] = []
+    monkeypatch.setattr(result_bar, done, lambda *told: calls.append(told))
+    begin(program, snapshot, (1280, 690))
+    program.window.activateWindow()
+    qtbot.waitActive(program.window)
+    for state in (State.ALIGN, State.APPLIED):
+        assert not calls
+        seen = snapshot(state)
+        program.wizard_panel.show_snapshot(seen)
+        program.wizard_panel.picture.show_snapshot(seen)
+        press(program.window, key, modifier)
+    qtbot.waitUntil(lambda: len(calls) == 1)
 
 
 def test_a_letter_leads_to_the_panel_in_sight_and_to_none_behind_tabs(

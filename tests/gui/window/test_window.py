@@ -18,7 +18,7 @@ from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.window import MainWindow, Page
 from tests.gui.views import all_views
-from tests.gui.window.conftest import Maker, main_button, press, say, shown
+from tests.gui.window.conftest import Maker, is_in_front, main_button, press, say, shown
 
 TABBED = ("wearer_view", "results", "trials", "session", "link")
 
@@ -115,54 +115,8 @@ def test_the_guide_is_the_largest_thing_in_the_window(window: MainWindow) -> Non
                 assert dock.width() * dock.height() < guide.width() * guide.height()
 
 
-def guide_px(window: MainWindow) -> int:
-    for _ in range(3):  # a layout may ask for another
-        QApplication.processEvents()
-    guide = window.centralWidget()
-    assert guide is not None
-    return guide.width()
-
-
-def test_the_guide_keeps_the_width_it_needs_in_a_window_made_narrower(window: MainWindow) -> None:
-    window.resize(1600, 1000)
-    window.show_page("live")
-    camera_px = window.docks["camera"].width()
-    window.resize(1280, 720)
-    assert guide_px(window) >= 500
-    assert window.docks["camera"].width() < camera_px
-
-
-def test_a_layout_of_a_wider_window_leaves_the_guide_the_width_it_needs(
-    window: MainWindow,
-) -> None:
-    window.resize(1600, 1000)
-    window.show_page("live")
-    layouts = window.layouts()
-    window.show_page("start")
-    for size_px, least_px in (((1280, 720), 500), ((1100, 640), 700)):
-        window.resize(*size_px)
-        window.restore_layouts(layouts)
-        window.show_page("live")
-        assert guide_px(window) >= least_px
-        window.use_arrangement("station")
-        window.use_arrangement("panels")
-        assert guide_px(window) >= least_px
-        window.show_page("start")
-
-
-@pytest.mark.parametrize("text", ["", "garbage", "AAAA"])
-def test_a_layout_that_does_not_fit_is_left_out(window: MainWindow, text: str) -> None:
-    window.restore_layouts({"live": text})
-    window.show_page("live")
-    assert shown(window) == set(window.docks)
-
-
 def has_title(window: MainWindow, name: str) -> bool:
     return window.docks[name].titleBarWidget() is None
-
-
-def is_in_front(window: MainWindow, name: str) -> bool:
-    return not window.docks[name].visibleRegion().isEmpty()
 
 
 def test_a_dock_has_a_title_unless_its_tab_says_the_same(qtbot: QtBot, window: MainWindow) -> None:

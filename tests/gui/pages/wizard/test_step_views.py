@@ -17,7 +17,7 @@ from handcal.types import Eye, VerdictName, Verification
 from handcal_gui.pages.wizard.preconditions import hand_found
 from handcal_gui.pages.wizard.step_views import connect_view, distance, save_view
 from handcal_gui.pages.wizard.steps import Wizard
-from handcal_gui.pages.wizard.view import Action, Precondition, Step
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Precondition, Step
 from tests.gui.views import NUDGED, Maker, actions, judged
 
 
@@ -84,7 +84,7 @@ def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> No
         "Left eye",
         "Right eye",
     ]
-    assert view.note == "the disk is full; free some space"
+    assert not view.note, "the banner says it"
     assert actions(view) == [Action.REDO]
     assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
 
@@ -99,12 +99,33 @@ def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
 
 
 @pytest.mark.parametrize("name", ["implausible", "contradicted"])
-def test_no_key_sends_a_result_that_must_not_be_used(snapshot: Maker, name: VerdictName) -> None:
+def test_of_a_result_that_must_not_be_used_the_offline_calibration_is_kept(
+    snapshot: Maker, name: VerdictName
+) -> None:
     view = Wizard().view(judged(snapshot, "accept", name, State.SOLVED))
+    assert view.sentence.startswith("Do not use this result: keep the offline")
+    assert "of the right eye" in view.sentence
+    assert view.main == ButtonSpec(Action.APPLY, "Send to the headset")
+    assert view.runs_after_s is None, "a person decides"
+    assert actions(view) == [Action.REDO]
+    assert all(offer.discards for offer in view.others), "by a click or its letter only"
+    none = Wizard().view(judged(snapshot, name, name, State.SOLVED))
+    assert none.main == ButtonSpec(Action.APPLY, "Keep offline")
+
+
+@pytest.mark.parametrize("name", ["implausible", "contradicted"])
+def test_of_one_eye_that_must_not_be_used_the_next_step_repeats(
+    snapshot: Maker, record: SessionRecord, name: VerdictName
+) -> None:
+    left = replace(next(iter(record.alignments.values())), eyes=("left",))
+    one = replace(record, alignments={1: left})
+    wizard = Wizard("each")
+    wizard.view(judged(snapshot, name, name, State.SOLVED, record=one))
+    view = wizard.view(judged(snapshot, name, name, State.APPLIED, record=one))
     assert view.sentence.startswith("Do not use this result.")
-    assert not view.main.is_enabled
-    assert actions(view) == [Action.REDO, Action.APPLY]
-    assert all(offer.discards for offer in view.others)
+    assert view.main == ButtonSpec(Action.ANOTHER, "Add alignment")
+    assert view.runs_after_s is None
+    assert "offline calibration for both eyes" in view.fact
 
 
 @pytest.mark.parametrize(
@@ -193,7 +214,7 @@ def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
     wizard.move(Action.NEXT, full)
     view = wizard.view(full)
     assert not view.preconditions[0].holds
-    assert view.note == "the disk is full"
+    assert not view.note, "the banner says it"
 
 
 def test_the_distance_of_the_hand_follows_from_the_depth_gate(snapshot: Maker) -> None:

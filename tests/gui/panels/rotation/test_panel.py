@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.register.guard import turn_advice
@@ -19,6 +19,14 @@ from handcal_gui.widgets.plots import Plot
 from tests.gui.helpers import child
 
 Make = Callable[..., Snapshot]
+TURNED = (
+    "Your hand is turned by 14.0°, more than 9°. Tip your fingers away from you and confirm again."
+)
+TWO_LINES = "Hand cut by the image border; move it toward the middle"
+THREE_LINES = (
+    "The arm points along the camera's line of sight; raise the hand so that its palm or its back "
+    "faces the camera"
+)
 
 
 @pytest.fixture
@@ -169,6 +177,36 @@ def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> No
     panel.show_snapshot(snapshot(procedure={"guard_limit_rad": float(np.radians(5.0))}))
     limit_line, _ = child(panel, Plot).item.listDataItems()
     np.testing.assert_allclose(limit_line.getData()[1], [5.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    ("more_px", "advice", "refused", "has_history"),
+    [
+        (60, TWO_LINES, f"1 confirmation refused. {TURNED}", True),
+        (0, TWO_LINES, "1 confirmation refused.", True),
+        (0, THREE_LINES, "1 confirmation refused.", False),
+    ],
+)
+def test_nothing_overlaps_in_a_low_dock(
+    panel: RotationPanel,
+    snapshot: Make,
+    more_px: int,
+    advice: str,
+    refused: str,
+    has_history: bool,
+) -> None:
+    panel.resize(360, panel.minimumSizeHint().height() + more_px)
+    panel.show()
+    lost = {"hand": None, "rotation_rad": None, "problem": advice}
+    panel.show_snapshot(snapshot(observation=lost, procedure={"refusal": TURNED}))
+    QApplication.processEvents()
+    assert text(panel, "refusals") == refused
+    assert child(panel, QLabel, "rotation-refusals").toolTip().endswith(TURNED)
+    assert child(panel, Plot, "rotation-history").isVisible() == has_history
+    for label in (child(panel, QLabel, f"rotation-{name}") for name in ("advice", "refusals")):
+        assert label.heightForWidth(label.width()) <= label.height()
+    dial = child(panel, RotationDial, "rotation-dial")
+    assert dial.height() >= dial.minimumHeight()
 
 
 def test_it_fits_a_small_dock(panel: RotationPanel) -> None:

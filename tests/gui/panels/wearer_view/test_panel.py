@@ -187,3 +187,14 @@ def test_the_eyes_stand_where_they_are_largest(
     left, right = (_canvas(panel, eye).mapTo(panel, QPoint(0, 0)) for eye in EYES)
     assert (right.y() > left.y()) == is_below
     assert (right.x() > left.x()) != is_below
+
+
+def test_eyes_below_one_another_need_no_more_height_than_side_by_side(
+    panel: WearerViewPanel,
+) -> None:
+    """Behind a tab it is not resized, and held the tabs up in a window made lower."""
+    least_px = panel.minimumSizeHint().height()
+    panel.resize(360, 900)
+    QApplication.processEvents()
+    assert _canvas(panel, "right").mapTo(panel, QPoint()).y() > 300
+    assert panel.minimumSizeHint().height() == least_px
