@@ -20,6 +20,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}; see Link</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>fewer than two thirds of the camera&apos;s frames are used; close other programs</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1541,15 +1545,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Blink before/after</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Show both in turn</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Copy</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1557,11 +1553,15 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Print…</source>
+        <source>Bl&amp;ink before/after</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Print the result</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Print… (Ctrl+P)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1582,10 +1582,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Both eyes at once</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Draws with a result that should not be used</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1661,19 +1657,15 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Do not use this result. Follow the advice below, then repeat.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Send &amp;anyway</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Keep the offline calibration of {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Keep offline</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Do not use this result: keep the offline calibration of {}, and follow the advice below.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1729,6 +1721,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Fini&amp;sh with one eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Add &amp;right eye</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1737,11 +1733,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Skip</source>
+        <source>Keep a&amp;s it is</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>F&amp;inish with one eye</source>
+        <source>&amp;Skip</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1754,10 +1750,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Add {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Keep as it &amp;is</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2932,7 +2924,7 @@ Each eye&apos;s position, its uncertainty and the verdict appear here after its 
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} refused. {}</source>
+        <source>{} refused.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
