@@ -21,6 +21,8 @@ from handcal_gui.program import Program
 _LOOK_MS = 600
 """Time until a change is visible, on a busy computer, too."""
 _TURN_MS = 50
+_APART_MS = 1_100
+"""Least time between two presses of *Record trial* that the panel takes for two."""
 _PATIENCE_MS = 20_000
 _STEPS = 6
 _RAIL = QRegularExpression("Rail$")
@@ -187,9 +189,10 @@ class Tour(QObject):
         self._save("fine-tune-moved", panel)
         self._save("window-fine-tune")
         yield from self._record_trial()
-        yield _LOOK_MS
+        yield _APART_MS
         self._record()  # for the other eye, whose φ is unchanged: the panel asks first
         self._save("window-trial-doubt")
+        yield _APART_MS
         yield from self._record_trial()
         panel.reset_action.trigger()
         yield 2 * _LOOK_MS
