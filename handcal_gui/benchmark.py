@@ -39,6 +39,7 @@ from handcal.station.states import State
 from handcal.station.station import Station
 from handcal.types import CameraIdentity, Frame
 from handcal_gui.app import keep_window_quick, use_english_capitals
+from handcal_gui.engine.garbage import collect_in_this_thread
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
@@ -227,6 +228,7 @@ def measure(frames: int, rate_hz: int) -> list[BenchFigure]:
         program.window.resize(1920, 1080)
         program.window.show()
         gc.freeze()  # as the program
+        collect_in_this_thread(program.window)
         # No camera is opened for a recording, and the frames are in memory.
         settings = StationSettings(
             source="recording",

@@ -25,6 +25,7 @@ from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
 from handcal.station.settings import StationSettings, with_source
 from handcal_gui.autopilot.demonstration import Demonstration
+from handcal_gui.engine.garbage import collect_in_this_thread
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.translation import tr
@@ -84,9 +85,8 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     field = program.window.focusWidget()
     if typed and isinstance(field, QComboBox) and field.isEditable():
         field.setEditText(typed + field.currentText())
-    # All of this stays. Searching it for garbage held up the window by 0.1 s, also from a job.
-    gc.freeze()
-    gc.enable()
+    gc.freeze()  # all of this stays; searching it for garbage held up the window by 0.1 s
+    collect_in_this_thread(app)
     if program.window.isVisible():  # or it was closed meanwhile, and nothing would end the loop
         app.exec()
     program.close()

@@ -27,8 +27,8 @@ def arguments(qapp: QApplication, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # put back at the end
     for name in ("setApplicationDisplayName", "setWindowIcon"):
         monkeypatch.setattr(qapp, name, lambda _: None)
-    monkeypatch.setattr(launch, "gc", SimpleNamespace(freeze=lambda: None, enable=lambda: None))
-    for name in ("close_on_signals", "_log_to"):
+    monkeypatch.setattr(launch, "gc", SimpleNamespace(freeze=lambda: None))
+    for name in ("close_on_signals", "collect_in_this_thread", "_log_to"):
         monkeypatch.setattr(launch, name, lambda *_: None)
     return Namespace(
         preferences=tmp_path / "preferences.json",
