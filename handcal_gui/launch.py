@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import gc
 import logging
 import signal
@@ -163,12 +164,16 @@ def _is_demonstration(arguments: argparse.Namespace) -> bool:
 
 
 def _log_to(path: Path) -> None:
-    """Log to a file what the window says, and to the terminal what failed unexpectedly."""
+    """Log to a file what the window says, and to the terminal what failed unexpectedly.
+
+    The file also gets where each thread was if a library crashes the program.
+    """
     handlers: list[logging.Handler] = [logging.StreamHandler()]
     handlers[0].setLevel(logging.WARNING)
     with suppress(HandcalError, OSError):
         make_folder(path.parent)
         handlers.append(RotatingFileHandler(path, maxBytes=_LOG_BYTES, backupCount=1))
+        faulthandler.enable(path.open("a"))  # its own: the handler's is closed as it rotates
     logging.basicConfig(
         level=logging.WARNING, format="%(asctime)s %(name)s: %(message)s", handlers=handlers
     )

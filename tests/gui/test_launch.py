@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -108,3 +109,16 @@ def test_no_part_of_the_window_is_shown_before_it(qtbot: QtBot, tmp_path: Path) 
     app.removeEventFilter(windows)
     qtbot.addWidget(program.window)
     assert windows.shown == []
+
+
+@pytest.mark.process
+def test_a_crash_in_a_library_leaves_the_places_of_all_threads_in_the_log(tmp_path: Path) -> None:
+    crash = (
+        "import faulthandler, sys; from pathlib import Path;"
+        "from handcal_gui.launch import _log_to;"
+        "_log_to(Path(sys.argv[1])); faulthandler._sigabrt()"
+    )
+    path = tmp_path / "handcal.log"
+    ended = subprocess.run([sys.executable, "-c", crash, str(path)], check=False)
+    assert ended.returncode != 0
+    assert "Fatal Python error: Aborted" in path.read_text()
