@@ -102,7 +102,7 @@ class Endpoint(Closable):
         """
         with self._changed:
             self._wait_for(lambda: message.state is not Delivery.PENDING, timeout_s)
-            name = " ".join(reversed(message.slot.name.lower().split("_")))  # left projection
+            name = message.slot.label
             if message.state is Delivery.SUPERSEDED:
                 raise LinkError(f"the {name} was replaced by a newer one before it arrived")
             if message.state is not Delivery.ACKED:

@@ -261,7 +261,7 @@ class HeadsetServer(Sender):
                 bytes_sent=self._sent["bytes"],
                 bytes_received=self._received["bytes"],
                 given_up=dict(self._given_up),
-                missing=tuple(slot.name.lower() for slot in self._outbox.given_up)
+                missing=tuple(slot.label for slot in self._outbox.given_up)
                 if self.connected
                 else (),
                 notice=self._notice if time.monotonic() < self._notice_until_s else "",

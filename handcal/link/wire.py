@@ -42,6 +42,11 @@ class Slot(IntEnum):
     VERIFY = 10
     NUDGE = 11
 
+    @property
+    def label(self) -> str:
+        """Its name in messages, such as "left projection"."""
+        return " ".join(reversed(self.name.lower().split("_")))
+
 
 class Rejection(StrEnum):
     """Reasons for dropping a datagram."""

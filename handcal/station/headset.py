@@ -82,7 +82,7 @@ def link_problem(link: LinkStatistics, address: tuple[str, int] | None) -> str:
     if link.notice:
         return link.notice
     if link.missing:
-        missing = " and ".join(link.missing).replace("_", " ")
+        missing = " and ".join(link.missing)
         return (
             f"the headset lacks the {missing}: it did not acknowledge it in time; improve the "
             "network, or restart the headset's app"
