@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
     QLabel,
     QLineEdit,
-    QListWidget,
     QPushButton,
     QScrollArea,
     QSpinBox,
@@ -38,56 +36,19 @@ from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from handcal_gui.windows.rig.wizard import RigWizard
 from tests.gui.helpers import letters
-
-BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
-
-
-@pytest.fixture
-def folder(photographs: Any, tmp_path: Path) -> Path:
-    """A work folder with everything entered, but nothing solved."""
-    ProjectFolder(tmp_path / "rig").save(photographs.work)
-    return tmp_path / "rig"
-
-
-@pytest.fixture
-def wizard(qtbot: QtBot, folder: Path) -> Iterator[RigWizard]:
-    wizard = RigWizard(ProjectFolder(folder))
-    qtbot.addWidget(wizard)
-    wizard.show()
-    yield wizard
-    wizard.accept()
-
-
-def child(wizard: RigWizard, kind: Any, name: str) -> Any:
-    """Return the child of a name that can be seen."""
-    (found,) = (one for one in wizard.findChildren(kind, name) if one.isVisible())
-    return found
-
-
-def solve(qtbot: QtBot, wizard: RigWizard, step: int) -> str:
-    """Solve a step once its images have been looked through; return the verdict's text."""
-    wizard.show_step(step)
-    wait(qtbot, wizard)
-    child(wizard, QPushButton, "solve").click()
-    wait(qtbot, wizard)
-    return str(child(wizard, QLabel, "verdictFound").text())
-
-
-def wait(qtbot: QtBot, wizard: RigWizard) -> None:
-    bars = wizard.findChildren(JobBar)
-    qtbot.waitUntil(lambda: not any(bar.is_busy for bar in bars), timeout=30_000)
-
-
-def show_tab(wizard: RigWizard, title: str) -> None:
-    tabs = child(wizard, QTabWidget, "")
-    (place,) = (i for i in range(tabs.count()) if tabs.tabText(i).replace("&", "") == title)
-    tabs.setCurrentIndex(place)
-
-
-def marks(wizard: RigWizard) -> list[str]:
-    rail = wizard.findChild(QListWidget, "rigRail")
-    assert isinstance(rail, QListWidget)
-    return [rail.item(row).toolTip() for row in range(rail.count())]
+from tests.gui.windows.rig.wizard_steps import (
+    BOARDS,
+    LEFT,
+    RESULT,
+    RIGHT,
+    STEREO,
+    VIEWPOINT,
+    child,
+    marks,
+    show_tab,
+    solve,
+    wait,
+)
 
 
 def test_a_rig_is_calibrated_saved_and_used(
