@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -136,7 +137,7 @@ class DisplayPage(StepPage):
         keys = tr("Ta&ke images…"), tr("Searc&h again")
         board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
         panels = {tr("Grid on the &display"): grid, tr("Ca&mera pose"): board}
-        super().__init__(f"{eye}DisplayPage", project, form, panels, parent)
+        super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
@@ -186,11 +187,12 @@ class DisplayPage(StepPage):
             self.project.rig,
             self.project.camera_file,
         )
-        self.box.run(work, self._show_solved)
+        self.box.run(work, partial(self._show_solved, self.inputs))
 
     def show_known(self) -> None:
         """Show the rig's present calibration of this display."""
-        self.box.show_origin(self.project.rig.origins.get(self._eye))
+        origin = self.project.rig.origins.get(self._eye)
+        self.box.show_origin(origin, self.project.outdated(self._eye))
 
     @property
     def need(self) -> str:
@@ -205,9 +207,11 @@ class DisplayPage(StepPage):
         need = images_needed(self._grid, grid)
         return need or ("" if self._entries.stereo else images_needed(self._board, board))
 
-    def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
+    def _show_solved(
+        self, inputs: Mapping[str, str], solved: tuple[SolvedPart, SolvedPart]
+    ) -> None:
         display, place = solved
-        self.box.show_solved(display, self.project.add_part(display))
+        self.box.show_solved(display, self.project.add_part(self._eye, display, inputs))
         self._grid.show_solved(display)
         self._board.show_solved(place)
 

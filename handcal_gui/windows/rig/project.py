@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from handcal.rig_types import Rig
 from handcal_gui.translation import tr
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.solve import SolvedPart
+from handcal_gui.windows.rig.step_inputs import Step, changed_inputs, step_inputs
 
 NOT_JUDGED, UNREADABLE = tr("not judged: the file has no verdict"), tr("the file cannot be read")
 _SETTLE_MS = 500
@@ -44,11 +46,14 @@ class RigProject(QObject):
         Message about files that could not be read; empty if there is none.
     rig_changed : Signal()
         The rig or the viewpoint camera's intrinsics have changed, or the board was found.
+    inputs_changed : Signal()
+        Other inputs were entered.
     failed : Signal(str)
         The entries could not be saved.
     """
 
     rig_changed = Signal()
+    inputs_changed = Signal()
     failed = Signal(str)
 
     def __init__(
@@ -96,6 +101,28 @@ class RigProject(QObject):
         if inputs != self.inputs:
             self.inputs = inputs
             self._settle.start()
+            self.inputs_changed.emit()
+
+    def inputs_of(self, step: Step) -> dict[str, str]:
+        """Return the present inputs of a step."""
+        return step_inputs(self.inputs, step, self.camera_file)
+
+    def outdated(self, step: Step) -> str:
+        """Return in words which inputs of a solved step are no longer those it was solved with."""
+        then = self.inputs.solved.get(step, {})
+        is_viewpoint = step == "viewpoint"
+        if is_viewpoint and self.inputs.viewpoint.intrinsics:
+            return ""
+        is_solved = self.camera_verdict if is_viewpoint else step in self.rig.origins
+        changed = changed_inputs(then, self.inputs_of(step)) if is_solved else ""
+        return (
+            tr("solved with other inputs ({}): solve it again").format(changed) if changed else ""
+        )
+
+    def note_solved(self, step: Step, inputs: Mapping[str, str]) -> None:
+        """Remember the inputs with which a step was solved."""
+        self.enter(solved={**self.inputs.solved, step: inputs})
+        self.save()
 
     @property
     def saved_file(self) -> Path | None:
@@ -119,15 +146,18 @@ class RigProject(QObject):
     def start_from(self, path: Path) -> None:
         """Start from a rig file, or raise HandcalError; earlier calibrations are discarded."""
         self.use_rig(read_rig(path))
+        solved = self.inputs.solved
+        self.enter(solved={step: solved[step] for step in solved if step == "viewpoint"})
 
-    def add_part(self, solved: SolvedPart) -> str:
-        """Add a calibrated part to the rig; return the outcome as a message."""
+    def add_part(self, step: Step, solved: SolvedPart, inputs: Mapping[str, str]) -> str:
+        """Add a part calibrated from inputs to the rig; return the outcome as a message."""
         if solved.add_to is None:
             return tr("it was not added to the rig")
         try:
             self.use_rig(solved.add_to(self.rig))
         except HandcalError as error:
             return tr("it was not added to the rig: {}").format(error)
+        self.note_solved(step, inputs)
         return tr("it was added to the rig")
 
     def camera_solved(self) -> None:

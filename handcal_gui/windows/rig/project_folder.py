@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -103,6 +104,8 @@ class RigInputs:
     right: DisplayEntries = field(default_factory=DisplayEntries)
     saved: str = ""
     """The rig file last saved."""
+    solved: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """For each solved step, its inputs at that time."""
 
 
 class ProjectFolder:

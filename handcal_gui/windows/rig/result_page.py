@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
     QLineEdit,
+    QMessageBox,
     QTabWidget,
     QWidget,
 )
@@ -37,6 +38,7 @@ from handcal_gui.windows.rig.accept_dialog import AcceptDialog
 from handcal_gui.windows.rig.finding_list import FindingList
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
+from handcal_gui.windows.rig.step_inputs import STEP_TITLES
 
 _RIG_FILES = tr("Rig files (*.yaml *.yml)")
 
@@ -85,7 +87,7 @@ class ResultPage(QWidget):
         """Show the present rig."""
         rig = self._project.rig
         self._name.setText(rig.name)
-        findings = report_rig(rig)
+        findings = (*report_rig(rig), *self._outdated())
         self._findings.show_findings(findings)
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         saved = self._project.saved_file
@@ -106,7 +108,7 @@ class ResultPage(QWidget):
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
         proposed = f"{plain or 'rig'}.yaml"
         path, _ = QFileDialog.getSaveFileName(self, tr("Save the rig file"), proposed, _RIG_FILES)
-        if path:
+        if path and self._confirm_mixed():
             self.save_as(Path(path))
 
     def save_as(self, path: Path) -> None:
@@ -123,6 +125,21 @@ class ResultPage(QWidget):
         """Close the acceptance, if it is open."""
         if self._acceptance is not None:
             self._acceptance.reject()
+
+    def _outdated(self) -> list[RigFinding]:
+        """Return the steps that were solved with other inputs than the present ones."""
+        expected = tr("solved with the present inputs")
+        found = {title: self._project.outdated(step) for step, title in STEP_TITLES.items()}
+        return [RigFinding(title, why, False, expected) for title, why in found.items() if why]
+
+    def _confirm_mixed(self) -> bool:
+        """Ask before a rig is saved whose parts are not all solved with the present inputs."""
+        mixed = "\n".join(f"{one.what}: {one.found}." for one in self._outdated())
+        question = tr("The rig is of mixed inputs. Save it nevertheless?")
+        buttons, no = QMessageBox.StandardButton, QMessageBox.StandardButton.No
+        asked = f"{question}\n\n{mixed}"
+        ask = QMessageBox.question
+        return not mixed or ask(self, tr("Save the rig file"), asked, buttons.Yes | no, no) != no
 
     def _open_acceptance(self) -> None:
         self._acceptance = AcceptDialog(self._project, self)

@@ -19,6 +19,7 @@ from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
+from handcal_gui.windows.rig.step_inputs import Step
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
 _FIRST_PANEL = 2
@@ -34,6 +35,7 @@ class StepPage(QWidget):
     ----------
     name : str
         Object name.
+    step : {"T_H_D", "viewpoint", "left", "right"}
     project : RigProject
     form : EntriesForm
     panels : mapping of str to ImagesPanel
@@ -45,6 +47,8 @@ class StepPage(QWidget):
     panels : tuple of ImagesPanel
     box : SolveBox
     main : MainButton
+    inputs : mapping of str to str
+        The present inputs of the step, by field.
     strip : QWidget
         With the main button, for the bottom of the window.
     """
@@ -52,6 +56,7 @@ class StepPage(QWidget):
     def __init__(
         self,
         name: str,
+        step: Step,
         project: RigProject,
         form: EntriesForm,
         panels: Mapping[str, ImagesPanel],
@@ -60,6 +65,8 @@ class StepPage(QWidget):
         super().__init__(parent)
         self.setObjectName(name)
         self.project = project
+        self.step = step
+        self.inputs = project.inputs_of(step)
         self.form = form
         self.panels = tuple(panels.values())
         self.box = SolveBox()
@@ -82,6 +89,7 @@ class StepPage(QWidget):
         self.box.shown.connect(self._refresh)
         project.rig_changed.connect(self.show_known)
         project.rig_changed.connect(self._refresh)
+        project.inputs_changed.connect(self._follow)
 
     def enter(self) -> None:
         """Search the entered folders, unless already done."""
@@ -136,6 +144,13 @@ class StepPage(QWidget):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(end)
         dialog.open()
+
+    def _follow(self) -> None:
+        """Show no longer a result or a failure of other inputs."""
+        if (now := self.project.inputs_of(self.step)) != self.inputs:
+            self.inputs = now
+            self.show_known()
+            self._refresh()
 
     def _lay_out(self) -> None:
         setup, inputs = QWidget(), QWidget()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -69,7 +70,7 @@ class StereoPage(StepPage):
         )
         form.show_entries(project.inputs.stereo)
         panel = ImagesPanel((tr("Depth camera"), tr("Headset camera")), _HINT, "setup-stereo")
-        super().__init__("stereoPage", project, form, {tr("&Pairs"): panel}, parent)
+        super().__init__("stereoPage", "T_H_D", project, form, {tr("&Pairs"): panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
@@ -89,11 +90,12 @@ class StereoPage(StepPage):
     def solve(self) -> None:
         """Solve from the pairs that are not excluded."""
         work = partial(solve_stereo, self.panel.shots, self.project.inputs.stereo)
-        self.box.run(work, self._show_solved)
+        self.box.run(work, partial(self._show_solved, self.inputs))
 
     def show_known(self) -> None:
         """Show the rig's present pose of the depth camera."""
-        self.box.show_origin(self.project.rig.origins.get("T_H_D"))
+        origin = self.project.rig.origins.get("T_H_D")
+        self.box.show_origin(origin, self.project.outdated("T_H_D"))
 
     @property
     def need(self) -> str:
@@ -101,8 +103,8 @@ class StereoPage(StepPage):
         request = tr("to solve, take pairs of images, or choose both folders in Inputs")
         return images_needed(self.panel, request)
 
-    def _show_solved(self, solved: SolvedPart) -> None:
-        self.box.show_solved(solved, self.project.add_part(solved))
+    def _show_solved(self, inputs: Mapping[str, str], solved: SolvedPart) -> None:
+        self.box.show_solved(solved, self.project.add_part("T_H_D", solved, inputs))
         self.panel.show_solved(solved)
 
     def _take(self) -> None:
