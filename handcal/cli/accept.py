@@ -10,7 +10,15 @@ from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, file_option, folder_option, number, seed, value
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
+from handcal.rig_types import RigPart
 from handcal.types import EYES
+
+_DISPLAY = "handcal rig display; handcal rig compare shows what has changed"
+_HOW: dict[RigPart, str] = {
+    "T_H_D": "handcal rig stereo, rig make",
+    "left": _DISPLAY,
+    "right": _DISPLAY,
+}
 
 
 @command(
@@ -84,8 +92,9 @@ def accept(arguments: argparse.Namespace) -> None:
         )
     if found.move is not None:
         console.print(f"depth camera: {found.move.words}, by tracked boards", markup=False)
-    if found.cause:
-        raise HandcalError(f"the rig fails: {found.cause}")
+    if found.cause.words:
+        how = "; ".join(dict.fromkeys(_HOW[part] for part in found.cause.again))
+        raise HandcalError(f"the rig fails: {found.cause.words}{how and f' ({how})'}")
     passed = passed_words(found.eyes)
     console.print(f"passed, at most {settings.limit_arcmin:g}′ at every distance: {passed}")
 
