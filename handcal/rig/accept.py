@@ -118,8 +118,8 @@ class CameraMove:
         if np.linalg.norm(self.shift_m) <= LARGEST_MOVE_M + 2.0 * self.sigma_m:
             return ""
         return (
-            f"the depth camera is {self.words} from its place in the rig: fasten it, and calibrate "
-            "its pose again"
+            f"the depth camera is {self.words} from its place in the rig: check the board's "
+            "measured sides, fasten the camera, and calibrate its pose again"
         )
 
 
@@ -318,7 +318,8 @@ def _or_shifted(turn_rad: Float64, found: EyeAcceptance) -> str:
     shift_m = float(np.linalg.norm(turn_rad)) * found.image_distance_m
     if shift_m > LARGEST_SHIFT_M:
         return ""
-    return f" or shifted by {1e3 * shift_m:.0f} mm (poses of the board tracked by the headset would show which)"
+    told = "poses of the board tracked by the headset would show which"
+    return f" or shifted by {1e3 * shift_m:.0f} mm ({told})"
 
 
 def _middle_m(T_C_B: Float64, seen: BoardView) -> float:
