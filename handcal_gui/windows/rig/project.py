@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from handcal.rig.formats import read_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig_types import Rig
 from handcal_gui.translation import tr
-from handcal_gui.windows.rig.project_folder import ProjectFolder
+from handcal_gui.windows.rig.project_folder import LastAcceptance, ProjectFolder
 from handcal_gui.windows.rig.solve import SolvedPart
 from handcal_gui.windows.rig.step_inputs import Step, changed_inputs, step_inputs
 
@@ -142,6 +143,17 @@ class RigProject(QObject):
         if board == self.inputs.board and not self.inputs.board_found:
             self.enter(board_found=True)
             self.rig_changed.emit()
+
+    @property
+    def acceptance(self) -> LastAcceptance | None:
+        """The last acceptance of the present rig, whatever its name."""
+        last = self.inputs.acceptance
+        return last if last.made and last.rig == self.folder.rig_mark else None
+
+    def note_accepted(self, words: str, *, is_passed: bool) -> None:
+        """Remember an acceptance of the present rig."""
+        made = datetime.now(UTC).isoformat(timespec="seconds")
+        self.enter(acceptance=LastAcceptance(made, is_passed, words, self.folder.rig_mark))
 
     def start_from(self, path: Path) -> None:
         """Start from a rig file, or raise HandcalError; earlier calibrations are discarded."""

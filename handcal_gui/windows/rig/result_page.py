@@ -34,6 +34,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
 from handcal_gui.windows.rig.finding_list import FindingList
 from handcal_gui.windows.rig.project import RigProject
@@ -87,7 +88,7 @@ class ResultPage(QWidget):
         """Show the present rig."""
         rig = self._project.rig
         self._name.setText(rig.name)
-        findings = (*report_rig(rig), *self._outdated())
+        findings = (*report_rig(rig), *self._outdated(), self._accepted())
         self._findings.show_findings(findings)
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         saved = self._project.saved_file
@@ -132,6 +133,14 @@ class ResultPage(QWidget):
         found = {title: self._project.outdated(step) for step, title in STEP_TITLES.items()}
         return [RigFinding(title, why, False, expected) for title, why in found.items() if why]
 
+    def _accepted(self) -> RigFinding:
+        """Return the last acceptance of this rig."""
+        what, last = tr("Acceptance"), self._project.acceptance
+        if last is None:
+            return RigFinding(what, tr("not yet, or the rig has changed"), is_known=False)
+        found = f"{local_time(last.made)}: {last.words}"
+        return RigFinding(what, found, last.is_passed, tr("the rig passes"))
+
     def _confirm_mixed(self) -> bool:
         """Ask before a rig is saved whose parts are not all solved with the present inputs."""
         mixed = "\n".join(f"{one.what}: {one.found}." for one in self._outdated())
@@ -143,6 +152,7 @@ class ResultPage(QWidget):
 
     def _open_acceptance(self) -> None:
         self._acceptance = AcceptDialog(self._project, self)
+        self._acceptance.finished.connect(self.enter)
         self._acceptance.open()
 
     def _on_name_edited(self) -> None:

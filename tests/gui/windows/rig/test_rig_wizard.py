@@ -161,7 +161,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     wizard.show_step(RESULT)
     found = child(wizard, QLabel, "savedRigFound").text()
     assert "as in the initial rig: left display, right display, depth camera's pose" in found
-    assert "4 are not known" in found
+    assert "5 are not known" in found
     signs = child(wizard, QTreeWidget, "rigFindings")
     rows = [signs.topLevelItem(row) for row in range(signs.topLevelItemCount())]
     told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
