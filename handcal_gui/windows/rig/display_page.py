@@ -36,7 +36,9 @@ _GRID_HINT = tr(
 )
 _BOARD_HINT = tr(
     "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
-    "through it while the headset tracks the board, and save the poses in one JSON file."
+    "through it while the headset tracks the board. Save in one JSON file for each image its name "
+    "and the board's pose in the headset rig, 4 rows of 4 numbers in metres; the tooltip of Poses "
+    "of the board in Inputs shows it."
 )
 
 
@@ -204,8 +206,13 @@ class DisplayPage(StepPage):
             "to solve, take images of the board, or choose their folder or a stereo calibration in "
             "Inputs"
         )
+        poses = tr(
+            "to solve, choose the file of the poses of the board in Inputs, or a stereo calibration"
+        )
         need = images_needed(self._grid, grid)
-        return need or ("" if self._entries.stereo else images_needed(self._board, board))
+        if need or self._entries.stereo:
+            return need
+        return images_needed(self._board, board) or ("" if self._entries.tracked else poses)
 
     def _show_solved(
         self, inputs: Mapping[str, str], solved: tuple[SolvedPart, SolvedPart]

@@ -322,6 +322,23 @@ def test_without_images_nothing_is_solved_and_the_reason_is_in_sight(
     wizard.accept()
 
 
+def test_without_the_poses_of_the_board_nothing_is_solved(qtbot: QtBot, wizard: RigWizard) -> None:
+    solve(qtbot, wizard, VIEWPOINT)
+    wizard.show_step(LEFT)
+    wait(qtbot, wizard)
+    page = wizard.page
+    assert isinstance(page, StepPage)
+    tracked = wizard.project.inputs.left.tracked
+    page.form.enter(tracked="")
+    assert not child(wizard, QPushButton, "solve").isEnabled()
+    assert "choose the file of the poses" in child(wizard, QLabel, "verdictFound").text()
+    page.form.enter(tracked=str(wizard.project.folder.viewpoint))
+    assert "choose the file of tracked poses" in solve(qtbot, wizard, LEFT)
+    page.form.enter(tracked=tracked)
+    assert child(wizard, QLabel, "verdictFound").text() == "Not solved yet."
+    assert child(wizard, QPushButton, "solve").isEnabled()
+
+
 def test_without_a_ticked_image_nothing_is_solved(qtbot: QtBot, wizard: RigWizard) -> None:
     assert "added" in solve(qtbot, wizard, STEREO)
     shots = child(wizard, QTreeWidget, "shots")
