@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import user_path
-from handcal.rig.check import MAX_TEXT
+from handcal.rig.check import MAX_NAME
 from handcal.rig.report import RigFinding, report_rig
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import PART_NAMES, RIG_PARTS, Rig
@@ -29,7 +29,7 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
-from handcal_gui.widgets.fields import button, main_button, with_name
+from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable
@@ -60,7 +60,10 @@ class ResultPage(QWidget):
         self.setObjectName("resultPage")
         self._project = project
         self._acceptance: AcceptDialog | None = None
-        self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", tr("Name of the rig"))
+        self._name = with_name(QLineEdit(maxLength=MAX_NAME), "rigName", tr("Name of the rig"))
+        self._name_problem = paragraph(
+            "rigNameProblem", tr("Enter a name of printable characters, to save the rig.")
+        )
         self._findings = FindingList(tr("Check of the rig"))
         self._numbers = NumberTable("numbers-of-the-rig", tr("Numbers of the rig"))
         self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
@@ -78,6 +81,7 @@ class ResultPage(QWidget):
         self._lay_out()
         self.enter()
         self._other.changed.connect(self._compare)
+        self._name.textChanged.connect(self._show_name_problem)
         self._name.editingFinished.connect(self._on_name_edited)
         self.main.clicked.connect(self.save)
         self._accept.clicked.connect(self._open_acceptance)
@@ -155,9 +159,18 @@ class ResultPage(QWidget):
         self._acceptance.finished.connect(self.enter)
         self._acceptance.open()
 
+    def _show_name_problem(self) -> None:
+        self._name_problem.setVisible(not self._is_name)
+        self.main.setEnabled(self._is_name)
+
+    @property
+    def _is_name(self) -> bool:
+        name = self._name.text().strip()
+        return bool(name) and name.isprintable()
+
     def _on_name_edited(self) -> None:
         name = self._name.text().strip()
-        if name == self._project.rig.name:
+        if name == self._project.rig.name or not self._is_name:
             return
         try:
             self._project.use_rig(replace(self._project.rig, name=name))
@@ -203,6 +216,8 @@ class ResultPage(QWidget):
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.addRow(tr("Name"), self._name)
+        form.addRow("", self._name_problem)
+        self._name_problem.hide()
         foot = QHBoxLayout()
         foot.setSpacing(2 * SPACING_PX)
         foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
