@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -128,3 +129,25 @@ def test_another_rig_is_begun_from(
     choose(tmp_path / "none.yaml")
     press(page, "begin")
     assert "none.yaml" in found(page)
+
+
+def test_only_what_is_not_saved_is_asked_about_and_no_is_the_default(
+    page: BoardPage, project: RigProject, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[str] = []
+
+    def question(*words: Any) -> QMessageBox.StandardButton:
+        asked.append(words[2])
+        assert words[-1] == QMessageBox.StandardButton.No
+        return QMessageBox.StandardButton.No
+
+    monkeypatch.setattr(QMessageBox, "question", question)
+    project.use_rig(replace(example_rig(), name="ours", origins={"left": ORIGIN}))
+    press(page, "afresh")
+    assert project.rig.name == "ours"
+    assert "left display" in asked[0]
+    project.save_rig_as(tmp_path / "ours.yaml")
+    press(page, "afresh")
+    assert project.rig.name == example_rig().name
+    assert not project.rig.origins
+    assert len(asked) == 1
