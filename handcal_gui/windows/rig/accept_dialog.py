@@ -154,7 +154,8 @@ class AcceptDialog(QDialog):
                 self._found.show_finding(Finding("", Health.BROKEN, str(error)))
                 return
             folders = {tr("Viewpoint camera"): self._folder / eye / "grid"}
-        dialog = TakeDialog(folders, board, choose, project.realsense, self)
+        dialog = TakeDialog(folders, board, choose, project.realsense, self, project.inputs.sources)
+        dialog.remembered.connect(project.remember_sources)
         dialog.finished.connect(self._show_state)
         dialog.finished.connect(self._refresh)
         dialog.open()

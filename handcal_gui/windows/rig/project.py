@@ -172,6 +172,10 @@ class RigProject(QObject):
         self.note_solved(step, inputs)
         return tr("it was added to the rig")
 
+    def remember_sources(self, sources: Mapping[str, str]) -> None:
+        """Remember the sources of images chosen for some cameras."""
+        self.enter(sources={**self.inputs.sources, **sources})
+
     def camera_solved(self) -> None:
         """Announce that the viewpoint camera's intrinsics may have changed."""
         self.rig_changed.emit()

@@ -120,6 +120,8 @@ class RigInputs:
     solved: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """For each solved step, its inputs at that time."""
     acceptance: LastAcceptance = LastAcceptance()
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """The source of images last chosen for each camera."""
 
 
 class ProjectFolder:

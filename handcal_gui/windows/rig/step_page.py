@@ -138,9 +138,9 @@ class StepPage(QWidget):
             then()
             self.enter()
 
-        dialog = TakeDialog(
-            folders, board, choose or ChooseSettings(), self.project.realsense, self
-        )
+        project, choose = self.project, choose or ChooseSettings()
+        dialog = TakeDialog(folders, board, choose, project.realsense, self, project.inputs.sources)
+        dialog.remembered.connect(project.remember_sources)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(end)
         dialog.open()

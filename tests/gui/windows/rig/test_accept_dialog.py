@@ -10,7 +10,15 @@ from typing import TypeVar
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QTableWidget, QTreeWidget, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QLabel,
+    QPushButton,
+    QTableWidget,
+    QTreeWidget,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
@@ -19,6 +27,7 @@ from handcal.sim.acceptance import write_acceptance
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
 from handcal.types import EYES
 from handcal_gui.widgets.drawing import Drawing
+from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder, ViewpointEntries
@@ -73,6 +82,29 @@ def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> Non
     assert {"&Viewpoint camera", "&Depth camera"} <= {
         label.text() for label in taking.findChildren(QLabel)
     }
+    taking.reject()
+
+
+def test_the_sources_are_those_of_the_last_time(
+    qtbot: QtBot, dialog: AcceptDialog, project: RigProject, tmp_path: Path
+) -> None:
+    def open_take() -> tuple[TakeDialog, QComboBox, PathField]:
+        part(dialog, QPushButton, "left-board").click()
+        taking = dialog.findChildren(TakeDialog)[-1]
+        return taking, taking.findChildren(QComboBox)[1], taking.findChildren(PathField)[1]
+
+    recording = tmp_path / "depth.db3"
+    recording.touch()
+    taking, source, path = open_take()
+    source.setCurrentIndex(source.findText("Recording or video"))
+    path.set_path(str(recording))
+    taking.start()
+    taking.reject()
+    project.save()
+    assert ProjectFolder(project.folder.path).load()[0].sources["Depth camera"] == str(recording)
+    taking, source, path = open_take()
+    assert source.currentText() == "Recording or video"
+    assert path.path == str(recording)
     taking.reject()
 
 

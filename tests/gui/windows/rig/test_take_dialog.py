@@ -95,6 +95,18 @@ def test_both_cameras_images_are_taken(
     assert not any(camera.is_open for camera in cameras.values())
 
 
+def test_what_has_been_taken_is_not_taken_again(
+    qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
+) -> None:
+    start(qtbot, dialog)
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: "corners" in said(dialog))
+    qtbot.waitUntil(button(dialog, "takeImage").isEnabled)
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: said(dialog) == "This has been taken already. Take another.")
+    assert len(list(tmp_path.rglob("*.png"))) == 2
+
+
 def test_what_to_do_stands_above_and_moves_no_button(qtbot: QtBot, dialog: TakeDialog) -> None:
     def places() -> list[object]:
         buttons = (one for one in dialog.findChildren(QAbstractButton) if one.isVisible())
