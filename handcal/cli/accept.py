@@ -111,9 +111,10 @@ def simulate(arguments: argparse.Namespace) -> None:
 
     from handcal.rig.example import example_rig
     from handcal.rig.formats import write_intrinsics
+    from handcal.rig.grid import Grid
     from handcal.rig.rig_file import read_rig
     from handcal.sim.acceptance import write_acceptance
-    from handcal.sim.photographs import DEPTH_CAMERA, HEADSET_CAMERA, write_photographs
+    from handcal.sim.photographs import BOARD, DEPTH_CAMERA, HEADSET_CAMERA, write_photographs
 
     folder = make_folder(arguments.folder)
     if any(folder.iterdir()):
@@ -127,4 +128,23 @@ def simulate(arguments: argparse.Namespace) -> None:
             write_intrinsics(folder / f"{name}.json", camera, "json")
         progress.at(0.7, "Acceptance")
         write_acceptance(folder / "accept", rig, max(8, arguments.views // 2), rng)
-    console.print(f"{folder}: made with a board of 8×6 squares", markup=False)
+    columns, rows = BOARD.squares
+    lines = [
+        f"{folder}: to enter in the rig window, step by step",
+        f"Board: ChArUco, {columns}×{rows} squares of {1e3 * BOARD.square_m:g} mm, markers of "
+        f"{1e3 * BOARD.marker_m:g} mm, {BOARD.dictionary}",
+        "Depth and headset camera: images in depth and headset, intrinsics in depth.json and "
+        "headset.json",
+        "Viewpoint camera: images in viewpoint",
+    ]
+    for eye in EYES:
+        display = rig.eyes[eye]
+        grid = Grid(display.width_px, display.height_px)
+        lines.append(
+            f"{eye.capitalize()} display: images of the grid in grid-{eye}, grid squares "
+            f"{grid.square_px} px; images of the board in board-{eye}, its poses in "
+            f"tracked-{eye}.json; measured distance {display.z_C0_S_m:g} m"
+        )
+    lines.append("Acceptance: images for 'handcal rig accept' in accept")
+    for line in lines:
+        console.print(line, markup=False)
