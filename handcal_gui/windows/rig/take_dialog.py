@@ -129,6 +129,7 @@ class TakeDialog(QDialog):
     def start(self) -> None:
         """Show the images of the chosen cameras."""
         self._stop_search()
+        self._found.clear()
         self._cameras.start()
         self.remembered.emit(self._cameras.chosen)
 

@@ -158,6 +158,7 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
     qtbot.waitUntil(lambda: said(dialog) == told)
     assert not button(dialog, "takeImage").isEnabled()
     start(qtbot, dialog)
+    assert said(dialog) == "", "it is over"
 
 
 def test_images_are_taken_by_themselves_until_they_are_enough(
