@@ -78,8 +78,8 @@ class SolveBox(QWidget):
             text = outdated or tr("Not solved yet")
             self.show_finding(Finding("", Health.LIMITED, text))
             return
-        text = tr("Solved {}: {}; {}").format(
-            local_time(origin.made), origin.verdict, origin.reason
+        text = tr("Solved {}: {}; {}; RMS {:.3f} px").format(
+            local_time(origin.made), origin.verdict, origin.reason, origin.rms_px
         )
         self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -90,6 +91,7 @@ def test_a_wrong_folder_is_not_shown_beside_an_earlier_verdict(
     page_of(again).form.enter(headset_images=right)
     wait(qtbot, again)
     assert marks(again)[STEREO] == wizard.project.rig.origins["T_H_D"].verdict
+    assert re.search(r"RMS 0\.\d+ px", child(again, QLabel, "verdictFound").text())
     again.accept()
 
 
