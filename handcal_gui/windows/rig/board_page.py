@@ -8,7 +8,6 @@ from typing import get_args
 
 from PySide6.QtWidgets import (
     QCheckBox,
-    QFileDialog,
     QFormLayout,
     QLabel,
     QMessageBox,
@@ -42,6 +41,7 @@ from handcal_gui.widgets.fields import (
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.windows.rig.file_dialogs import ask_open, ask_save
 from handcal_gui.windows.rig.project import RigProject
 
 _KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": tr("Checkerboard")}
@@ -178,23 +178,19 @@ class BoardPage(QWidget):
         self._found.show_finding(found)
 
     def _save_pdf(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(
-            self, tr("Save the board"), "board.pdf", tr("PDF (*.pdf)")
-        )
-        if path:
-            self._save(lambda: write_board_pdf(Path(path), *self._printed()), path)
+        title = tr("Save the board")
+        if path := ask_save(self._project, self, title, "board.pdf", tr("PDF (*.pdf)")):
+            self._save(lambda: write_board_pdf(path, *self._printed()), path)
 
     def _save_picture(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(
-            self, tr("Save the board"), "board.png", tr("PNG (*.png)")
-        )
-        if path:
-            self._save(lambda: _write_picture(Path(path), self._project.inputs.board), path)
+        title = tr("Save the board")
+        if path := ask_save(self._project, self, title, "board.png", tr("PNG (*.png)")):
+            self._save(lambda: _write_picture(path, self._project.inputs.board), path)
 
     def _printed(self) -> tuple[Board, Paper]:
         return self._project.inputs.board, self._project.inputs.paper
 
-    def _save(self, write: Callable[[], None], path: str) -> None:
+    def _save(self, write: Callable[[], None], path: Path) -> None:
         try:
             write()
         except (ValueError, FileError) as error:
@@ -204,11 +200,9 @@ class BoardPage(QWidget):
         self._found.show_finding(Finding("", Health.GOOD, tr("saved as {}").format(path), advice))
 
     def _ask_for_rig(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(
-            self, tr("Choose an initial rig"), "", tr("Rig files (*.yaml *.yml)")
-        )
-        if path:
-            self._start_from(Path(path))
+        title, pattern = tr("Choose an initial rig"), tr("Rig files (*.yaml *.yml)")
+        if path := ask_open(self._project, self, title, pattern):
+            self._start_from(path)
 
     def _start_from(self, path: Path) -> None:
         if not self._confirm_discard():

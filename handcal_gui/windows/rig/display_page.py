@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import write_png
@@ -20,6 +19,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, number, whole_number
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.rig.file_dialogs import ask_save
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import DisplayEntries, Distance
@@ -236,11 +236,11 @@ class DisplayPage(StepPage):
         if (grid := self._shown()) is None:
             return
         name = f"grid-{self._eye}.png"
-        path, _ = QFileDialog.getSaveFileName(self, tr("Save the grid"), name, tr("PNG (*.png)"))
-        if not path:
+        path = ask_save(self.project, self, tr("Save the grid"), name, tr("PNG (*.png)"))
+        if path is None:
             return
         try:
-            write_png(Path(path), draw_grid(grid))
+            write_png(path, draw_grid(grid))
         except FileError as error:
             self._grid.show_trouble(str(error))
             return

@@ -122,6 +122,8 @@ class RigInputs:
     acceptance: LastAcceptance = LastAcceptance()
     sources: Mapping[str, str] = field(default_factory=dict)
     """The source of images last chosen for each camera."""
+    chosen_folder: str = ""
+    """Folder of the file last saved or opened."""
 
 
 class ProjectFolder:

@@ -10,7 +10,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QHideEvent
 from PySide6.QtWidgets import (
-    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLineEdit,
@@ -36,6 +35,7 @@ from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
+from handcal_gui.windows.rig.file_dialogs import ask_save
 from handcal_gui.windows.rig.finding_list import FindingList
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
@@ -112,9 +112,9 @@ class ResultPage(QWidget):
         """Choose a path and save the rig file."""
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
         proposed = f"{plain or 'rig'}.yaml"
-        path, _ = QFileDialog.getSaveFileName(self, tr("Save the rig file"), proposed, _RIG_FILES)
+        path = ask_save(self._project, self, tr("Save the rig file"), proposed, _RIG_FILES)
         if path and self._confirm_mixed():
-            self.save_as(Path(path))
+            self.save_as(path)
 
     def save_as(self, path: Path) -> None:
         """Save the rig file."""

@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QMessageBox, QPushButton, QSpinBox
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QLabel,
+    QMessageBox,
+    QPushButton,
+    QSpinBox,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
@@ -103,6 +111,26 @@ def test_the_board_is_saved(
     choose(tmp_path / "missing" / "board.pdf")
     press(page, "savePdf")
     assert "Not saved" in found(page)
+
+
+def test_dialogs_begin_in_the_folder_used_last(
+    page: BoardPage, project: RigProject, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    proposed: list[str] = []
+
+    def answer(*words: Any) -> tuple[str, str]:
+        proposed.append(words[2])
+        return str(tmp_path / "mine" / "board.pdf"), ""
+
+    (tmp_path / "mine").mkdir()
+    for ask in ("getSaveFileName", "getOpenFileName"):
+        monkeypatch.setattr(QFileDialog, ask, answer)
+    for name in ("savePdf", "savePicture", "begin"):
+        press(page, name)
+    mine = tmp_path / "mine"
+    assert proposed == ["board.pdf", str(mine / "board.png"), str(mine)]
+    project.save()
+    assert ProjectFolder(project.folder.path).load()[0].chosen_folder == str(mine)
 
 
 def test_another_rig_is_begun_from(
