@@ -10,8 +10,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from handcal.io.images import IMAGE_SUFFIXES
 from handcal_gui.translation import tr
-from handcal_gui.windows.rig.project_folder import RigInputs
+from handcal_gui.windows.rig.project_folder import RigInputs, entered_path
 
 Step: TypeAlias = Literal["T_H_D", "viewpoint", "left", "right"]
 """A step that is solved: a part of the rig, or the viewpoint camera's intrinsics."""
@@ -49,7 +50,7 @@ _NAMES = {
 
 
 def step_inputs(inputs: RigInputs, step: Step, camera: Path) -> dict[str, str]:
-    """Return the inputs of a step as text, by field.
+    """Return the inputs of a step as text, by field; of paths, also what is there.
 
     Parameters
     ----------
@@ -60,11 +61,27 @@ def step_inputs(inputs: RigInputs, step: Step, camera: Path) -> dict[str, str]:
     """
     entries = inputs.stereo if step == "T_H_D" else getattr(inputs, step)
     values = {"board": asdict(inputs.board), **asdict(entries)}
+    texts = {name: json.dumps(value) + _content(value) for name, value in values.items()}
     if step in ("left", "right"):
-        values["camera"] = ""
-        with suppress(OSError):
-            values["camera"] = sha256(camera.read_bytes()).hexdigest()
-    return {name: json.dumps(value) for name, value in values.items()}
+        texts["camera"] = ""
+        with suppress(OSError):  # it is the same if it is solved again from the same images
+            texts["camera"] = sha256(camera.read_bytes()).hexdigest()
+    return texts
+
+
+def _content(value: object) -> str:
+    """Return a mark of a file, or of the images in a folder; empty if `value` is neither."""
+    path = entered_path(value) if isinstance(value, str) else None
+    try:
+        if path is None or not path.exists():
+            return ""
+        if not path.is_dir():
+            return f" {path.stat().st_size} {path.stat().st_mtime_ns}"
+        images = [one for one in path.iterdir() if one.suffix.lower() in IMAGE_SUFFIXES]
+        listed = sorted(f"{one.name} {one.stat().st_size}" for one in images)
+        return f" {sha256(repr(listed).encode()).hexdigest()}"
+    except OSError:
+        return ""
 
 
 def changed_inputs(then: Mapping[str, str], now: Mapping[str, str]) -> str:

@@ -77,6 +77,7 @@ class StepPage(QWidget):
         self._lay_out()
         form.changed.connect(self.keep)
         form.changed.connect(self._refresh)
+        self.box.button.clicked.connect(self._refresh)  # a file may have been written anew
         self.box.button.clicked.connect(self.solve)
         for panel in self.panels:
             panel.dropped_changed.connect(self.keep)
@@ -89,7 +90,7 @@ class StepPage(QWidget):
         self.box.shown.connect(self._refresh)
         project.rig_changed.connect(self.show_known)
         project.rig_changed.connect(self._refresh)
-        project.inputs_changed.connect(self._follow)
+        project.inputs_changed.connect(self._refresh)
 
     def enter(self) -> None:
         """Search the entered folders, unless already done."""
@@ -150,7 +151,6 @@ class StepPage(QWidget):
         if (now := self.project.inputs_of(self.step)) != self.inputs:
             self.inputs = now
             self.show_known()
-            self._refresh()
 
     def _lay_out(self) -> None:
         setup, inputs = QWidget(), QWidget()
@@ -179,6 +179,7 @@ class StepPage(QWidget):
         return any(panel.bar.is_busy for panel in self.panels)
 
     def _refresh(self) -> None:
+        self._follow()
         panels = zip(self._titles, self.panels, strict=True)
         for place, (title, panel) in enumerate(panels, _FIRST_PANEL):
             count = f" ({panel.count})" if panel.count else ""

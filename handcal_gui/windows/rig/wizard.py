@@ -190,6 +190,7 @@ class RigWizard(QDialog):
         self._back.setEnabled(step > 0)
         self._next.setEnabled(step < len(_STEPS) - 1)
         self._pages[step].enter()
+        self._refresh()  # images may have been taken
 
     def _refresh(self) -> None:
         """Mark each step with its state."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTreeWidget
+from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTabWidget, QTreeWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.windows.rig.project_folder import ProjectFolder
@@ -105,6 +106,25 @@ def test_another_viewpoint_camera_makes_the_displays_outdated(
     )
     wizard.project.camera_solved()
     assert "(viewpoint camera's intrinsics)" in marks(wizard)[LEFT]
+
+
+def test_images_added_later_make_a_step_outdated(
+    qtbot: QtBot, wizard: RigWizard, photographs: Any, tmp_path: Path
+) -> None:
+    folder = tmp_path / "viewpoint"
+    shutil.copytree(wizard.project.inputs.viewpoint.images, folder)
+    wizard.show_step(VIEWPOINT)
+    page_of(wizard).form.enter(images=str(folder))
+    solved = solve(qtbot, wizard, VIEWPOINT)
+    assert "other inputs" not in solved
+    shutil.copy(folder / "viewpoint-001.png", folder / "viewpoint-100.png")
+    child(wizard, QTabWidget, "").setCurrentIndex(0)
+    child(wizard, QPushButton, "again").click()
+    wait(qtbot, wizard)
+    text = "other inputs (viewpoint camera's images)"
+    assert text in child(wizard, QLabel, "verdictFound").text()
+    wizard.show_step(RESULT)
+    assert text in marks(wizard)[VIEWPOINT]
 
 
 def test_saving_mixed_inputs_warns(
