@@ -29,6 +29,8 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
 
+_TAKEN = tr("this has been taken already")
+
 
 class TakeDialog(QDialog):
     """Shows live images of one or two cameras, and takes images with all of them at once.
@@ -170,9 +172,12 @@ class TakeDialog(QDialog):
 
     def _keep_if_new(self, images: Images) -> str:
         """Save images if useful, otherwise return why not; runs in the job's thread."""
+        folders = tuple(self._folders.values())
+        if self._cameras.are_stored and are_kept(images, folders):
+            return _TAKEN
         why_not = self._selector.consider(see_board(images, self._board))
         if not why_not:
-            keep_images(images, tuple(self._folders.values()))
+            keep_images(images, folders)
         return why_not
 
     def _on_searched(self, _images: Images, why_not: str) -> None:
@@ -205,9 +210,7 @@ class TakeDialog(QDialog):
     def _show_taken(self, views: list[BoardImage]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)
         if not views:
-            found = Finding(
-                "", Health.LIMITED, tr("this has been taken already"), tr("take another")
-            )
+            found = Finding("", Health.LIMITED, _TAKEN, tr("take another"))
         elif problem:
             found = Finding("", Health.LIMITED, problem, tr("take another"))
         else:

@@ -20,6 +20,7 @@ from handcal.errors import CameraError
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.live_cameras import LiveCameras
+from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.shots import read_color
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from tests.gui.helpers import child
@@ -173,6 +174,20 @@ def test_images_are_taken_by_themselves_until_they_are_enough(
     for folder in ("depth", "headset"):
         names = [path.name for path in sorted((tmp_path / folder).iterdir())]
         assert names == [f"{folder}-00{number}.png" for number in (1, 2)]
+
+
+def test_a_recording_that_begins_again_is_not_taken_again_by_itself(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
+) -> None:
+    for number, source in enumerate(dialog.findChildren(QComboBox, "source")):
+        path = str(tmp_path / f"{number}.mp4")
+        cameras[path] = cameras[str(number)]
+        source.setCurrentIndex(source.findText("Recording or video"))
+        dialog.findChildren(PathField)[number].set_path(path)
+    start(qtbot, dialog)
+    child(dialog, QCheckBox, "byItself").click()
+    qtbot.waitUntil(lambda: said(dialog) == "1 taken; this has been taken already.")
+    assert len(list(tmp_path.rglob("*.png"))) == 2
 
 
 def test_what_is_not_taken_by_itself_is_explained(
