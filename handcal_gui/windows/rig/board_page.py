@@ -256,9 +256,8 @@ class BoardPage(QWidget):
                 )
             )
         )
-        left.addWidget(self._rig)
-        left.addWidget(self._state)
-        left.addLayout(hbox(self._begin, self._afresh, 1, spacing=SPACING_PX))
+        left.addLayout(hbox((self._rig, 1), self._afresh, spacing=SPACING_PX))
+        left.addLayout(hbox((self._state, 1), self._begin, spacing=SPACING_PX))
         left.addStretch(1)
         hbox((left, 1), (self._preview, 1), on=self, margins=0, spacing=3 * SPACING_PX)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -189,12 +188,7 @@ class DisplayPage(StepPage):
             self.project.rig,
             self.project.camera_file,
         )
-        self.box.run(work, partial(self._show_solved, self.inputs))
-
-    def show_known(self) -> None:
-        """Show the rig's present calibration of this display."""
-        origin = self.project.rig.origins.get(self._eye)
-        self.box.show_origin(origin, self.project.outdated(self._eye))
+        self.box.run(work, self._show_solved)
 
     @property
     def need(self) -> str:
@@ -214,11 +208,9 @@ class DisplayPage(StepPage):
             return need
         return images_needed(self._board, board) or ("" if self._entries.tracked else poses)
 
-    def _show_solved(
-        self, inputs: Mapping[str, str], solved: tuple[SolvedPart, SolvedPart]
-    ) -> None:
+    def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
         display, place = solved
-        self.box.show_solved(display, self.project.add_part(self._eye, display, inputs))
+        self.box.show_solved(display, self.project.add_part(self._eye, display, self.solved_with))
         self._grid.show_solved(display)
         self._board.show_solved(place)
 

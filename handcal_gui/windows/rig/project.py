@@ -110,15 +110,14 @@ class RigProject(QObject):
 
     def outdated(self, step: Step) -> str:
         """Return in words which inputs of a solved step are no longer those it was solved with."""
+        if step == "viewpoint":
+            is_solved = self.camera_file == self.folder.viewpoint and self.camera_file.exists()
+        else:
+            is_solved = step in self.rig.origins
         then = self.inputs.solved.get(step, {})
-        is_viewpoint = step == "viewpoint"
-        if is_viewpoint and self.inputs.viewpoint.intrinsics:
+        if not is_solved or not (changed := changed_inputs(then, self.inputs_of(step))):
             return ""
-        is_solved = self.camera_verdict if is_viewpoint else step in self.rig.origins
-        changed = changed_inputs(then, self.inputs_of(step)) if is_solved else ""
-        return (
-            tr("solved with other inputs ({}): solve it again").format(changed) if changed else ""
-        )
+        return tr("solved with other inputs ({}): solve it again").format(changed)
 
     def note_solved(self, step: Step, inputs: Mapping[str, str]) -> None:
         """Remember the inputs with which a step was solved."""

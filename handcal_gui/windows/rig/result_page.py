@@ -148,11 +148,11 @@ class ResultPage(QWidget):
     def _confirm_mixed(self) -> bool:
         """Ask before a rig is saved whose parts are not all solved with the present inputs."""
         mixed = "\n".join(f"{one.what}: {one.found}." for one in self._outdated())
-        question = tr("The rig is of mixed inputs. Save it nevertheless?")
-        buttons, no = QMessageBox.StandardButton, QMessageBox.StandardButton.No
-        asked = f"{question}\n\n{mixed}"
-        ask = QMessageBox.question
-        return not mixed or ask(self, tr("Save the rig file"), asked, buttons.Yes | no, no) != no
+        if not mixed:
+            return True
+        yes, no = QMessageBox.StandardButton.Yes, QMessageBox.StandardButton.No
+        text = tr("The rig is of mixed inputs. Save it nevertheless?\n\n{}").format(mixed)
+        return QMessageBox.question(self, tr("Save the rig file"), text, yes | no, no) == yes
 
     def _open_acceptance(self) -> None:
         self._acceptance = AcceptDialog(self._project, self)

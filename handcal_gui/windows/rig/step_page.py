@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
@@ -11,6 +12,7 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
+from handcal.rig_types import Origin
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
@@ -49,6 +51,8 @@ class StepPage(QWidget):
     main : MainButton
     inputs : mapping of str to str
         The present inputs of the step, by field.
+    solved_with : mapping of str to str
+        The inputs from which it was last solved, or is being solved.
     strip : QWidget
         With the main button, for the bottom of the window.
     """
@@ -66,7 +70,7 @@ class StepPage(QWidget):
         self.setObjectName(name)
         self.project = project
         self.step = step
-        self.inputs = project.inputs_of(step)
+        self.inputs = self.solved_with = project.inputs_of(step)
         self.form = form
         self.panels = tuple(panels.values())
         self.box = SolveBox()
@@ -77,8 +81,7 @@ class StepPage(QWidget):
         self._lay_out()
         form.changed.connect(self.keep)
         form.changed.connect(self._refresh)
-        self.box.button.clicked.connect(self._refresh)  # a file may have been written anew
-        self.box.button.clicked.connect(self.solve)
+        self.box.button.clicked.connect(self._solve)
         for panel in self.panels:
             panel.dropped_changed.connect(self.keep)
             panel.dropped_changed.connect(self._refresh)
@@ -106,7 +109,8 @@ class StepPage(QWidget):
 
     def show_known(self) -> None:
         """Show the rig's present calibration of this part."""
-        raise NotImplementedError
+        origins: Mapping[Any, Origin] = self.project.rig.origins
+        self.box.show_origin(origins.get(self.step), self.project.outdated(self.step))
 
     @property
     def need(self) -> str:
@@ -145,6 +149,11 @@ class StepPage(QWidget):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(end)
         dialog.open()
+
+    def _solve(self) -> None:
+        self._refresh()  # a file may have been written anew
+        self.solved_with = self.inputs
+        self.solve()
 
     def _follow(self) -> None:
         """Show no longer a result or a failure of other inputs."""

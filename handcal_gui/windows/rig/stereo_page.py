@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -90,12 +89,7 @@ class StereoPage(StepPage):
     def solve(self) -> None:
         """Solve from the pairs that are not excluded."""
         work = partial(solve_stereo, self.panel.shots, self.project.inputs.stereo)
-        self.box.run(work, partial(self._show_solved, self.inputs))
-
-    def show_known(self) -> None:
-        """Show the rig's present pose of the depth camera."""
-        origin = self.project.rig.origins.get("T_H_D")
-        self.box.show_origin(origin, self.project.outdated("T_H_D"))
+        self.box.run(work, self._show_solved)
 
     @property
     def need(self) -> str:
@@ -103,8 +97,8 @@ class StereoPage(StepPage):
         request = tr("to solve, take pairs of images, or choose both folders in Inputs")
         return images_needed(self.panel, request)
 
-    def _show_solved(self, inputs: Mapping[str, str], solved: SolvedPart) -> None:
-        self.box.show_solved(solved, self.project.add_part("T_H_D", solved, inputs))
+    def _show_solved(self, solved: SolvedPart) -> None:
+        self.box.show_solved(solved, self.project.add_part("T_H_D", solved, self.solved_with))
         self.panel.show_solved(solved)
 
     def _take(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -65,8 +64,7 @@ class ViewpointPage(StepPage):
     def solve(self) -> None:
         """Solve from the images that are not excluded."""
         entries, output = self.project.inputs.viewpoint, self.project.folder.viewpoint
-        work = partial(solve_viewpoint, self.panel.shots, entries, output)
-        self.box.run(work, partial(self._show_solved, self.inputs))
+        self.box.run(partial(solve_viewpoint, self.panel.shots, entries, output), self._show_solved)
 
     def show_known(self) -> None:
         """Show the file of intrinsics, if there is one."""
@@ -87,11 +85,11 @@ class ViewpointPage(StepPage):
         request = tr("to solve, take images of the board, or choose their folder in Inputs")
         return images_needed(self.panel, request)
 
-    def _show_solved(self, inputs: Mapping[str, str], solved: SolvedPart) -> None:
+    def _show_solved(self, solved: SolvedPart) -> None:
         is_bad = solved.verdict.name == "bad"
         kept = tr("it is not used") if is_bad else tr("the displays will be calibrated with it")
         if not is_bad:
-            self.project.note_solved("viewpoint", inputs)
+            self.project.note_solved("viewpoint", self.solved_with)
         self.project.camera_solved()
         self.box.show_solved(solved, kept)
         self.panel.show_solved(solved)
