@@ -126,7 +126,7 @@ def are_kept(images: Sequence[UInt8], folders: Sequence[Path]) -> bool:
     return all(
         any(
             path.stat().st_size == len(data) and path.read_bytes() == data
-            for path in folder.glob("*.png")
+            for path in sorted(folder.glob("*.png"))
         )
         for folder, data in zip(folders, map(png_bytes, images), strict=True)
     )

@@ -151,7 +151,7 @@ class StepPage(QWidget):
         dialog.open()
 
     def _solve(self) -> None:
-        self._refresh()  # a file may have been written anew
+        self._refresh()  # a file may have been written since
         self.solved_with = self.inputs
         self.solve()
 
