@@ -197,6 +197,7 @@ class SeparateWindows(QObject):
             return None
         wizard = RigWizard(folder, self._window, self._start.new.settings.realsense)
         wizard.rig_saved.connect(self._use_rig)
+        wizard.finished.connect(self._start.new.check)
         self._open(wizard, wizard.accept)
         return wizard
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraEndError, CameraTimeoutError
 from handcal.io.files import make_folder
-from handcal.io.images import write_png
+from handcal.io.images import png_bytes, write_png
 from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
@@ -119,6 +119,17 @@ def keep_images(images: Sequence[UInt8], folders: Sequence[Path]) -> tuple[str, 
     for image, folder, name in zip(images, folders, names, strict=True):
         write_png(folder / name, image)
     return names
+
+
+def are_kept(images: Sequence[UInt8], folders: Sequence[Path]) -> bool:
+    """Return whether each image is already in its folder, as when a recording starts again."""
+    return all(
+        any(
+            path.stat().st_size == len(data) and path.read_bytes() == data
+            for path in sorted(folder.glob("*.png"))
+        )
+        for folder, data in zip(folders, map(png_bytes, images), strict=True)
+    )
 
 
 def keep_imager(folder: Path, frame: Frame, identity: CameraIdentity) -> None:

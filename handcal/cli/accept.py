@@ -10,7 +10,15 @@ from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, file_option, folder_option, number, seed, value
 from handcal.errors import HandcalError
 from handcal.io.files import make_folder
+from handcal.rig_types import RigPart
 from handcal.types import EYES
+
+_DISPLAY = "handcal rig display; handcal rig compare shows what has changed"
+_HOW: dict[RigPart, str] = {
+    "T_H_D": "handcal rig stereo, rig make",
+    "left": _DISPLAY,
+    "right": _DISPLAY,
+}
 
 
 @command(
@@ -84,8 +92,9 @@ def accept(arguments: argparse.Namespace) -> None:
         )
     if found.move is not None:
         console.print(f"depth camera: {found.move.words}, by tracked boards", markup=False)
-    if found.cause:
-        raise HandcalError(f"the rig fails: {found.cause}")
+    if found.cause.words:
+        how = "; ".join(dict.fromkeys(_HOW[part] for part in found.cause.again))
+        raise HandcalError(f"the rig fails: {found.cause.words}{how and f' ({how})'}")
     passed = passed_words(found.eyes)
     console.print(f"passed, at most {settings.limit_arcmin:g}′ at every distance: {passed}")
 
@@ -102,9 +111,10 @@ def simulate(arguments: argparse.Namespace) -> None:
 
     from handcal.rig.example import example_rig
     from handcal.rig.formats import write_intrinsics
+    from handcal.rig.grid import Grid
     from handcal.rig.rig_file import read_rig
     from handcal.sim.acceptance import write_acceptance
-    from handcal.sim.photographs import DEPTH_CAMERA, HEADSET_CAMERA, write_photographs
+    from handcal.sim.photographs import BOARD, DEPTH_CAMERA, HEADSET_CAMERA, write_photographs
 
     folder = make_folder(arguments.folder)
     if any(folder.iterdir()):
@@ -118,4 +128,23 @@ def simulate(arguments: argparse.Namespace) -> None:
             write_intrinsics(folder / f"{name}.json", camera, "json")
         progress.at(0.7, "Acceptance")
         write_acceptance(folder / "accept", rig, max(8, arguments.views // 2), rng)
-    console.print(f"{folder}: made with a board of 8×6 squares", markup=False)
+    columns, rows = BOARD.squares
+    lines = [
+        f"{folder}: to enter in the rig window, step by step",
+        f"Board: ChArUco, {columns}×{rows} squares of {1e3 * BOARD.square_m:g} mm, markers of "
+        f"{1e3 * BOARD.marker_m:g} mm, {BOARD.dictionary}",
+        "Depth and headset camera: images in depth and headset, intrinsics in depth.json and "
+        "headset.json",
+        "Viewpoint camera: images in viewpoint",
+    ]
+    for eye in EYES:
+        display = rig.eyes[eye]
+        grid = Grid(display.width_px, display.height_px)
+        lines.append(
+            f"{eye.capitalize()} display: images of the grid in grid-{eye}, grid squares "
+            f"{grid.square_px} px; images of the board in board-{eye}, its poses in "
+            f"tracked-{eye}.json; measured distance {display.z_C0_S_m:g} m"
+        )
+    lines.append("Acceptance: images for 'handcal rig accept' in accept")
+    for line in lines:
+        console.print(line, markup=False)

@@ -61,8 +61,13 @@ def write_png(path: Path, image: UInt8) -> None:
         If `path` does not end in ``.png``, or cannot be written.
     """
     require_suffix(path, ".png")
+    write_atomic(path, png_bytes(image))
+
+
+def png_bytes(image: UInt8) -> bytes:
+    """Return an image, (H, W) grey or (H, W, 3) RGB, as `write_png` stores it."""
     stored = image[..., ::-1] if image.ndim == 3 else image
-    write_atomic(path, cv2.imencode(".png", stored)[1].tobytes())
+    return cv2.imencode(".png", stored)[1].tobytes()
 
 
 def _require_pixels_only(data: bytes, path: Path, width: int, height: int) -> None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -29,8 +30,8 @@ from handcal.rig.board import BoardView
 from handcal.rig.display import DisplayHomography, undistort
 from handcal.rig.viewpoint import TrackedView, board_pose, locate_viewpoint
 from handcal.rig.views import ViewsError
-from handcal.rig_types import EyeDisplay, Rig
-from handcal.types import Float64, Intrinsics
+from handcal.rig_types import EyeDisplay, Rig, RigPart
+from handcal.types import Eye, Float64, Intrinsics
 
 FEWEST_VIEWS = 5
 LIMIT_ARCMIN = 5.0
@@ -117,8 +118,8 @@ class CameraMove:
         if np.linalg.norm(self.shift_m) <= LARGEST_MOVE_M + 2.0 * self.sigma_m:
             return ""
         return (
-            f"the depth camera is {self.words} from its place in the rig: fasten it, and calibrate "
-            "its pose again (handcal rig stereo, rig make)"
+            f"the depth camera is {self.words} from its place in the rig: check the board's "
+            "measured sides, fasten the camera, and calibrate its pose again"
         )
 
 
@@ -229,7 +230,7 @@ def accept_eye(
 
 def problem(found: EyeAcceptance, limit_arcmin: float = LIMIT_ARCMIN) -> str:
     """Return what is wrong with an eye's drawing; empty if it passes."""
-    away_m = float(np.linalg.norm(found.shift_m))
+    away_m = _away_m(found)
     if away_m > LARGEST_SHIFT_M:
         return (
             f"the camera is {1e3 * away_m:.0f} mm from the eye's place; move it there and check "
@@ -241,29 +242,75 @@ def problem(found: EyeAcceptance, limit_arcmin: float = LIMIT_ARCMIN) -> str:
     return f"{where.mean_arcmin:.1f}′ at {where.depth_m:.2f} m, more than {limit_arcmin:g}′"
 
 
-def likely_cause(found: Sequence[EyeAcceptance], move: CameraMove | None = None) -> str:
-    """Return in words what has probably moved on a rig that fails."""
+class Cause(NamedTuple):
+    """The likely cause of a failure."""
+
+    words: str = ""
+    again: tuple[RigPart, ...] = ()
+    """Parts of the rig to calibrate again."""
+
+
+def likely_cause(
+    found: Mapping[Eye, EyeAcceptance], failed: Sequence[Eye], move: CameraMove | None = None
+) -> Cause:
+    """Return what has probably moved on a rig that fails, as far as the errors show it."""
     if move is not None and move.problem:
-        return move.problem
-    if any(one.left_arcmin > _EXPLAINED * one.mean_arcmin for one in found):
-        return (
-            "no rotation explains the errors: check the board's measured sides, the intrinsics, "
-            "and that the camera stood still; then calibrate the displays again"
-        )
-    turns_rad = np.array([one.turn_rad for one in found])
+        return Cause(move.problem, ("T_H_D",))
+    turns_rad = np.array([found[eye].turn_rad for eye in failed])
     mean_rad = turns_rad.mean(axis=0)
     apart_rad = np.linalg.norm(turns_rad - mean_rad, axis=1).max()
-    degrees = np.degrees(np.linalg.norm(mean_rad))
-    if len(found) > 1 and apart_rad <= _SAME_TURN * np.linalg.norm(mean_rad):
-        return (
+    strange = [eye for eye in failed if not _is_rotation(found[eye])]
+    if not strange and len(failed) > 1 and apart_rad <= _SAME_TURN * np.linalg.norm(mean_rad):
+        degrees = np.degrees(np.linalg.norm(mean_rad))
+        return Cause(
             f"both eyes' errors are those of a depth camera turned by {degrees:.2f}° on the "
-            f"headset{_or_shifted(mean_rad, found[0]) if move is None else ''}: fasten it, and "
-            "calibrate its pose again (handcal rig stereo, rig make)"
+            f"headset{_or_shifted(mean_rad, found[failed[0]]) if move is None else ''}: fasten it, "
+            "and calibrate its pose again",
+            ("T_H_D",),
         )
+    read = "; ".join(f"{eye}: {_reading(found[eye])}" for eye in failed)
+    again = f"calibrate the {' and '.join(failed)} display{'s' if len(failed) > 1 else ''} again"
+    if len(failed) < len(found):
+        (other,) = set(found) - set(failed)
+        advice = (
+            f"{other} passes with the same board and cameras: take {failed[0]}'s images again, and "
+            f"if it still fails, {again}"
+        )
+    elif strange:
+        advice = (
+            "check the board's measured sides, the intrinsics, and that the camera stood still in "
+            f"the eye's place; then {again}"
+        )
+    elif len(failed) > 1:
+        advice = (
+            "one depth camera cannot have turned by both: check the board's measured sides and the "
+            f"screens' distances; then {again}"
+        )
+    else:
+        return Cause(
+            f"{read}; display or depth camera: images of the other eye's display would show which"
+        )
+    return Cause(f"{read}; {advice}", tuple(failed))
+
+
+def _is_rotation(found: EyeAcceptance) -> bool:
+    """Return whether a rotation explains most of an eye's errors, with the camera in its place."""
+    is_explained = found.left_arcmin <= _EXPLAINED * found.mean_arcmin
+    return is_explained and _away_m(found) <= LARGEST_SHIFT_M
+
+
+def _reading(found: EyeAcceptance) -> str:
+    if _away_m(found) > LARGEST_SHIFT_M:
+        return f"the camera is {1e3 * _away_m(found):.0f} mm from the eye's place"
+    if not _is_rotation(found):
+        return "no rotation explains the errors"
     return (
-        "each eye's errors are those of a different rotation: calibrate the displays again "
-        "(handcal rig display), and see with handcal rig compare what has changed"
+        f"the errors are those of a rotation by {np.degrees(np.linalg.norm(found.turn_rad)):.2f}°"
     )
+
+
+def _away_m(found: EyeAcceptance) -> float:
+    return float(np.linalg.norm(found.shift_m))
 
 
 def _or_shifted(turn_rad: Float64, found: EyeAcceptance) -> str:
@@ -271,7 +318,8 @@ def _or_shifted(turn_rad: Float64, found: EyeAcceptance) -> str:
     shift_m = float(np.linalg.norm(turn_rad)) * found.image_distance_m
     if shift_m > LARGEST_SHIFT_M:
         return ""
-    return f" or shifted by {1e3 * shift_m:.0f} mm (EYE/tracked.json would show which)"
+    told = "poses of the board tracked by the headset would show which"
+    return f" or shifted by {1e3 * shift_m:.0f} mm ({told})"
 
 
 def _middle_m(T_C_B: Float64, seen: BoardView) -> float:

@@ -18,6 +18,7 @@ from handcal.report.write import write_report
 from handcal.rig.accept import (
     LIMIT_ARCMIN,
     CameraMove,
+    Cause,
     EyeAcceptance,
     accept_eye,
     camera_move,
@@ -65,7 +66,7 @@ class Acceptance:
     eyes: Mapping[Eye, EyeAcceptance]
     problems: Mapping[Eye, str]
     """For each eye; empty if it passes."""
-    cause: str
+    cause: Cause
     """Likely cause of the problems; empty if there are none."""
     move: CameraMove | None
     """Of the depth camera from its place in the rig; None without tracked poses of the board."""
@@ -77,9 +78,9 @@ class Acceptance:
     def json(self, limit_arcmin: float) -> dict[str, Any]:
         """Return the result as JSON-able values."""
         return {
-            "passed": not self.cause,
+            "passed": not self.cause.words,
             "limit_arcmin": limit_arcmin,
-            "cause": self.cause,
+            "cause": self.cause.words,
             "depth_camera": None
             if self.move is None
             else {
@@ -133,10 +134,10 @@ def run_acceptance(settings: AcceptanceSettings, progress: Progress = Progress()
         tracked |= {f"{eye}/{name}": one for name, one in images.tracked.items()}
     move = camera_move(rig, tracked, depth_camera) if tracked else None
     problems = {eye: problem(one, settings.limit_arcmin) for eye, one in found.items()}
-    failed = [found[eye] for eye, text in problems.items() if text]
+    failed = [eye for eye, text in problems.items() if text]
     has_moved = move is not None and bool(move.problem)
-    cause = likely_cause(failed, move) if failed or has_moved else ""
-    page = _page(rig, found, problems, cause, move)
+    cause = likely_cause(found, failed, move) if failed or has_moved else Cause()
+    page = _page(rig, found, problems, cause.words, move)
     files = write_report(settings.output, page, progress.part(0.8, 1.0))
     return Acceptance(found, problems, cause, move, left_out, files)
 

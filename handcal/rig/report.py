@@ -23,6 +23,8 @@ from handcal.types import EYES, Float64
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0
+_LARGEST_FOCAL_DIFFERENCE = 0.25
+"""Dioptres; both eyes' screens are made to be equally far."""
 _LARGEST_OFFSET_M = 0.02
 _LARGEST_REACH_M = 0.25
 _LEAST_SEEN = 0.95
@@ -109,6 +111,9 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
             seen >= _LEAST_SEEN,
             f"{100 * _LEAST_SEEN:.0f} % or more",
         )
+    left, right = (1.0 / rig.eyes[eye].z_C0_S_m for eye in EYES)
+    bounds, what = (0.0, _LARGEST_FOCAL_DIFFERENCE), "Difference of the virtual screens' distances"
+    yield _within(what, abs(right - left), bounds, 1.0, "dioptres")
     reach_m = float(np.linalg.norm(rig.T_H_D[:3, 3]))
     yield _within("Depth camera from the headset rig", reach_m, (0.0, _LARGEST_REACH_M), 1e3, "mm")
     camera = rig.depth_camera

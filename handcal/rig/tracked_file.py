@@ -19,6 +19,7 @@ from handcal.types import Float64
 
 TRACKED_VERSION = 1
 _REACH_M = 10.0
+_ADVICE = "choose the file of tracked poses of the board"
 
 
 def read_tracked(path: Path) -> dict[str, Float64]:
@@ -29,9 +30,15 @@ def read_tracked(path: Path) -> dict[str, Float64]:
     FileError
         If the file cannot be read, is not of this format, or a pose is not rigid.
     """
-    values = read_json(path)
+    try:
+        values = read_json(path)
+    except FileError as error:
+        raise FileError(f"{error}; {_ADVICE}") from error
     if values.get("handcal_tracked") != TRACKED_VERSION:
-        raise FileError(f"{path}: handcal_tracked must be {TRACKED_VERSION}, the version known")
+        raise FileError(
+            f"{path} holds no tracked poses that are known: handcal_tracked must be "
+            f"{TRACKED_VERSION}; {_ADVICE}"
+        )
     poses = values.get("T_H_B")
     if not isinstance(poses, dict) or not 0 < len(poses) <= MAX_VIEWS:
         raise FileError(f"{path}: T_H_B must hold 1 to {MAX_VIEWS} poses by image name")

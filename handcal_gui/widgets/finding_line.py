@@ -48,6 +48,13 @@ class FindingLine(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         self.setMinimumHeight(max(3 * SPACING_PX, self._button.sizeHint().height()))
 
+    def clear(self) -> None:
+        """Show nothing."""
+        self._finding = None
+        self._text.clear()
+        self._icon.clear()
+        self._button.hide()
+
     def show_finding(
         self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
     ) -> None:

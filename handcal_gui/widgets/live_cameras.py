@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
@@ -69,6 +70,7 @@ class LiveCameras(QWidget):
         self._realsense, self._tell, self._open_source = realsense, tell, open_source
         self._live: LiveImages | None = None
         self._opened: dict[str, str] = {}
+        self._wanted: dict[str, str] = {}
         self._warp: Callable[[UInt8], UInt8] | None = None
         self._sources = {title: choice("source", title, _SOURCES) for title in titles}
         self._recorded = {
@@ -98,11 +100,29 @@ class LiveCameras(QWidget):
                 source.insertItem(0, tr("Camera {}").format(number), str(number))
             if self._live is None:
                 source.setCurrentIndex(place)
+        if self._live is None:
+            self.choose(self._wanted)
+
+    def choose(self, chosen: Mapping[str, str]) -> None:
+        """Choose by title, as `chosen` returns them, cameras and recordings that exist.
+
+        Those of cameras that are added later are chosen then.
+        """
+        self._wanted = dict(chosen)
+        for title, source in chosen.items():
+            choices = self._sources.get(title)
+            if choices is None or not source:
+                continue
+            if choices.findData(source) >= 0:
+                choices.setCurrentIndex(choices.findData(source))
+            elif Path(source).exists():
+                choices.setCurrentIndex(choices.findData(_RECORDED))
+                self._recorded[title].set_path(source)
 
     def start(self) -> None:
         """Show images of the chosen cameras."""
         self.stop()
-        sources = self._opened = self._chosen()
+        sources = self._opened = self.chosen
         if "" in sources.values():
             self.failed.emit(tr("choose the recording or video"))
             return
@@ -143,12 +163,14 @@ class LiveCameras(QWidget):
         for field in (*self._sources.values(), *self._recorded.values(), *self._labels):
             field.setVisible(not is_only)
 
-    def _chosen(self) -> dict[str, str]:
+    @property
+    def chosen(self) -> dict[str, str]:
+        """The source of each camera for `open_view_source`, by title; empty if none is chosen."""
         return {title: self._source(title) for title in self._sources}
 
     def _stop_another(self) -> None:
         """Stop once another camera is chosen than the one shown."""
-        if self._live is not None and self._chosen() != self._opened:
+        if self._live is not None and self.chosen != self._opened:
             self.stop()
 
     def _source(self, title: str) -> str:

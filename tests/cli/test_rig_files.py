@@ -41,7 +41,7 @@ def test_a_rig_in_doubt_fails_the_check(tmp_path: Path, capsys: pytest.CaptureFi
         one["is_fine"] for one in json.loads((tmp_path / "found.json").read_text())["findings"]
     )
     write_rig(path, replace(RIG, eyes={"left": RIG.eyes["right"], "right": RIG.eyes["left"]}))
-    with pytest.raises(HandcalError, match="1 of 18 findings"):
+    with pytest.raises(HandcalError, match="1 of 19 findings"):
         run("check", path)
     assert "left and right are exchanged" in capsys.readouterr().out
 
@@ -111,7 +111,7 @@ def test_the_depth_camera_is_checked_and_the_rig_file_keeps_it(
     said = " ".join(capsys.readouterr().out.split())
     assert "doubtful: +" in said
     assert "calibrate the sensor" in said
-    with pytest.raises(HandcalError, match="1 of 18 findings"):
+    with pytest.raises(HandcalError, match="1 of 19 findings"):
         run("check", new)
     with pytest.raises(HandcalError, match=r"not the depth camera of this rig: images of 640x360"):
         run("depth", tmp_path / "take", "--stills", "--output", tmp_path / "other.yaml")

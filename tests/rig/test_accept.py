@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -58,11 +59,14 @@ def test_a_right_rig_passes_and_the_cameras_place_is_found() -> None:
 
 def test_a_turned_depth_camera_fails_and_is_named() -> None:
     was = turned(RIG, [0.0, np.radians(0.5), 0.0])
-    found = [accepted(RIG, was, eye, noise_px=0.05) for eye in EYES]
-    assert all("more than 5′" in problem(one) for one in found)
-    assert "a depth camera turned by 0." in likely_cause(found)
+    found = {eye: accepted(RIG, was, eye, noise_px=0.05) for eye in EYES}
+    assert all("more than 5′" in problem(one) for one in found.values())
+    cause = likely_cause(found, EYES)
+    assert "a depth camera turned by 0." in cause.words
+    assert cause.again == ("T_H_D",)
     assert all(
-        np.linalg.norm(one.turn_rad) == pytest.approx(np.radians(0.5), rel=0.2) for one in found
+        np.linalg.norm(one.turn_rad) == pytest.approx(np.radians(0.5), rel=0.2)
+        for one in found.values()
     )
 
 
@@ -86,13 +90,14 @@ def test_a_shift_of_the_depth_camera_is_found_by_tracked_boards() -> None:
     T_H_D = rigid(None, -shift_m) @ RIG.T_H_D
     found = camera_move(replace(RIG, T_H_D=T_H_D), views, DEPTH_CAMERA)
     np.testing.assert_allclose(found.shift_m, shift_m, atol=0.0006)
-    assert "the depth camera is shifted by" in likely_cause([], found)
+    assert "the depth camera is shifted by" in likely_cause({}, (), found).words
 
 
 def test_without_tracked_boards_a_small_rotation_may_be_a_shift() -> None:
-    shifted = [accepted(RIG, turned(RIG, [0.0, 0.0, 0.0], [0.005, 0.0, 0.0]), eye) for eye in EYES]
-    assert all(problem(one) for one in shifted)
-    assert "or shifted by 5 mm" in likely_cause(shifted)
+    was = turned(RIG, [0.0, 0.0, 0.0], [0.005, 0.0, 0.0])
+    shifted = {eye: accepted(RIG, was, eye) for eye in EYES}
+    assert all(problem(one) for one in shifted.values())
+    assert "or shifted by 5 mm" in likely_cause(shifted, EYES).words
 
 
 def test_a_changed_display_is_not_taken_for_the_depth_camera() -> None:
@@ -100,11 +105,26 @@ def test_a_changed_display_is_not_taken_for_the_depth_camera() -> None:
     H = np.array([[1.0, 0.0, 15.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     changed = replace(left, K=H @ left.K)
     was = replace(RIG, eyes={**RIG.eyes, "left": changed})
-    found = [accepted(RIG, was, "left", noise_px=0.05)]
-    assert problem(found[0])
-    assert "depth camera turned" not in likely_cause(found)
-    both = [*found, accepted(RIG, was, "right", noise_px=0.05)]
-    assert "depth camera turned" not in likely_cause(both)
+    found = {eye: accepted(RIG, was, eye, noise_px=0.05) for eye in EYES}
+    assert problem(found["left"])
+    alone = likely_cause({"left": found["left"]}, ["left"])
+    assert "images of the other eye's display would show which" in alone.words
+    assert alone.again == ()
+    cause = likely_cause(found, ["left"])
+    assert re.search(r"^left: .* rotation by 0\.\d+°; right passes .*left display", cause.words)
+    assert cause.again == ("left",)
+
+
+def test_two_eyes_that_fail_differently_are_told_apart() -> None:
+    H = np.array([[1.0, 0.0, 15.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    shifts = {"left": H, "right": np.linalg.inv(H)}
+    eyes = {eye: replace(RIG.eyes[eye], K=shifts[eye] @ RIG.eyes[eye].K) for eye in EYES}
+    was = replace(RIG, eyes=eyes)
+    cause = likely_cause({eye: accepted(RIG, was, eye) for eye in EYES}, EYES)
+    assert re.search(
+        r"^left: .* by 0\.\d+°; right: .* by 0\.\d+°; one depth camera cannot", cause.words
+    )
+    assert cause.again == EYES
 
 
 def test_a_camera_far_from_the_eye_and_too_few_views_are_refused() -> None:

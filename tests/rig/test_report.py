@@ -43,6 +43,12 @@ def test_a_display_too_near_and_a_viewpoint_too_far_are_told() -> None:
     } <= set(found)
 
 
+def test_screens_at_different_distances_are_doubtful() -> None:
+    left = replace(RIG.eyes["left"], z_C0_S_m=0.5)
+    found = doubtful(replace(RIG, eyes={**RIG.eyes, "left": left}))
+    assert found == {"Difference of the virtual screens' distances": "1.5 dioptres"}
+
+
 def test_a_part_that_was_not_good_is_reported_with_its_reason() -> None:
     origin = Origin("grid", "today", 3, 0.2, "bad", "the camera moved", ("x_m",), np.eye(1))
     found = doubtful(replace(RIG, origins={"left": origin}))

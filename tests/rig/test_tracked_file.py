@@ -36,3 +36,10 @@ def test_what_is_no_set_of_poses_is_named(tmp_path: Path, content: object, probl
     path.write_text(json.dumps(content))
     with pytest.raises(FileError, match=problem):
         read_tracked(path)
+
+
+@pytest.mark.parametrize("text", ["", "{}"])
+def test_another_file_says_which_to_choose(tmp_path: Path, text: str) -> None:
+    (tmp_path / "depth.json").write_text(text)
+    with pytest.raises(FileError, match="; choose the file of tracked poses"):
+        read_tracked(tmp_path / "depth.json")

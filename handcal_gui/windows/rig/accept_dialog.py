@@ -39,6 +39,7 @@ from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve import CAMERA_MISSING
+from handcal_gui.windows.rig.step_inputs import STEP_TITLES
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
 _HOW = tr(
@@ -153,7 +154,8 @@ class AcceptDialog(QDialog):
                 self._found.show_finding(Finding("", Health.BROKEN, str(error)))
                 return
             folders = {tr("Viewpoint camera"): self._folder / eye / "grid"}
-        dialog = TakeDialog(folders, board, choose, project.realsense, self)
+        dialog = TakeDialog(folders, board, choose, project.realsense, self, project.inputs.sources)
+        dialog.remembered.connect(project.remember_sources)
         dialog.finished.connect(self._show_state)
         dialog.finished.connect(self._refresh)
         dialog.open()
@@ -176,8 +178,12 @@ class AcceptDialog(QDialog):
         ]
         self._table.show_rows(_COLUMNS, rows)
         self._table.show()
-        if found.cause:
-            finding = Finding("", Health.BROKEN, tr("the rig fails: {}").format(found.cause))
+        if found.cause.words:
+            text = tr("the rig fails: {}").format(found.cause.words)
+            if found.cause.again:
+                steps = tr(" and ").join(STEP_TITLES[part] for part in found.cause.again)
+                text = tr("{} (step {})").format(text, steps)
+            finding = Finding("", Health.BROKEN, text)
         else:
             is_whole = len(found.eyes) == len(EYES)
             eyes = passed_words(found.eyes)
@@ -186,6 +192,7 @@ class AcceptDialog(QDialog):
                 Health.GOOD if is_whole else Health.LIMITED,
                 tr("the rig passes: {}").format(eyes),
             )
+        self._project.note_accepted(finding.found, is_passed=not found.cause.words)
         if found.left_out:
             name, why = next(iter(found.left_out.items()))
             words = tr("{} left out, such as {}: {}").format(len(found.left_out), name, why)

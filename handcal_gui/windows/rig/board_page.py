@@ -8,7 +8,6 @@ from typing import get_args
 
 from PySide6.QtWidgets import (
     QCheckBox,
-    QFileDialog,
     QFormLayout,
     QLabel,
     QMessageBox,
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import write_png
+from handcal.io.resources import resource_path
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
 from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.print_page import Paper
@@ -41,6 +41,7 @@ from handcal_gui.widgets.fields import (
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.windows.rig.file_dialogs import ask_open, ask_save
 from handcal_gui.windows.rig.project import RigProject
 
 _KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": tr("Checkerboard")}
@@ -98,6 +99,9 @@ class BoardPage(QWidget):
             "savePicture", tr("Save &image…"), help_text=tr("PNG, to show on a screen")
         )
         self._begin = button("begin", tr("&Use another initial rig…"))
+        self._afresh = button(
+            "afresh", tr("Use the e&xample"), help_text=tr("Start afresh from the example rig")
+        )
         self._rig, self._state = paragraph("initialRig"), paragraph("initialRigState")
         self._found = FindingLine("board")
         self._problem = ""
@@ -115,6 +119,7 @@ class BoardPage(QWidget):
         self.main.clicked.connect(self._save_pdf)
         self._picture.clicked.connect(self._save_picture)
         self._begin.clicked.connect(self._ask_for_rig)
+        self._afresh.clicked.connect(lambda: self._start_from(resource_path("example_rig.yaml")))
         project.rig_changed.connect(self._show_rig)
         self._show_rig()
         self._take()
@@ -173,23 +178,19 @@ class BoardPage(QWidget):
         self._found.show_finding(found)
 
     def _save_pdf(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(
-            self, tr("Save the board"), "board.pdf", tr("PDF (*.pdf)")
-        )
-        if path:
-            self._save(lambda: write_board_pdf(Path(path), *self._printed()), path)
+        title = tr("Save the board")
+        if path := ask_save(self._project, self, title, "board.pdf", tr("PDF (*.pdf)")):
+            self._save(lambda: write_board_pdf(path, *self._printed()), path)
 
     def _save_picture(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(
-            self, tr("Save the board"), "board.png", tr("PNG (*.png)")
-        )
-        if path:
-            self._save(lambda: _write_picture(Path(path), self._project.inputs.board), path)
+        title = tr("Save the board")
+        if path := ask_save(self._project, self, title, "board.png", tr("PNG (*.png)")):
+            self._save(lambda: _write_picture(path, self._project.inputs.board), path)
 
     def _printed(self) -> tuple[Board, Paper]:
         return self._project.inputs.board, self._project.inputs.paper
 
-    def _save(self, write: Callable[[], None], path: str) -> None:
+    def _save(self, write: Callable[[], None], path: Path) -> None:
         try:
             write()
         except (ValueError, FileError) as error:
@@ -199,26 +200,27 @@ class BoardPage(QWidget):
         self._found.show_finding(Finding("", Health.GOOD, tr("saved as {}").format(path), advice))
 
     def _ask_for_rig(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(
-            self, tr("Choose an initial rig"), "", tr("Rig files (*.yaml *.yml)")
-        )
-        if not path or not self._confirm_discard():
+        title, pattern = tr("Choose an initial rig"), tr("Rig files (*.yaml *.yml)")
+        if path := ask_open(self._project, self, title, pattern):
+            self._start_from(path)
+
+    def _start_from(self, path: Path) -> None:
+        if not self._confirm_discard():
             return
         try:
-            self._project.start_from(Path(path))
+            self._project.start_from(path)
         except HandcalError as error:
             self._found.show_finding(Finding("", Health.BROKEN, str(error)))
 
     def _confirm_discard(self) -> bool:
-        """Ask before calibrated parts are discarded."""
-        if not self._project.rig.origins:
+        """Ask before calibrated parts that have not been saved are discarded."""
+        if not self._project.rig.origins or self._project.saved_file is not None:
             return True
-        answer = QMessageBox.question(
-            self,
-            tr("Use another initial rig"),
-            tr("Calibrated parts that have not been saved will be lost. Continue?"),
-        )
-        return answer == QMessageBox.StandardButton.Yes
+        parts = ", ".join(PART_NAMES[part] for part in self._project.rig.origins)
+        yes, no = QMessageBox.StandardButton.Yes, QMessageBox.StandardButton.No
+        title = tr("Use another initial rig")
+        text = tr("The rig has not been saved; this will be lost: {}. Continue?").format(parts)
+        return QMessageBox.question(self, title, text, yes | no, no) == yes
 
     def _show_rig(self) -> None:
         rig = self._project.rig
@@ -254,7 +256,7 @@ class BoardPage(QWidget):
                 )
             )
         )
-        left.addWidget(self._rig)
+        left.addLayout(hbox((self._rig, 1), self._afresh, spacing=SPACING_PX))
         left.addLayout(hbox((self._state, 1), self._begin, spacing=SPACING_PX))
         left.addStretch(1)
         hbox((left, 1), (self._preview, 1), on=self, margins=0, spacing=3 * SPACING_PX)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.images import write_png
@@ -19,6 +18,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, number, whole_number
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.rig.file_dialogs import ask_save
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import DisplayEntries, Distance
@@ -35,7 +35,9 @@ _GRID_HINT = tr(
 )
 _BOARD_HINT = tr(
     "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
-    "through it while the headset tracks the board, and save the poses in one JSON file."
+    "through it while the headset tracks the board. Save in one JSON file for each image its name "
+    "and the board's pose in the headset rig, 4 rows of 4 numbers in metres; the tooltip of Poses "
+    "of the board in Inputs shows it."
 )
 
 
@@ -136,7 +138,7 @@ class DisplayPage(StepPage):
         keys = tr("Ta&ke images…"), tr("Searc&h again")
         board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
         panels = {tr("Grid on the &display"): grid, tr("Ca&mera pose"): board}
-        super().__init__(f"{eye}DisplayPage", project, form, panels, parent)
+        super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
@@ -188,10 +190,6 @@ class DisplayPage(StepPage):
         )
         self.box.run(work, self._show_solved)
 
-    def show_known(self) -> None:
-        """Show the rig's present calibration of this display."""
-        self.box.show_origin(self.project.rig.origins.get(self._eye))
-
     @property
     def need(self) -> str:
         """The viewpoint camera's intrinsics, or images, if there are none."""
@@ -202,12 +200,17 @@ class DisplayPage(StepPage):
             "to solve, take images of the board, or choose their folder or a stereo calibration in "
             "Inputs"
         )
+        poses = tr(
+            "to solve, choose the file of the poses of the board in Inputs, or a stereo calibration"
+        )
         need = images_needed(self._grid, grid)
-        return need or ("" if self._entries.stereo else images_needed(self._board, board))
+        if need or self._entries.stereo:
+            return need
+        return images_needed(self._board, board) or ("" if self._entries.tracked else poses)
 
     def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
         display, place = solved
-        self.box.show_solved(display, self.project.add_part(display))
+        self.box.show_solved(display, self.project.add_part(self._eye, display, self.solved_with))
         self._grid.show_solved(display)
         self._board.show_solved(place)
 
@@ -225,11 +228,11 @@ class DisplayPage(StepPage):
         if (grid := self._shown()) is None:
             return
         name = f"grid-{self._eye}.png"
-        path, _ = QFileDialog.getSaveFileName(self, tr("Save the grid"), name, tr("PNG (*.png)"))
-        if not path:
+        path = ask_save(self.project, self, tr("Save the grid"), name, tr("PNG (*.png)"))
+        if path is None:
             return
         try:
-            write_png(Path(path), draw_grid(grid))
+            write_png(path, draw_grid(grid))
         except FileError as error:
             self._grid.show_trouble(str(error))
             return

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +19,9 @@ from handcal.rig.formats import read_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig_types import Rig
 from handcal_gui.translation import tr
-from handcal_gui.windows.rig.project_folder import ProjectFolder
+from handcal_gui.windows.rig.project_folder import LastAcceptance, ProjectFolder
 from handcal_gui.windows.rig.solve import SolvedPart
+from handcal_gui.windows.rig.step_inputs import Step, changed_inputs, step_inputs
 
 NOT_JUDGED, UNREADABLE = tr("not judged: the file has no verdict"), tr("the file cannot be read")
 _SETTLE_MS = 500
@@ -44,11 +47,14 @@ class RigProject(QObject):
         Message about files that could not be read; empty if there is none.
     rig_changed : Signal()
         The rig or the viewpoint camera's intrinsics have changed, or the board was found.
+    inputs_changed : Signal()
+        Other inputs were entered.
     failed : Signal(str)
         The entries could not be saved.
     """
 
     rig_changed = Signal()
+    inputs_changed = Signal()
     failed = Signal(str)
 
     def __init__(
@@ -96,6 +102,27 @@ class RigProject(QObject):
         if inputs != self.inputs:
             self.inputs = inputs
             self._settle.start()
+            self.inputs_changed.emit()
+
+    def inputs_of(self, step: Step) -> dict[str, str]:
+        """Return the present inputs of a step."""
+        return step_inputs(self.inputs, step, self.camera_file)
+
+    def outdated(self, step: Step) -> str:
+        """Return in words which inputs of a solved step are no longer those it was solved with."""
+        if step == "viewpoint":
+            is_solved = self.camera_file == self.folder.viewpoint and self.camera_file.exists()
+        else:
+            is_solved = step in self.rig.origins
+        then = self.inputs.solved.get(step, {})
+        if not is_solved or not (changed := changed_inputs(then, self.inputs_of(step))):
+            return ""
+        return tr("solved with other inputs ({}): solve it again").format(changed)
+
+    def note_solved(self, step: Step, inputs: Mapping[str, str]) -> None:
+        """Remember the inputs with which a step was solved."""
+        self.enter(solved={**self.inputs.solved, step: inputs})
+        self.save()
 
     @property
     def saved_file(self) -> Path | None:
@@ -116,19 +143,37 @@ class RigProject(QObject):
             self.enter(board_found=True)
             self.rig_changed.emit()
 
+    @property
+    def acceptance(self) -> LastAcceptance | None:
+        """The last acceptance of the present rig, whatever its name."""
+        last = self.inputs.acceptance
+        return last if last.made and last.rig == self.folder.rig_mark else None
+
+    def note_accepted(self, words: str, *, is_passed: bool) -> None:
+        """Remember an acceptance of the present rig."""
+        made = datetime.now(UTC).isoformat(timespec="seconds")
+        self.enter(acceptance=LastAcceptance(made, is_passed, words, self.folder.rig_mark))
+
     def start_from(self, path: Path) -> None:
         """Start from a rig file, or raise HandcalError; earlier calibrations are discarded."""
         self.use_rig(read_rig(path))
+        solved = self.inputs.solved
+        self.enter(solved={step: solved[step] for step in solved if step == "viewpoint"})
 
-    def add_part(self, solved: SolvedPart) -> str:
-        """Add a calibrated part to the rig; return the outcome as a message."""
+    def add_part(self, step: Step, solved: SolvedPart, inputs: Mapping[str, str]) -> str:
+        """Add a part calibrated from inputs to the rig; return the outcome as a message."""
         if solved.add_to is None:
             return tr("it was not added to the rig")
         try:
             self.use_rig(solved.add_to(self.rig))
         except HandcalError as error:
             return tr("it was not added to the rig: {}").format(error)
+        self.note_solved(step, inputs)
         return tr("it was added to the rig")
+
+    def remember_sources(self, sources: Mapping[str, str]) -> None:
+        """Remember the sources of images chosen for some cameras."""
+        self.enter(sources={**self.inputs.sources, **sources})
 
     def camera_solved(self) -> None:
         """Announce that the viewpoint camera's intrinsics may have changed."""

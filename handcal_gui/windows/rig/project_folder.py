@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -90,6 +92,18 @@ class DisplayEntries:
 
 
 @dataclass(frozen=True, slots=True)
+class LastAcceptance:
+    """The result of an acceptance."""
+
+    made: str = ""
+    """Date and time, ISO 8601; empty if there was none."""
+    is_passed: bool = False
+    words: str = ""
+    rig: str = ""
+    """`ProjectFolder.rig_mark` of the rig."""
+
+
+@dataclass(frozen=True, slots=True)
 class RigInputs:
     """Everything entered in the rig wizard."""
 
@@ -103,6 +117,13 @@ class RigInputs:
     right: DisplayEntries = field(default_factory=DisplayEntries)
     saved: str = ""
     """The rig file last saved."""
+    solved: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """For each solved step, its inputs at that time."""
+    acceptance: LastAcceptance = LastAcceptance()
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """The source of images last chosen for each camera."""
+    chosen_folder: str = ""
+    """Folder of the file last saved or opened."""
 
 
 class ProjectFolder:
@@ -172,6 +193,15 @@ class ProjectFolder:
             If it cannot be written.
         """
         write_rig(self._rig, rig)
+
+    @property
+    def rig_mark(self) -> str:
+        """Hash of the partly calibrated rig without its name; empty before anything is stored."""
+        try:
+            lines = self._rig.read_bytes().splitlines()
+        except OSError:
+            return ""
+        return sha256(b"\n".join(one for one in lines if one[:5] != b"name:")).hexdigest()
 
     def is_rig(self, path: Path) -> bool:
         """Return whether a file is the same as the rig in this folder."""

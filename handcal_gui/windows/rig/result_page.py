@@ -10,17 +10,17 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QHideEvent
 from PySide6.QtWidgets import (
-    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLineEdit,
+    QMessageBox,
     QTabWidget,
     QWidget,
 )
 
 from handcal.errors import FileError, HandcalError
 from handcal.io.files import user_path
-from handcal.rig.check import MAX_TEXT
+from handcal.rig.check import MAX_NAME
 from handcal.rig.report import RigFinding, report_rig
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import PART_NAMES, RIG_PARTS, Rig
@@ -28,15 +28,18 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
-from handcal_gui.widgets.fields import button, main_button, with_name
+from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
+from handcal_gui.windows.rig.file_dialogs import ask_save
 from handcal_gui.windows.rig.finding_list import FindingList
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.rows import COLUMNS, difference_rows, rig_rows
+from handcal_gui.windows.rig.step_inputs import STEP_TITLES
 
 _RIG_FILES = tr("Rig files (*.yaml *.yml)")
 
@@ -57,7 +60,10 @@ class ResultPage(QWidget):
         self.setObjectName("resultPage")
         self._project = project
         self._acceptance: AcceptDialog | None = None
-        self._name = with_name(QLineEdit(maxLength=MAX_TEXT), "rigName", tr("Name of the rig"))
+        self._name = with_name(QLineEdit(maxLength=MAX_NAME), "rigName", tr("Name of the rig"))
+        self._name_problem = paragraph(
+            "rigNameProblem", tr("Enter a name of printable characters, to save the rig.")
+        )
         self._findings = FindingList(tr("Check of the rig"))
         self._numbers = NumberTable("numbers-of-the-rig", tr("Numbers of the rig"))
         self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
@@ -75,6 +81,7 @@ class ResultPage(QWidget):
         self._lay_out()
         self.enter()
         self._other.changed.connect(self._compare)
+        self._name.textChanged.connect(self._show_name_problem)
         self._name.editingFinished.connect(self._on_name_edited)
         self.main.clicked.connect(self.save)
         self._accept.clicked.connect(self._open_acceptance)
@@ -85,7 +92,7 @@ class ResultPage(QWidget):
         """Show the present rig."""
         rig = self._project.rig
         self._name.setText(rig.name)
-        findings = report_rig(rig)
+        findings = (*report_rig(rig), *self._outdated(), self._accepted())
         self._findings.show_findings(findings)
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         saved = self._project.saved_file
@@ -105,9 +112,9 @@ class ResultPage(QWidget):
         """Choose a path and save the rig file."""
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
         proposed = f"{plain or 'rig'}.yaml"
-        path, _ = QFileDialog.getSaveFileName(self, tr("Save the rig file"), proposed, _RIG_FILES)
-        if path:
-            self.save_as(Path(path))
+        path = ask_save(self._project, self, tr("Save the rig file"), proposed, _RIG_FILES)
+        if path and self._confirm_mixed():
+            self.save_as(path)
 
     def save_as(self, path: Path) -> None:
         """Save the rig file."""
@@ -124,13 +131,46 @@ class ResultPage(QWidget):
         if self._acceptance is not None:
             self._acceptance.reject()
 
+    def _outdated(self) -> list[RigFinding]:
+        """Return the steps that were solved with other inputs than the present ones."""
+        expected = tr("solved with the present inputs")
+        found = {title: self._project.outdated(step) for step, title in STEP_TITLES.items()}
+        return [RigFinding(title, why, False, expected) for title, why in found.items() if why]
+
+    def _accepted(self) -> RigFinding:
+        """Return the last acceptance of this rig."""
+        what, last = tr("Acceptance"), self._project.acceptance
+        if last is None:
+            return RigFinding(what, tr("not yet, or the rig has changed"), is_known=False)
+        found = f"{local_time(last.made)}: {last.words}"
+        return RigFinding(what, found, last.is_passed, tr("the rig passes"))
+
+    def _confirm_mixed(self) -> bool:
+        """Ask before a rig is saved whose parts are not all solved with the present inputs."""
+        mixed = "\n".join(f"{one.what}: {one.found}." for one in self._outdated())
+        if not mixed:
+            return True
+        yes, no = QMessageBox.StandardButton.Yes, QMessageBox.StandardButton.No
+        text = tr("The rig is of mixed inputs. Save it nevertheless?\n\n{}").format(mixed)
+        return QMessageBox.question(self, tr("Save the rig file"), text, yes | no, no) == yes
+
     def _open_acceptance(self) -> None:
         self._acceptance = AcceptDialog(self._project, self)
+        self._acceptance.finished.connect(self.enter)
         self._acceptance.open()
+
+    def _show_name_problem(self) -> None:
+        self._name_problem.setVisible(not self._is_name)
+        self.main.setEnabled(self._is_name)
+
+    @property
+    def _is_name(self) -> bool:
+        name = self._name.text().strip()
+        return bool(name) and name.isprintable()
 
     def _on_name_edited(self) -> None:
         name = self._name.text().strip()
-        if name == self._project.rig.name:
+        if name == self._project.rig.name or not self._is_name:
             return
         try:
             self._project.use_rig(replace(self._project.rig, name=name))
@@ -176,6 +216,8 @@ class ResultPage(QWidget):
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.addRow(tr("Name"), self._name)
+        form.addRow("", self._name_problem)
+        self._name_problem.hide()
         foot = QHBoxLayout()
         foot.setSpacing(2 * SPACING_PX)
         foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)

@@ -153,7 +153,8 @@ def _note(item: QTreeWidgetItem, note: str) -> None:
     """Show the image's name with a note below."""
     text = "\n".join(filter(None, (_name(item), sentence(note))))
     item.setText(_IMAGE, text)
-    item.setToolTip(_IMAGE, text)
+    for column in range(len(_COLUMNS)):
+        item.setToolTip(column, text)
 
 
 def _picture(image: UInt8) -> QIcon:

@@ -9,6 +9,7 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
+from handcal.errors import FileError
 from handcal.rig.board import BoardView
 from handcal.rig.views import BoardImage
 from handcal.types import UInt8
@@ -41,7 +42,6 @@ class ShotView(QWidget):
         self._captions = tuple(paragraph("shotCaption") for _ in titles)
         self._read = LatestJob(_read, self)
         self._read.answered.connect(self._show_images)
-        self._read.failed.connect(self._show_message)
         parts = zip(self._captions, self._images, strict=True)
         pairs = [
             (vbox(caption, (image, 1), spacing=SPACING_PX // 2), 1) for caption, image in parts
@@ -61,16 +61,16 @@ class ShotView(QWidget):
         """Wait for background work to end."""
         self._read.stop()
 
-    def _show_images(self, files: tuple[Path, ...], images: tuple[UInt8, ...]) -> None:
+    def _show_images(self, files: tuple[Path, ...], images: tuple[UInt8 | str, ...]) -> None:
         if self._shot is None or files != self._shot.files:
             return
         texts = zip(self._captions, self._titles, strict=True)
         parts = zip(self._images, texts, self._shot.views, images, strict=True)
         for shown, (caption, title), view, image in parts:
-            shown.show_image(image)
             found = view.found
+            shown.show_image(None if isinstance(image, str) else image)
             shown.show_overlay(None if found is None else partial(_draw_corners, found))
-            shown.show_text()
+            shown.show_text(message=image if isinstance(image, str) else "")
             caption.setText(f"{title}: {_caption(view)}")
 
     def _show_message(self, message: str) -> None:
@@ -81,8 +81,16 @@ class ShotView(QWidget):
             shown.show_text(message=message)
 
 
-def _read(files: tuple[Path, ...]) -> tuple[UInt8, ...]:
-    return tuple(read_color(file) for file in files)
+def _read(files: tuple[Path, ...]) -> tuple[UInt8 | str, ...]:
+    return tuple(_read_one(file) for file in files)
+
+
+def _read_one(file: Path) -> UInt8 | str:
+    """Return an image, or why it cannot be read: the other of a pair is shown nevertheless."""
+    try:
+        return read_color(file)
+    except FileError as error:
+        return str(error)
 
 
 def _caption(view: BoardImage) -> str:

@@ -143,11 +143,11 @@ def _compared(result: CameraCalibration) -> str:
     """Return the lens models compared with their errors on images not used to solve them."""
     edge, unknown = tr("± {:.2f} px at the edge"), tr("unknown at the edge")
     listed = ", ".join(
-        f"{one.lens} {one.held_out_px:.3f} px "
+        f"of {one.lens} {one.held_out_px:.3f} px "
         f"({edge.format(one.edge_px) if math.isfinite(one.edge_px) else unknown})"
         for one in result.compared
     )
-    return tr("lens {}, of {}").format(result.lens, listed)
+    return tr("lens model {}, by the errors on images left out: {}").format(result.lens, listed)
 
 
 def _tilts(views: Sequence[BoardImage], camera: Camera) -> dict[str, float]:

@@ -71,14 +71,15 @@ class SolveBox(QWidget):
 
         self.bar.run(tr("Solving"), solve, then)
 
-    def show_origin(self, origin: Origin | None) -> None:
-        """Show an earlier result; None if there is none."""
+    def show_origin(self, origin: Origin | None, outdated: str = "") -> None:
+        """Show an earlier result, or that it is outdated; None if there is none."""
         self._clear()
-        if origin is None:
-            self.show_finding(Finding("", Health.LIMITED, tr("Not solved yet")))
+        if origin is None or outdated:
+            text = outdated or tr("Not solved yet")
+            self.show_finding(Finding("", Health.LIMITED, text))
             return
-        text = tr("Solved {}: {}; {}").format(
-            local_time(origin.made), origin.verdict, origin.reason
+        text = tr("Solved {}: {}; {}; RMS {:.3f} px").format(
+            local_time(origin.made), origin.verdict, origin.reason, origin.rms_px
         )
         self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
 

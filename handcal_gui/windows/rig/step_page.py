@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
@@ -11,6 +12,7 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
+from handcal.rig_types import Origin
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
@@ -19,6 +21,7 @@ from handcal_gui.widgets.layouts import hbox, scrollable, vbox
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
+from handcal_gui.windows.rig.step_inputs import Step
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 
 _FIRST_PANEL = 2
@@ -34,6 +37,7 @@ class StepPage(QWidget):
     ----------
     name : str
         Object name.
+    step : {"T_H_D", "viewpoint", "left", "right"}
     project : RigProject
     form : EntriesForm
     panels : mapping of str to ImagesPanel
@@ -45,6 +49,10 @@ class StepPage(QWidget):
     panels : tuple of ImagesPanel
     box : SolveBox
     main : MainButton
+    inputs : mapping of str to str
+        The present inputs of the step, by field.
+    solved_with : mapping of str to str
+        The inputs from which it was last solved, or is being solved.
     strip : QWidget
         With the main button, for the bottom of the window.
     """
@@ -52,6 +60,7 @@ class StepPage(QWidget):
     def __init__(
         self,
         name: str,
+        step: Step,
         project: RigProject,
         form: EntriesForm,
         panels: Mapping[str, ImagesPanel],
@@ -60,6 +69,8 @@ class StepPage(QWidget):
         super().__init__(parent)
         self.setObjectName(name)
         self.project = project
+        self.step = step
+        self.inputs = self.solved_with = project.inputs_of(step)
         self.form = form
         self.panels = tuple(panels.values())
         self.box = SolveBox()
@@ -70,7 +81,7 @@ class StepPage(QWidget):
         self._lay_out()
         form.changed.connect(self.keep)
         form.changed.connect(self._refresh)
-        self.box.button.clicked.connect(self.solve)
+        self.box.button.clicked.connect(self._solve)
         for panel in self.panels:
             panel.dropped_changed.connect(self.keep)
             panel.dropped_changed.connect(self._refresh)
@@ -82,6 +93,7 @@ class StepPage(QWidget):
         self.box.shown.connect(self._refresh)
         project.rig_changed.connect(self.show_known)
         project.rig_changed.connect(self._refresh)
+        project.inputs_changed.connect(self._refresh)
 
     def enter(self) -> None:
         """Search the entered folders, unless already done."""
@@ -97,7 +109,8 @@ class StepPage(QWidget):
 
     def show_known(self) -> None:
         """Show the rig's present calibration of this part."""
-        raise NotImplementedError
+        origins: Mapping[Any, Origin] = self.project.rig.origins
+        self.box.show_origin(origins.get(self.step), self.project.outdated(self.step))
 
     @property
     def need(self) -> str:
@@ -130,12 +143,23 @@ class StepPage(QWidget):
             then()
             self.enter()
 
-        dialog = TakeDialog(
-            folders, board, choose or ChooseSettings(), self.project.realsense, self
-        )
+        project, choose = self.project, choose or ChooseSettings()
+        dialog = TakeDialog(folders, board, choose, project.realsense, self, project.inputs.sources)
+        dialog.remembered.connect(project.remember_sources)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(end)
         dialog.open()
+
+    def _solve(self) -> None:
+        self._refresh()  # a file may have been written since
+        self.solved_with = self.inputs
+        self.solve()
+
+    def _follow(self) -> None:
+        """Show no longer a result or a failure of other inputs."""
+        if (now := self.project.inputs_of(self.step)) != self.inputs:
+            self.inputs = now
+            self.show_known()
 
     def _lay_out(self) -> None:
         setup, inputs = QWidget(), QWidget()
@@ -164,6 +188,7 @@ class StepPage(QWidget):
         return any(panel.bar.is_busy for panel in self.panels)
 
     def _refresh(self) -> None:
+        self._follow()
         panels = zip(self._titles, self.panels, strict=True)
         for place, (title, panel) in enumerate(panels, _FIRST_PANEL):
             count = f" ({panel.count})" if panel.count else ""

@@ -69,7 +69,7 @@ class StereoPage(StepPage):
         )
         form.show_entries(project.inputs.stereo)
         panel = ImagesPanel((tr("Depth camera"), tr("Headset camera")), _HINT, "setup-stereo")
-        super().__init__("stereoPage", project, form, {tr("&Pairs"): panel}, parent)
+        super().__init__("stereoPage", "T_H_D", project, form, {tr("&Pairs"): panel}, parent)
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
@@ -91,10 +91,6 @@ class StereoPage(StepPage):
         work = partial(solve_stereo, self.panel.shots, self.project.inputs.stereo)
         self.box.run(work, self._show_solved)
 
-    def show_known(self) -> None:
-        """Show the rig's present pose of the depth camera."""
-        self.box.show_origin(self.project.rig.origins.get("T_H_D"))
-
     @property
     def need(self) -> str:
         """Pairs of images, if there are none."""
@@ -102,7 +98,7 @@ class StereoPage(StepPage):
         return images_needed(self.panel, request)
 
     def _show_solved(self, solved: SolvedPart) -> None:
-        self.box.show_solved(solved, self.project.add_part(solved))
+        self.box.show_solved(solved, self.project.add_part("T_H_D", solved, self.solved_with))
         self.panel.show_solved(solved)
 
     def _take(self) -> None:

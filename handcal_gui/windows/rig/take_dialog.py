@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QDialog, QWidget
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.camera.take_board import keep_imager, keep_images, see_board
+from handcal.camera.take_board import are_kept, keep_imager, keep_images, see_board
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.progress import Progress
@@ -27,6 +29,8 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
 
+_TAKEN = tr("this has been taken already")
+
 
 class TakeDialog(QDialog):
     """Shows live images of one or two cameras, and takes images with all of them at once.
@@ -40,11 +44,20 @@ class TakeDialog(QDialog):
     choose : ChooseSettings
         Criteria for images taken automatically.
     realsense : RealSenseSettings
+    sources : mapping of str to str
+        Source last chosen for each camera, by its name.
     open_source : callable
         Like `open_view_source`.
     list_cameras : callable
         Like `list_viewpoints`.
+
+    Attributes
+    ----------
+    remembered : Signal(dict)
+        The sources that are shown, by the cameras' names.
     """
+
+    remembered = Signal(object)
 
     def __init__(
         self,
@@ -53,6 +66,7 @@ class TakeDialog(QDialog):
         choose: ChooseSettings,
         realsense: RealSenseSettings,
         parent: QWidget | None = None,
+        sources: Mapping[str, str] = MappingProxyType({}),
         open_source: Callable[..., ViewpointCamera] = open_view_source,
         list_cameras: Callable[[], list[int]] = list_viewpoints,
     ) -> None:
@@ -107,6 +121,7 @@ class TakeDialog(QDialog):
         self._bar.run(
             tr("Looking for cameras"), lambda *_: list_cameras(), self._cameras.add_cameras
         )
+        self._cameras.choose(sources)
 
     @property
     def shown_images(self) -> Images | None:
@@ -116,7 +131,9 @@ class TakeDialog(QDialog):
     def start(self) -> None:
         """Show the images of the chosen cameras."""
         self._stop_search()
+        self._found.clear()
         self._cameras.start()
+        self.remembered.emit(self._cameras.chosen)
 
     def take(self) -> None:
         """Save the present images, and search them for the board."""
@@ -125,7 +142,10 @@ class TakeDialog(QDialog):
             return
 
         def work(_progress: Progress) -> object:
-            names = keep_images(images, tuple(self._folders.values()))
+            folders = tuple(self._folders.values())
+            if are_kept(images, folders):
+                return []
+            names = keep_images(images, folders)
             return [
                 board_image(name, one, self._board) for name, one in zip(names, images, strict=True)
             ]
@@ -152,9 +172,12 @@ class TakeDialog(QDialog):
 
     def _keep_if_new(self, images: Images) -> str:
         """Save images if useful, otherwise return why not; runs in the job's thread."""
+        folders = tuple(self._folders.values())
+        if self._cameras.are_stored and are_kept(images, folders):
+            return _TAKEN
         why_not = self._selector.consider(see_board(images, self._board))
         if not why_not:
-            keep_images(images, tuple(self._folders.values()))
+            keep_images(images, folders)
         return why_not
 
     def _on_searched(self, _images: Images, why_not: str) -> None:
@@ -186,7 +209,9 @@ class TakeDialog(QDialog):
 
     def _show_taken(self, views: list[BoardImage]) -> None:
         problem = "; ".join(f"{view.name}: {view.problem}" for view in views if view.problem)
-        if problem:
+        if not views:
+            found = Finding("", Health.LIMITED, _TAKEN, tr("take another"))
+        elif problem:
             found = Finding("", Health.LIMITED, problem, tr("take another"))
         else:
             counts = tr(" and ").join(str(len(view.found.ids)) for view in views if view.found)

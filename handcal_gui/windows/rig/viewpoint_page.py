@@ -42,7 +42,9 @@ class ViewpointPage(StepPage):
         )
         form.show_entries(project.inputs.viewpoint)
         panel = ImagesPanel((tr("Viewpoint camera"),), _HINT, "setup-viewpoint")
-        super().__init__("viewpointPage", project, form, {tr("I&mages"): panel}, parent)
+        super().__init__(
+            "viewpointPage", "viewpoint", project, form, {tr("I&mages"): panel}, parent
+        )
         self.panel = panel
         self.panel.take_requested.connect(self._take)
         self.show_known()
@@ -57,7 +59,6 @@ class ViewpointPage(StepPage):
         entries = self.form.take(self.project.inputs.viewpoint)
         dropped = self.panel.dropped_of(entries.dropped)
         self.project.enter(viewpoint=replace(entries, dropped=dropped))
-        self.show_known()
         self.enter()
 
     def solve(self) -> None:
@@ -67,9 +68,10 @@ class ViewpointPage(StepPage):
 
     def show_known(self) -> None:
         """Show the file of intrinsics, if there is one."""
-        self.box.show_origin(None)
+        outdated = self.project.outdated("viewpoint")
+        self.box.show_origin(None, outdated)
         file = self.project.camera_file
-        if verdict := self.project.camera_verdict:
+        if not outdated and (verdict := self.project.camera_verdict):
             found = tr("the intrinsics are in {}: {}").format(file, verdict)
             finding = Finding("", HEALTHS.get(verdict, Health.LIMITED), found)
             if verdict == UNREADABLE:
@@ -86,6 +88,8 @@ class ViewpointPage(StepPage):
     def _show_solved(self, solved: SolvedPart) -> None:
         is_bad = solved.verdict.name == "bad"
         kept = tr("it is not used") if is_bad else tr("the displays will be calibrated with it")
+        if not is_bad:
+            self.project.note_solved("viewpoint", self.solved_with)
         self.project.camera_solved()
         self.box.show_solved(solved, kept)
         self.panel.show_solved(solved)

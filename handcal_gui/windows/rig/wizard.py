@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.rig_types import RigPart
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
@@ -25,9 +24,10 @@ from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
-from handcal_gui.windows.rig.project import NOT_JUDGED, UNREADABLE, RigProject
+from handcal_gui.windows.rig.project import UNREADABLE, RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.result_page import ResultPage
+from handcal_gui.windows.rig.step_inputs import STEP_TITLES, Step
 from handcal_gui.windows.rig.stereo_page import StereoPage
 from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
 
@@ -37,36 +37,35 @@ _SAVED = tr("saved")
 _SIGNS = {
     "good": ("check", "good"),
     _SAVED: ("check", "good"),
-    "needs more views": ("warning", "warning"),
-    NOT_JUDGED: ("warning", "warning"),
     "bad": ("cross", "red"),
     UNREADABLE: ("cross", "red"),
 }
-_BOARD, _VIEWPOINT = tr("Board"), tr("Viewpoint camera")
-_STEPS: dict[str, tuple[str, RigPart | None]] = {
+_DOUBTFUL, _UNDONE = ("warning", "warning"), ("wait", "muted")
+_BOARD = tr("Board")
+_STEPS: dict[str, tuple[str, Step | None]] = {
     _BOARD: (tr("Print the board at 100 %, measure a square and enter its size."), None),
-    tr("Depth and headset camera"): (
+    STEP_TITLES["T_H_D"]: (
         tr(
             "Take images of the board with both cameras, and solve where the depth camera is on "
             "the headset."
         ),
         "T_H_D",
     ),
-    _VIEWPOINT: (
+    STEP_TITLES["viewpoint"]: (
         tr(
             "Take images of the board with the camera that later takes the eye's place, and solve "
             "its lens."
         ),
-        None,
+        "viewpoint",
     ),
-    tr("Left display"): (
+    STEP_TITLES["left"]: (
         tr(
             "Put the viewpoint camera behind the left display, take images of its grid and of the "
             "board, enter the screen's distance in Inputs, and solve."
         ),
         "left",
     ),
-    tr("Right display"): (
+    STEP_TITLES["right"]: (
         tr(
             "Do the same behind the right display: take images of its grid and of the board, enter "
             "the screen's distance in Inputs, and solve."
@@ -75,7 +74,7 @@ _STEPS: dict[str, tuple[str, RigPart | None]] = {
     ),
     tr("Result"): (tr("Name the rig, look at what is doubtful, save it, and use it."), None),
 }
-"""By title: the step's purpose, and the part of the rig that it calibrates."""
+"""By title: the step's purpose, and what it solves."""
 
 
 class RigPage(Protocol):
@@ -147,6 +146,7 @@ class RigWizard(QDialog):
         self._next.clicked.connect(lambda: self.show_step(self.step + 1))
         self._close.clicked.connect(self.accept)
         self.project.rig_changed.connect(self._refresh)
+        self.project.inputs_changed.connect(self._refresh)
         self.project.failed.connect(self._banner.show_message)
         result.rig_saved.connect(self.rig_saved)
         self._banner.show_message(self.project.complaint)
@@ -190,12 +190,13 @@ class RigWizard(QDialog):
         self._back.setEnabled(step > 0)
         self._next.setEnabled(step < len(_STEPS) - 1)
         self._pages[step].enter()
+        self._refresh()  # images may have been taken
 
     def _refresh(self) -> None:
         """Mark each step with its state."""
         for row, title in enumerate(_STEPS):
             verdict = self._verdict(title)
-            name, role = _SIGNS.get(verdict, ("wait", "muted"))
+            name, role = _SIGNS.get(verdict, _DOUBTFUL if verdict else _UNDONE)
             sign = icon(name, getattr(colors(), role))
             chosen = icon(name, self.palette().highlightedText().color().name())
             sign.addPixmap(chosen.pixmap(2 * SPACING_PX), QIcon.Mode.Selected)
@@ -204,14 +205,16 @@ class RigWizard(QDialog):
 
     def _verdict(self, title: str) -> str:
         """Return a step's verdict; empty if it is not done."""
-        origins = self.project.rig.origins
-        part = _STEPS[title][1]
-        if part is not None:
-            return origins[part].verdict if part in origins else ""
+        step = _STEPS[title][1]
+        if step is not None and (outdated := self.project.outdated(step)):
+            return outdated
+        if step == "viewpoint":
+            return self.project.camera_verdict
+        if step is not None:
+            origin = self.project.rig.origins.get(step)
+            return origin.verdict if origin else ""
         if title == _BOARD:
             return "good" if self.project.inputs.board_found else ""
-        if title == _VIEWPOINT:
-            return self.project.camera_verdict
         return _SAVED if self.project.saved_file else ""
 
     def _lay_out(self) -> None:

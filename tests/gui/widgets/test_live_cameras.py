@@ -57,6 +57,16 @@ def pair(qtbot: QtBot, still_camera: Any) -> Iterator[Pair]:
     pair.widget.stop()
 
 
+def test_cameras_of_the_last_time_are_chosen_once_they_are_found(qtbot: QtBot) -> None:
+    widget = LiveCameras(("Left camera", "Right camera"))
+    qtbot.addWidget(widget)
+    widget.choose({"Left camera": "1", "Right camera": "0", "Another": "2"})
+    widget.add_cameras([0, 1])
+    assert widget.chosen == {"Left camera": "1", "Right camera": "0"}
+    widget.choose({"Left camera": "7"})
+    assert widget.chosen["Left camera"] == "1", "the other is no longer there"
+
+
 def test_what_both_see_is_shown_until_it_is_stopped(qtbot: QtBot, pair: Pair) -> None:
     pair.widget.start()
     qtbot.waitUntil(lambda: pair.levels == [50, 90])

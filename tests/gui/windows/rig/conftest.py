@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QFileDialog
+from pytestqt.qtbot import QtBot
 
 from handcal.rig import board_finder
 from handcal.rig.board import Board, Int64
@@ -19,11 +21,13 @@ from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_photographs
 from handcal.types import Float64, Intrinsics, UInt8
 from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
+    ProjectFolder,
     RigInputs,
     StereoEntries,
     ViewpointEntries,
 )
 from handcal_gui.windows.rig.shots import read_color
+from handcal_gui.windows.rig.wizard import RigWizard
 
 find_corners = board_finder.find_corners
 
@@ -78,6 +82,22 @@ def photographs(tmp_path_factory: pytest.TempPathFactory) -> Photographs:
         ),
     )
     return Photographs(out, work, VIEWPOINT_CAMERA)
+
+
+@pytest.fixture
+def folder(photographs: Any, tmp_path: Path) -> Path:
+    """A work folder with everything entered, but nothing solved."""
+    ProjectFolder(tmp_path / "rig").save(photographs.work)
+    return tmp_path / "rig"
+
+
+@pytest.fixture
+def wizard(qtbot: QtBot, folder: Path) -> Iterator[RigWizard]:
+    wizard = RigWizard(ProjectFolder(folder))
+    qtbot.addWidget(wizard)
+    wizard.show()
+    yield wizard
+    wizard.accept()
 
 
 @pytest.fixture

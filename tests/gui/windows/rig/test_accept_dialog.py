@@ -4,22 +4,34 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QTableWidget, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QLabel,
+    QPushButton,
+    QTableWidget,
+    QTreeWidget,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.acceptance import write_acceptance
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
+from handcal.types import EYES
 from handcal_gui.widgets.drawing import Drawing
+from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder, ViewpointEntries
+from handcal_gui.windows.rig.result_page import ResultPage
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from tests.gui.helpers import letters
 
@@ -73,6 +85,29 @@ def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> Non
     taking.reject()
 
 
+def test_the_sources_are_those_of_the_last_time(
+    qtbot: QtBot, dialog: AcceptDialog, project: RigProject, tmp_path: Path
+) -> None:
+    def open_take() -> tuple[TakeDialog, QComboBox, PathField]:
+        part(dialog, QPushButton, "left-board").click()
+        taking = dialog.findChildren(TakeDialog)[-1]
+        return taking, taking.findChildren(QComboBox)[1], taking.findChildren(PathField)[1]
+
+    recording = tmp_path / "depth.db3"
+    recording.touch()
+    taking, source, path = open_take()
+    source.setCurrentIndex(source.findText("Recording or video"))
+    path.set_path(str(recording))
+    taking.start()
+    taking.reject()
+    project.save()
+    assert ProjectFolder(project.folder.path).load()[0].sources["Depth camera"] == str(recording)
+    taking, source, path = open_take()
+    assert source.currentText() == "Recording or video"
+    assert path.path == str(recording)
+    taking.reject()
+
+
 def test_what_is_missing_is_in_sight(
     qtbot: QtBot, dialog: AcceptDialog, project: RigProject, tmp_path: Path
 ) -> None:
@@ -104,3 +139,40 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     assert table.rowCount() >= 5
     assert (folder / "page" / "report.html").exists()
     dialog.reject()
+
+
+def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: RigProject) -> None:
+    folder = project.folder.path / "accept"
+    write_acceptance(folder, project.rig, 8, np.random.default_rng(1), samples=1)
+    for eye in EYES:
+        (folder / eye / "grid").mkdir()
+        (folder / eye / "grid.png").rename(folder / eye / "grid" / "grid-001.png")
+    left = project.rig.eyes["left"]
+    wrong = replace(left, K=np.array([[1, 0, 40], [0, 1, 0], [0, 0, 1.0]]) @ left.K)
+    project.use_rig(replace(project.rig, eyes={**project.rig.eyes, "left": wrong}))
+    page = ResultPage(project)
+    qtbot.addWidget(page)
+    findings = part(page, QTreeWidget, "rigFindings")
+
+    def acceptance() -> str:
+        rows = [findings.topLevelItem(row) for row in range(findings.topLevelItemCount())]
+        (found,) = (row.text(1) for row in rows if row and row.text(0) == "Acceptance")
+        return found
+
+    assert acceptance().startswith("not yet")
+    part(page, QPushButton, "acceptRig").click()
+    dialog = part(page, AcceptDialog, "acceptDialog")
+    part(dialog, QPushButton, "runAcceptance").click()
+    found = part(dialog, QLabel, "acceptedFound")
+    qtbot.waitUntil(lambda: "fails: left" in found.text(), timeout=30_000)
+    assert "(step Left display)" in found.text()
+    assert "handcal rig" not in found.text()
+    dialog.reject()
+    assert "fails: left" in acceptance()
+    project.use_rig(replace(project.rig, name="another name"))
+    assert "fails: left" in acceptance()
+    project.save()
+    again = RigProject(ProjectFolder(project.folder.path), RealSenseSettings())
+    assert again.acceptance == project.acceptance is not None
+    project.use_rig(replace(project.rig, eyes={**project.rig.eyes, "left": left}))
+    assert acceptance().startswith("not yet")

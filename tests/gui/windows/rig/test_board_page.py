@@ -3,10 +3,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QMessageBox, QPushButton, QSpinBox
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QLabel,
+    QMessageBox,
+    QPushButton,
+    QSpinBox,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
@@ -104,6 +113,26 @@ def test_the_board_is_saved(
     assert "Not saved" in found(page)
 
 
+def test_dialogs_begin_in_the_folder_used_last(
+    page: BoardPage, project: RigProject, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    proposed: list[str] = []
+
+    def answer(*words: Any) -> tuple[str, str]:
+        proposed.append(words[2])
+        return str(tmp_path / "mine" / "board.pdf"), ""
+
+    (tmp_path / "mine").mkdir()
+    for ask in ("getSaveFileName", "getOpenFileName"):
+        monkeypatch.setattr(QFileDialog, ask, answer)
+    for name in ("savePdf", "savePicture", "begin"):
+        press(page, name)
+    mine = tmp_path / "mine"
+    assert proposed == ["board.pdf", str(mine / "board.png"), str(mine)]
+    project.save()
+    assert ProjectFolder(project.folder.path).load()[0].chosen_folder == str(mine)
+
+
 def test_another_rig_is_begun_from(
     page: BoardPage,
     project: RigProject,
@@ -128,3 +157,25 @@ def test_another_rig_is_begun_from(
     choose(tmp_path / "none.yaml")
     press(page, "begin")
     assert "none.yaml" in found(page)
+
+
+def test_only_what_is_not_saved_is_asked_about_and_no_is_the_default(
+    page: BoardPage, project: RigProject, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[str] = []
+
+    def question(*words: Any) -> QMessageBox.StandardButton:
+        asked.append(words[2])
+        assert words[-1] == QMessageBox.StandardButton.No
+        return QMessageBox.StandardButton.No
+
+    monkeypatch.setattr(QMessageBox, "question", question)
+    project.use_rig(replace(example_rig(), name="ours", origins={"left": ORIGIN}))
+    press(page, "afresh")
+    assert project.rig.name == "ours"
+    assert "left display" in asked[0]
+    project.save_rig_as(tmp_path / "ours.yaml")
+    press(page, "afresh")
+    assert project.rig.name == example_rig().name
+    assert not project.rig.origins
+    assert len(asked) == 1

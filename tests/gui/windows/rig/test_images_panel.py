@@ -72,6 +72,19 @@ def text(panel: QWidget, name: str) -> str:
     return label.text()
 
 
+def test_an_image_is_shown_although_the_other_of_its_pair_cannot_be_read(
+    qtbot: QtBot, panel: ImagesPanel, photographs: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "depth-001.png").write_bytes(b"no image")
+    panel.look((str(tmp_path), photographs.work.stereo.headset_images), photographs.work.board, ())
+    depth, headset = panel.findChildren(ImageView)[:2]
+    qtbot.waitUntil(lambda: headset.has_image and "depth-001.png" in depth.message)
+    assert not depth.has_image
+    assert headset.message == ""
+    for column in range(4):
+        assert "depth-001.png" in item(panel, 0).toolTip(column), "the list may cut it"
+
+
 def test_what_was_found_is_listed(qtbot: QtBot, full: ImagesPanel) -> None:
     assert text(full, "count") == "8 of 9 used"
     assert item(full, 0).text(0) == "depth-001.png"

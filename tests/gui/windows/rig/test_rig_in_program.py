@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
@@ -42,6 +44,24 @@ def test_the_start_page_leads_to_a_rig_that_it_uses(program: Program, tmp_path: 
     program.window.close()
     assert not wizard.isVisible()
     assert (tmp_path / "config" / "rig" / "work.json").exists()
+
+
+def test_the_rig_is_named_as_soon_as_the_wizard_is_closed(
+    qtbot: QtBot, program: Program, tmp_path: Path
+) -> None:
+    found = program.window.findChild(QLabel, "rigFound")
+    assert isinstance(found, QLabel)
+    qtbot.waitUntil(lambda: "Example" in found.text())
+    wizard = program.windows.calibrate_rig()
+    assert wizard is not None
+    path = tmp_path / "ours.yaml"
+    write_rig(path, replace(example_rig(), name="Rig 7"))
+    wizard.rig_saved.emit(path)
+    settle, again = (program.start.new.findChildren(QTimer)[place] for place in (0, 1))
+    qtbot.waitUntil(lambda: not settle.isActive())
+    again.stop()
+    wizard.accept()
+    qtbot.waitUntil(lambda: "Rig 7" in found.text(), timeout=2000)
 
 
 def test_a_missing_folder_is_reported_with_the_reason(program: Program, tmp_path: Path) -> None:

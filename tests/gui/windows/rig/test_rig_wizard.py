@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
     QLabel,
     QLineEdit,
-    QListWidget,
     QPushButton,
     QScrollArea,
     QSpinBox,
@@ -38,56 +36,19 @@ from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from handcal_gui.windows.rig.wizard import RigWizard
 from tests.gui.helpers import letters
-
-BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
-
-
-@pytest.fixture
-def folder(photographs: Any, tmp_path: Path) -> Path:
-    """A work folder with everything entered, but nothing solved."""
-    ProjectFolder(tmp_path / "rig").save(photographs.work)
-    return tmp_path / "rig"
-
-
-@pytest.fixture
-def wizard(qtbot: QtBot, folder: Path) -> Iterator[RigWizard]:
-    wizard = RigWizard(ProjectFolder(folder))
-    qtbot.addWidget(wizard)
-    wizard.show()
-    yield wizard
-    wizard.accept()
-
-
-def child(wizard: RigWizard, kind: Any, name: str) -> Any:
-    """Return the child of a name that can be seen."""
-    (found,) = (one for one in wizard.findChildren(kind, name) if one.isVisible())
-    return found
-
-
-def solve(qtbot: QtBot, wizard: RigWizard, step: int) -> str:
-    """Solve a step once its images have been looked through; return the verdict's text."""
-    wizard.show_step(step)
-    wait(qtbot, wizard)
-    child(wizard, QPushButton, "solve").click()
-    wait(qtbot, wizard)
-    return str(child(wizard, QLabel, "verdictFound").text())
-
-
-def wait(qtbot: QtBot, wizard: RigWizard) -> None:
-    bars = wizard.findChildren(JobBar)
-    qtbot.waitUntil(lambda: not any(bar.is_busy for bar in bars), timeout=30_000)
-
-
-def show_tab(wizard: RigWizard, title: str) -> None:
-    tabs = child(wizard, QTabWidget, "")
-    (place,) = (i for i in range(tabs.count()) if tabs.tabText(i).replace("&", "") == title)
-    tabs.setCurrentIndex(place)
-
-
-def marks(wizard: RigWizard) -> list[str]:
-    rail = wizard.findChild(QListWidget, "rigRail")
-    assert isinstance(rail, QListWidget)
-    return [rail.item(row).toolTip() for row in range(rail.count())]
+from tests.gui.windows.rig.wizard_steps import (
+    BOARDS,
+    LEFT,
+    RESULT,
+    RIGHT,
+    STEREO,
+    VIEWPOINT,
+    child,
+    marks,
+    show_tab,
+    solve,
+    wait,
+)
 
 
 def test_a_rig_is_calibrated_saved_and_used(
@@ -200,7 +161,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     wizard.show_step(RESULT)
     found = child(wizard, QLabel, "savedRigFound").text()
     assert "as in the initial rig: left display, right display, depth camera's pose" in found
-    assert "4 are not known" in found
+    assert "5 are not known" in found
     signs = child(wizard, QTreeWidget, "rigFindings")
     rows = [signs.topLevelItem(row) for row in range(signs.topLevelItemCount())]
     told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
@@ -359,6 +320,23 @@ def test_without_images_nothing_is_solved_and_the_reason_is_in_sight(
     said = child(wizard, QLabel, "verdictFound").text()
     assert "Show it unscaled. The viewpoint camera's intrinsics are missing" in said
     wizard.accept()
+
+
+def test_without_the_poses_of_the_board_nothing_is_solved(qtbot: QtBot, wizard: RigWizard) -> None:
+    solve(qtbot, wizard, VIEWPOINT)
+    wizard.show_step(LEFT)
+    wait(qtbot, wizard)
+    page = wizard.page
+    assert isinstance(page, StepPage)
+    tracked = wizard.project.inputs.left.tracked
+    page.form.enter(tracked="")
+    assert not child(wizard, QPushButton, "solve").isEnabled()
+    assert "choose the file of the poses" in child(wizard, QLabel, "verdictFound").text()
+    page.form.enter(tracked=str(wizard.project.folder.viewpoint))
+    assert "choose the file of tracked poses" in solve(qtbot, wizard, LEFT)
+    page.form.enter(tracked=tracked)
+    assert child(wizard, QLabel, "verdictFound").text() == "Not solved yet."
+    assert child(wizard, QPushButton, "solve").isEnabled()
 
 
 def test_without_a_ticked_image_nothing_is_solved(qtbot: QtBot, wizard: RigWizard) -> None:

@@ -20,6 +20,7 @@ from handcal.errors import CameraError
 from handcal.rig.choose import ChooseSettings
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.live_cameras import LiveCameras
+from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.shots import read_color
 from handcal_gui.windows.rig.take_dialog import TakeDialog
 from tests.gui.helpers import child
@@ -95,6 +96,18 @@ def test_both_cameras_images_are_taken(
     assert not any(camera.is_open for camera in cameras.values())
 
 
+def test_what_has_been_taken_is_not_taken_again(
+    qtbot: QtBot, dialog: TakeDialog, tmp_path: Path
+) -> None:
+    start(qtbot, dialog)
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: "corners" in said(dialog))
+    qtbot.waitUntil(button(dialog, "takeImage").isEnabled)
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: said(dialog) == "This has been taken already. Take another.")
+    assert len(list(tmp_path.rglob("*.png"))) == 2
+
+
 def test_what_to_do_stands_above_and_moves_no_button(qtbot: QtBot, dialog: TakeDialog) -> None:
     def places() -> list[object]:
         buttons = (one for one in dialog.findChildren(QAbstractButton) if one.isVisible())
@@ -146,6 +159,7 @@ def test_a_failing_camera_is_reported_and_can_be_shown_again(
     qtbot.waitUntil(lambda: said(dialog) == told)
     assert not button(dialog, "takeImage").isEnabled()
     start(qtbot, dialog)
+    assert said(dialog) == "", "it is over"
 
 
 def test_images_are_taken_by_themselves_until_they_are_enough(
@@ -160,6 +174,20 @@ def test_images_are_taken_by_themselves_until_they_are_enough(
     for folder in ("depth", "headset"):
         names = [path.name for path in sorted((tmp_path / folder).iterdir())]
         assert names == [f"{folder}-00{number}.png" for number in (1, 2)]
+
+
+def test_a_recording_that_begins_again_is_not_taken_again_by_itself(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
+) -> None:
+    for number, source in enumerate(dialog.findChildren(QComboBox, "source")):
+        path = str(tmp_path / f"{number}.mp4")
+        cameras[path] = cameras[str(number)]
+        source.setCurrentIndex(source.findText("Recording or video"))
+        dialog.findChildren(PathField)[number].set_path(path)
+    start(qtbot, dialog)
+    child(dialog, QCheckBox, "byItself").click()
+    qtbot.waitUntil(lambda: said(dialog) == "1 taken; this has been taken already.")
+    assert len(list(tmp_path.rglob("*.png"))) == 2
 
 
 def test_what_is_not_taken_by_itself_is_explained(
