@@ -5328,6 +5328,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} (step {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>the rig passes: {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5392,11 +5396,23 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Use the e&amp;xample</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Start afresh from the example rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Preview of the board</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>No such board exists</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The rig has not been saved; this will be lost: {}. Continue?</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5457,10 +5473,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Use another initial rig</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Calibrated parts that have not been saved will be lost. Continue?</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5600,7 +5612,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board, and save the poses in one JSON file.</source>
+        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board. Save in one JSON file for each image its name and the board&apos;s pose in the headset rig, 4 rows of 4 numbers in metres; the tooltip of Poses of the board in Inputs shows it.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5669,6 +5681,10 @@ one turns out.</source>
     </message>
     <message>
         <source>to solve, take images of the board, or choose their folder or a stereo calibration in Inputs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>to solve, choose the file of the poses of the board in Inputs, or a stereo calibration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5792,6 +5808,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>solved with other inputs ({}): solve it again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>it was not added to the rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5868,6 +5888,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Enter a name of printable characters, to save the rig.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Save rig file…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5881,6 +5905,28 @@ one turns out.</source>
     </message>
     <message>
         <source>save it in another folder, or under another name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>solved with the present inputs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Acceptance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>not yet, or the rig has changed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the rig passes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The rig is of mixed inputs. Save it nevertheless?
+
+{}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6076,11 +6122,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the viewpoint camera&apos;s intrinsics are missing: solve its step first</source>
+        <source>lens model {}, by the errors on images left out: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>lens {}, of {}</source>
+        <source>the viewpoint camera&apos;s intrinsics are missing: solve its step first</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6096,7 +6142,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Solved {}: {}; {}</source>
+        <source>Solved {}: {}; {}; RMS {:.3f} px</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6161,6 +6207,10 @@ one turns out.</source>
     </message>
     <message>
         <source>to solve, take pairs of images, or choose both folders in Inputs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>this has been taken already</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6277,6 +6327,90 @@ one turns out.</source>
     </message>
     <message>
         <source>Left display</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>viewpoint camera&apos;s intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>depth camera&apos;s images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>headset camera&apos;s images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>depth camera&apos;s intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>headset camera&apos;s intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>depth imager&apos;s intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>pose from depth to colour</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>lens</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>viewpoint camera&apos;s images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>images of the grid</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>grid squares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>images of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>poses of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>stereo calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>rendering camera&apos;s pose</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>screen&apos;s distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>measured distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>angle of a square</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>nominal distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>excluded images</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
