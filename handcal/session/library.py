@@ -44,6 +44,8 @@ class EyeOutcome:
     """Error with the calibrated φ: an eye that keeps the offline calibration has that before."""
     measured_arcmin: float | None
     """Error after the wearer's verification; None if the calibrated φ was not verified."""
+    found_arcmin: float | None = None
+    """Error that the verification found, and corrected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,11 +276,13 @@ def _outcome(one: Mapping[str, Any]) -> EyeOutcome:
     before_arcmin = _number(expected.get("without_arcmin"))
     if verdict == "keep":  # whatever was solved and verified is not used
         return EyeOutcome(verdict, before_arcmin, before_arcmin, None)
+    found, left = measured if isinstance(measured, list) and len(measured) == 2 else (None, None)
     return EyeOutcome(
         verdict,
         before_arcmin,
         _number(expected.get("after_arcmin")),
-        _number(measured[1]) if isinstance(measured, list) and len(measured) == 2 else None,
+        _number(left),
+        _number(found),
     )
 
 

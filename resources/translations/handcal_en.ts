@@ -4175,20 +4175,20 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Verified ′</source>
+        <source>Found ′</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error that is expected after the wearer&apos;s verification, left / right, in arcminutes;
+        <source>Error that the wearer&apos;s verification found, and corrected, left / right, in arcminutes;
 – was not verified</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error that the solver expects from all it knows, left / right, in arcminutes</source>
+        <source>Expected ′</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Expected ′</source>
+        <source>Error that is left, as expected from all that is known, left / right, in arcminutes</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -62,6 +62,7 @@ def test_an_entry_says_what_the_session_holds(make: Callable[..., Path], tmp_pat
     assert (entry.alignments, entry.trials, entry.is_finished) == (1, 2, True)
     left, right = entry.eyes["left"], entry.eyes["right"]
     assert (left.verdict, left.expected_arcmin, left.measured_arcmin) == ("accept", 7.5, 4.5)
+    assert left.found_arcmin == 11.0
     assert (right.verdict, right.expected_arcmin, right.measured_arcmin) == ("repeat", 16.0, None)
     trials = Session.open(path).trials.values()
     means = [trial.error_arcmin.mean() for trial in trials]

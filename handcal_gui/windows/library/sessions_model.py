@@ -55,12 +55,10 @@ def is_accepted(entry: LibraryEntry) -> bool:
     return bool(entry.eyes) and all(one.verdict == "accept" for one in entry.eyes.values())
 
 
-def worst_arcmin(entry: LibraryEntry, kind: Literal["measured", "expected"]) -> float | None:
+def worst_arcmin(entry: LibraryEntry, kind: Literal["found", "expected"]) -> float | None:
     """Return the error of the worse eye; None unless it is known of every solved eye."""
     outcomes = entry.eyes.values()
-    errors = [
-        one.measured_arcmin if kind == "measured" else one.expected_arcmin for one in outcomes
-    ]
+    errors = [one.found_arcmin if kind == "found" else one.expected_arcmin for one in outcomes]
     known = [error for error in errors if error is not None]
     return max(known) if known and len(known) == len(errors) else None
 
@@ -89,12 +87,10 @@ def _verdicts(entry: LibraryEntry) -> str:
     )
 
 
-def _errors(kind: Literal["measured", "expected"]) -> Callable[[LibraryEntry], str]:
+def _errors(kind: Literal["found", "expected"]) -> Callable[[LibraryEntry], str]:
     def text(entry: LibraryEntry) -> str:
         errors = [
-            entry.eyes[eye].measured_arcmin
-            if kind == "measured"
-            else entry.eyes[eye].expected_arcmin
+            entry.eyes[eye].found_arcmin if kind == "found" else entry.eyes[eye].expected_arcmin
             for eye in EYES
             if eye in entry.eyes
         ]
@@ -137,18 +133,18 @@ COLUMNS = (
     ),
     _Column(tr("Verdict"), tr("Of the newest results"), _verdicts, _verdicts),
     _Column(
-        tr("Verified ′"),
+        tr("Found ′"),
         tr(
-            "Error that is expected after the wearer's verification, left / right, in "
+            "Error that the wearer's verification found, and corrected, left / right, in "
             "arcminutes;\n– was not verified"
         ),
-        _errors("measured"),
-        lambda e: _known_first(worst_arcmin(e, "measured")),
+        _errors("found"),
+        lambda e: _known_first(worst_arcmin(e, "found")),
         is_number=True,
     ),
     _Column(
         tr("Expected ′"),
-        tr("Error that the solver expects from all it knows, left / right, in arcminutes"),
+        tr("Error that is left, as expected from all that is known, left / right, in arcminutes"),
         _errors("expected"),
         lambda e: _known_first(worst_arcmin(e, "expected")),
         is_number=True,

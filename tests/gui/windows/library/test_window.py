@@ -40,7 +40,7 @@ from tests.gui.windows.library.conftest import (
 def test_the_newest_is_first_and_measured_is_not_expected(window: LibraryWindow) -> None:
     assert wearers(window) == ["Cid", "Bea", "Ada", "Ada"]
     newer, older = rows(window)[2:]
-    assert older[4:9] == ["✓ Accept", "4.0 / 4.0", "9.0 / 9.0", "–", "Finished"]
+    assert older[4:9] == ["✓ Accept", "8.0 / 8.0", "9.0 / 9.0", "–", "Finished"]
     assert newer[5:7] == ["– / –", "8.0 / 8.0"]
     assert rows(window)[0][4] == "Not solved"
     assert rows(window)[0][8] == "Damaged: 1 part"
@@ -69,9 +69,9 @@ def test_search_filter_and_sorting(window: LibraryWindow) -> None:
         assert len(rows(window)) == expected[kind]
     kinds.setCurrentIndex(0)
     header = table(window).model().headerData(5, Qt.Orientation.Horizontal)
-    assert header == "Verified ′"  # an error that is expected, with a verification behind it
+    assert header == "Found ′"
     table(window).sortByColumn(5, Qt.SortOrder.AscendingOrder)  # those not verified follow
-    assert rows(window)[0][5] == "4.0 / 4.0"
+    assert rows(window)[0][5] == "8.0 / 8.0"  # not what is expected to be left of it
 
 
 def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
