@@ -269,6 +269,8 @@ def _judge_benefit(gain: Benefit, advice: Advice, more: str, settings: VerdictSe
             "better",
         )
     now = f"expected error {gain.after_arcmin:.1f}′, {sure} sure to be better than none"
+    if gain.probability_better < settings.probability_min:
+        now += f" ({percent(settings.probability_min)} needed)"
     then = f"{advice.after_arcmin:.1f}′ expected after {more}"
     if not advice.meets_target:
         return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
