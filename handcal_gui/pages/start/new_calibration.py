@@ -9,8 +9,10 @@ from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
+    QAbstractItemView,
     QApplication,
     QComboBox,
+    QCompleter,
     QLineEdit,
     QSizePolicy,
     QWidget,
@@ -88,6 +90,11 @@ class NewCalibration(Card):
         self._wearer.setLineEdit(name)
         self._wearer.setEditable(True)
         self._wearer.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        completer = self._wearer.completer()
+        assert completer is not None
+        # A list: typed in by itself, a former wearer's name would be taken for the present one's.
+        completer.setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
+        name.returnPressed.connect(lambda: self._start_past(completer.popup()))
         self._wearer_problem = paragraph("wearerProblem")
         self._wearer_problem.hide()
         self._wearer.editTextChanged.connect(self._show_wearer_problem)
@@ -285,6 +292,11 @@ class NewCalibration(Card):
         """Take no blanks before a name: the space bar pressed the former page's button."""
         if typed != typed.lstrip():
             self._wearer.setEditText(typed.lstrip())
+
+    def _start_past(self, names: QAbstractItemView) -> None:
+        """Start on Enter while a list of names is open, which keeps the key from the form."""
+        if names.isVisible() and not names.currentIndex().isValid():
+            self._button.click()
 
     def _show_wearer_problem(self, typed: str) -> None:
         try:
