@@ -94,7 +94,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             _users_form,
             (
                 Preparation(
-                    tr("Rec&ord…"),
+                    tr("Re&cord…"),
                     tr(
                         "Record the trials of one session with a cube in the room; enter the "
                         "session first."

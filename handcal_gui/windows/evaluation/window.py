@@ -20,7 +20,8 @@ from PySide6.QtWidgets import (
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.fields import button, with_name
+from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
 
@@ -72,6 +73,8 @@ class EvaluationWindow(QDialog):
             item.setSizeHint(QSize(0, 4 * SPACING_PX))
             self._rail.addItem(item)
             self._pages[name] = page
+        self._close = button("close", tr("Cl&ose"), help_text=tr("The entries are kept"))
+        self._close.clicked.connect(self.reject)
         self._lay_out()
         self._rail.currentRowChanged.connect(self._go_to)
         self._rail.setCurrentRow(0)
@@ -128,4 +131,6 @@ class EvaluationWindow(QDialog):
         scale_font(self._title, 1.6, is_bold=True)
         self._rail.setFixedWidth(_RAIL_PX)
         right = vbox(self._title, (self._stack, 1), spacing=SPACING_PX)
-        hbox(self._rail, (right, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
+        close = hbox(self._close, KeyCap("closeKey", "Escape"), 1, spacing=SPACING_PX)
+        left = vbox((self._rail, 1), close, spacing=SPACING_PX)
+        hbox(left, (right, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
