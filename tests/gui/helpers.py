@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from typing import TypeVar
 
+import pytest
 from PySide6.QtCore import QObject, QRect, Qt
-from PySide6.QtWidgets import QAbstractButton, QLabel, QMenuBar, QTabBar, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QLabel,
+    QMenuBar,
+    QMessageBox,
+    QPushButton,
+    QTabBar,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 Child = TypeVar("Child", bound=QObject)
@@ -66,3 +75,16 @@ def button(parent: QObject, kind: type[Button], text: str) -> Button:
     """Return the first button of a kind and a text, regardless of its letter."""
     found = parent.findChildren(kind)
     return next(one for one in found if one.text().replace("&", "") == text.replace("&", ""))
+
+
+def answer_questions(monkeypatch: pytest.MonkeyPatch, answer: str) -> list[str]:
+    """Have message boxes answered by the button of a text; return the list of what they say."""
+    said: list[str] = []
+
+    def press(box: QMessageBox) -> int:
+        said.append(box.text())
+        button(box, QPushButton, answer).click()
+        return 0
+
+    monkeypatch.setattr(QMessageBox, "exec", press)
+    return said

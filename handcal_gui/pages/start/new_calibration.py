@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
-    QAbstractItemView,
     QApplication,
     QComboBox,
     QCompleter,
@@ -94,7 +94,7 @@ class NewCalibration(Card):
         assert completer is not None
         # A list: typed in by itself, a former wearer's name would be taken for the present one's.
         completer.setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
-        name.returnPressed.connect(lambda: self._start_past(completer.popup()))
+        name.returnPressed.connect(partial(self._start_past, completer))
         self._wearer_problem = paragraph("wearerProblem")
         self._wearer_problem.hide()
         self._wearer.editTextChanged.connect(self._show_wearer_problem)
@@ -293,9 +293,10 @@ class NewCalibration(Card):
         if typed != typed.lstrip():
             self._wearer.setEditText(typed.lstrip())
 
-    def _start_past(self, names: QAbstractItemView) -> None:
+    def _start_past(self, completer: QCompleter) -> None:
         """Start on Enter while a list of names is open, which keeps the key from the form."""
-        if names.isVisible() and not names.currentIndex().isValid():
+        names = completer.popup()
+        if names is not None and names.isVisible() and not names.currentIndex().isValid():
             self._button.click()
 
     def _show_wearer_problem(self, typed: str) -> None:

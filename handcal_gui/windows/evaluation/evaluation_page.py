@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from PySide6.QtCore import Signal
@@ -63,7 +63,7 @@ class EvaluationPage(QWidget):
         self._entries = entries
         self._readiness: Readiness | None = None
         self._failure = self._waits_for = ""
-        self._is_done = False
+        self._is_done = self._is_cancelled = False
         self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
@@ -82,6 +82,7 @@ class EvaluationPage(QWidget):
         for prepare in self._preparing:
             prepare.closed.connect(self._take_entries)
         self._bar.failed.connect(self._show_failure)
+        self._bar.cancelled.connect(self._note_cancelled)
         self._bar.busy_changed.connect(self._change_busy)
         self._look.answered.connect(self._on_readiness)
         self._look.failed.connect(self._show_failure)
@@ -92,6 +93,11 @@ class EvaluationPage(QWidget):
         return self._entries
 
     @property
+    def kept(self) -> str:
+        """Sentence that says what of the evaluation is kept if it is cancelled."""
+        return self._evaluation.kept
+
+    @property
     def is_busy(self) -> bool:
         """True while the evaluation runs."""
         return self._bar.is_busy
@@ -99,7 +105,7 @@ class EvaluationPage(QWidget):
     def run(self) -> None:
         """Start or resume the evaluation."""
         entries = self._entries
-        self._failure, self._is_done = "", False
+        self._failure, self._is_done, self._is_cancelled = "", False, False
         self._results.show_outcome(None)
         self._bar.run(
             tr("Starting"),
@@ -134,7 +140,7 @@ class EvaluationPage(QWidget):
 
     def _take_entries(self, entries: Any) -> None:
         self._entries = entries
-        self._failure, self._is_done = "", False
+        self._failure, self._is_done, self._is_cancelled = "", False, False
         self._ask()
 
     def _ask(self) -> None:
@@ -163,6 +169,9 @@ class EvaluationPage(QWidget):
     def _show_failure(self, why: str) -> None:
         self._failure = why
         self._refresh()
+
+    def _note_cancelled(self) -> None:
+        self._is_cancelled = True
 
     def _change_busy(self, is_busy: bool) -> None:
         self.form.setEnabled(not is_busy)
@@ -193,7 +202,12 @@ class EvaluationPage(QWidget):
             return Finding("", Health.LIMITED, found, tr("only one can run at a time"))
         if self._is_done:
             return Finding("", Health.GOOD, tr("Done"))
-        return self._readiness.finding if self._readiness else None
+        finding = self._readiness.finding if self._readiness else None
+        if finding is None or not self._is_cancelled:
+            return finding
+        if finding.health is Health.GOOD:  # ready for a start from the beginning
+            return replace(finding, found=tr("Cancelled; nothing is kept"))
+        return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
     def _lay_out(self, question: str) -> None:
         vbox(

@@ -21,6 +21,7 @@ from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, with_name
+from handcal_gui.widgets.job_bar import may_cancel
 from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
@@ -30,7 +31,7 @@ _RAIL_PX = 24 * SPACING_PX
 
 
 class EvaluationWindow(QDialog):
-    """Offers evaluations, one of which can run at a time; closing cancels it.
+    """Offers evaluations, one of which can run at a time; closing asks, and cancels it.
 
     Parameters
     ----------
@@ -95,7 +96,11 @@ class EvaluationWindow(QDialog):
         self._rail.setCurrentRow(list(self._pages).index(name))
 
     def reject(self) -> None:
-        """Close; a running evaluation is cancelled first."""
+        """Close; a running evaluation is cancelled first, if the user agrees."""
+        for name, page in self._pages.items():
+            question = tr("{} is running. {}").format(self._specs[name].title, page.kept)
+            if page.is_busy and not self._is_closing and not may_cancel(self, question):
+                return
         busy = [page for page in self._pages.values() if page.is_busy]
         self._is_closing = bool(busy)
         for page in busy:
