@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
@@ -38,6 +38,8 @@ class EvaluationSpec:
     """Creates the form for its entries."""
     preparations: tuple[Preparation, ...] = ()
     """Buttons and dialogs that prepare data and devices."""
+    note: str = ""
+    """HTML about the format of its data, with a link to a page of the manual."""
 
 
 class EvaluationPage(QWidget):
@@ -52,10 +54,13 @@ class EvaluationPage(QWidget):
     Attributes
     ----------
     busy_changed : Signal(bool)
+    manual_wanted : Signal(str)
+        The user wants to read a page of the manual.
     form : EntriesForm
     """
 
     busy_changed = Signal(bool)
+    manual_wanted = Signal(str)
 
     def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -76,7 +81,7 @@ class EvaluationPage(QWidget):
         keep_space(self._found)
         self._results = ResultsView()
         self._look = LatestJob(self._check, self)
-        self._lay_out(spec.question)
+        self._lay_out(spec)
         self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
         for prepare in self._preparing:
@@ -209,12 +214,19 @@ class EvaluationPage(QWidget):
             return replace(finding, found=tr("Cancelled; nothing is kept"))
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
-    def _lay_out(self, question: str) -> None:
+    def _lay_out(self, spec: EvaluationSpec) -> None:
+        note = paragraph("format", spec.note)
+        note.setTextFormat(Qt.TextFormat.RichText)
+        by = Qt.TextInteractionFlag
+        note.setTextInteractionFlags(by.LinksAccessibleByMouse | by.LinksAccessibleByKeyboard)
+        note.linkActivated.connect(self.manual_wanted)
+        note.setVisible(bool(spec.note))
         vbox(
             paragraph(
                 "question",
-                tr("{} Check the entries, then start at the lower right.").format(question),
+                tr("{} Check the entries, then start at the lower right.").format(spec.question),
             ),
+            note,
             self.form,
             self._found,
             (self._results, 1),

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_folder import find_captures
+from handcal.lab.evaluate.masked_frames import read_masked_names
 from handcal.lab.evaluate.run import run_cube_test, run_segmentation_test, run_user_test
 from handcal.lab.evaluate.user_test import holds_trials
 from handcal.lab.settings import SegmentationTestSettings
@@ -113,6 +114,11 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             ),
             FileEvaluation(_missing_frames, run_segmentation_test),
             _segmentation_form,
+            note=tr(
+                "A frame NAME is NAME_depth.png, NAME_handmask.png and, if there is one, "
+                "NAME_color.png; meta.json describes all frames: "
+            )
+            + f'<a href="docs/commands.md#handcal-evaluate-segmentation">{tr("its contents")}</a>.',
         ),
     }
 
@@ -146,7 +152,11 @@ def _missing_sessions(entries: UserEntries) -> str:
 
 
 def _missing_frames(entries: SegmentationTestSettings) -> str:
-    return _missing_folder(entries.folder, tr("choose a folder of frames with true masks"))
+    request = tr("choose a folder of frames with true masks")
+    missing = _missing_folder(entries.folder, request)
+    if not missing:
+        read_masked_names(user_path(entries.folder))  # raises an error if they are not usable
+    return missing
 
 
 def _missing_folder(folder: str, request: str) -> str:

@@ -44,9 +44,12 @@ class EvaluationWindow(QDialog):
     ----------
     remembered : Signal(EvaluationEntries)
         The settings as entered, to be proposed next time.
+    manual_wanted : Signal(str)
+        The user wants to read a page of the manual.
     """
 
     remembered = Signal(object)
+    manual_wanted = Signal(str)
 
     def __init__(
         self,
@@ -69,6 +72,7 @@ class EvaluationWindow(QDialog):
         for name, spec in specs.items():
             page = EvaluationPage(spec, getattr(entries, name))
             page.busy_changed.connect(partial(self._change_busy, name))
+            page.manual_wanted.connect(self.manual_wanted)
             self._stack.addWidget(page)
             item = QListWidgetItem(spec.title)
             item.setSizeHint(QSize(0, 4 * SPACING_PX))

@@ -202,6 +202,21 @@ def test_a_wrong_description_is_one_clear_line(
         list(read_masked_frames(folder, read_masked_names(folder)))
 
 
+def test_a_folder_of_no_frames_is_known_before_they_are_read(folder: Path) -> None:
+    named = {"fx": 1.0, "fy": 1.0, "cx": 1.0, "cy": 1.0}
+    about = json.loads((folder / "meta.json").read_text())
+    read_masked_names(folder)
+    (folder / "meta.json").write_text(json.dumps({"9": about["9"] | {"intrinsics": named}}))
+    with pytest.raises(FileError, match=r"a list of four numbers without names, \[fx, fy, cx, cy"):
+        read_masked_names(folder)
+    (folder / "meta.json").write_text(json.dumps({"8": about["9"]}))
+    with pytest.raises(FileError, match=r"there is no .*8_depth\.png"):
+        read_masked_names(folder)
+    (folder / "meta.json").unlink()
+    with pytest.raises(FileError, match=r"holds no meta\.json"):
+        read_masked_names(folder)
+
+
 @pytest.mark.parametrize("content", ["{}", '{"../a": {}}', '{"a": 3}', "[]", "no"])
 def test_a_wrong_list_of_frames_is_refused(tmp_path: Path, content: str) -> None:
     (tmp_path / "meta.json").write_text(content)

@@ -128,7 +128,8 @@ def test_frames_are_chosen_before_the_segmentation_is_tested(tmp_path: Path) -> 
     entries = replace(entries, folder=str(tmp_path / "none"))
     assert "there is no folder" in evaluation.readiness(entries).finding.found
     (tmp_path / "none").mkdir()
-    assert evaluation.readiness(entries).can_run
+    with pytest.raises(FileError, match=r"none holds no meta\.json"):
+        evaluation.readiness(entries)
     with pytest.raises(FileError, match=r"meta\.json"):
         evaluation.run(entries, Progress())
 
