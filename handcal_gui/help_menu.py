@@ -6,14 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox
 
 from handcal.errors import FileError
 from handcal.io.resources import resource_path
 from handcal_gui.dialogs.keys import KeysDialog
 from handcal_gui.translation import tr
+from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow
 from handcal_gui.windows.manual import Manual
@@ -64,8 +64,7 @@ def _show_folder(window: MainWindow, name: str) -> None:
     except FileError as error:
         window.banner.show_message(str(error))
         return
-    if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-        window.banner.show_message(tr("No file manager was found; the folder is {}").format(folder))
+    open_path(window, folder)
 
 
 def _show_about(window: MainWindow) -> None:

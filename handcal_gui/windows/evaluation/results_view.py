@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.report.document import Figure, Report, Table
@@ -17,6 +16,7 @@ from handcal_gui.widgets.fields import button, fill_row, paragraph, with_name
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.evaluation.work import Outcome
 
@@ -62,7 +62,7 @@ class ResultsView(QWidget):
         self._tabs.addTab(page, title)
 
     def _open(self, name: str) -> None:
-        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._folder / name)))
+        open_path(self, self._folder / name)
 
     def _lay_out(self) -> None:
         foot, buttons = QWidget(), []

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -29,7 +28,7 @@ from handcal_gui.widgets.fields import MainButton
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
-from tests.gui.helpers import answer_questions, letters
+from tests.gui.helpers import answer_questions, letters, note_opened
 
 Kind = TypeVar("Kind", bound=QWidget)
 PATIENCE_MS = 20_000
@@ -102,14 +101,12 @@ def test_a_study_runs_to_its_end(
     item = student.child(QTableWidget, "numbers").item(9, 0)
     assert item is not None
     assert item.text() == "81"
-    opened: list[QUrl] = []
-    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    opened = note_opened(monkeypatch)
     for name in ("openPdf", "openHtml", "openFolder"):
         student.child(QPushButton, name).click()
     folder = Path(entries.output)
-    paths = [Path(url.toLocalFile()) for url in opened]
-    assert paths == [folder / "report.pdf", folder / "report.html", folder]
-    assert all(path.exists() for path in paths)
+    assert opened == [folder / "report.pdf", folder / "report.html", folder]
+    assert all(path.exists() for path in opened)
     student.wait_for_button("Show results")
 
 
