@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,8 @@ from handcal.lab.settings import (
 )
 from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
 from handcal.lab.study.noise import QUICK_NOISE
-from handcal.lab.study.studies import run_method_comparison, run_noise_study
+from handcal.lab.study.store import StudyFolder
+from handcal.lab.study.studies import noise_cases, run_method_comparison, run_noise_study
 from handcal.progress import Progress
 from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
@@ -64,6 +65,19 @@ def test_studies_are_those_of_the_commands() -> None:
     quick = methods.study(MethodComparisonSettings(wearers=3, size="quick"))
     assert quick.settings == QUICK_METHODS
     assert (noise.order, methods.order) == (run_noise_study, run_method_comparison)
+
+
+def test_another_study_in_the_folder_is_told_by_what_was_entered(tmp_path: Path) -> None:
+    evaluation = make_specs()["noise"].evaluation
+    quick = NoiseStudySettings("quick", output=str(tmp_path))
+    study = noise_cases(quick)
+    StudyFolder(tmp_path, study.name, asdict(study.settings), [study.cases])
+    with pytest.raises(FileError) as refused:
+        evaluation.readiness(replace(quick, size="full", seed=2))
+    assert str(refused.value) == (
+        f"{tmp_path} holds another study (another size; seed 1 there, 2 here); "
+        "choose another folder, or the same entries"
+    )
 
 
 def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
