@@ -20,6 +20,7 @@ from handcal.lab.study.studies import (
     run_noise_study,
 )
 from handcal.session.journal import JOURNAL
+from handcal.session.record import replay
 from handcal_gui.evaluation_entries import CubeEntries, UserEntries
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -145,6 +146,10 @@ def _missing_sessions(entries: UserEntries) -> str:
         return tr("there is no session in {}: {}").format(entries.sessions, request)
     if holds_trials(folder):
         return ""
+    if (folder / JOURNAL).is_file():
+        return tr(
+            "the session of {} holds no trial: record some in the panel Trials, or press Record…"
+        ).format(replay(folder).state.wearer or tr("a wearer without a name"))
     return tr(
         "no session in {} holds a trial: record some in the panel Trials, or choose one session "
         "and press Record…"

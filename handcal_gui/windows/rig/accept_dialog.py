@@ -194,7 +194,8 @@ class AcceptDialog(QDialog):
         self._refresh()
 
     def _open_page(self) -> None:
-        open_path(self, self._page)
+        if self._page is not None:
+            open_path(self, self._page)
 
     def _refresh(self) -> None:
         for eye, shown in self._counts.items():

@@ -111,6 +111,8 @@ def test_a_user_test_is_ready_once_a_session_holds_a_trial(
         readiness = evaluation.readiness(entries)
         assert not readiness.can_run
         assert "record some in the panel Trials" in readiness.finding.found
+    whose = record.wearer or "a wearer without a name"
+    assert evaluation.readiness(one).finding.found.startswith(f"the session of {whose} holds no")
     with Session(record.path) as session:
         number = session.save_trial(
             make_trial(rig.eyes["left"], "left", 0.5, [0.0] * 3, [1e-3] * 3)
