@@ -22,6 +22,7 @@ from handcal_gui.control.review import ReviewController
 from handcal_gui.docks import Panels
 from handcal_gui.edit_menu import add_edit_menu
 from handcal_gui.help_menu import add_help_menu, read_manual
+from handcal_gui.keys import NoAltLetters
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
 from handcal_gui.pages.start.start_page import StartPage
@@ -89,6 +90,7 @@ class Program(QObject):
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
         self.manual = Manual(self.window)
+        NoAltLetters(self.window)
         comparison = Comparison(panels.results)
         self.live = CalibrationController(self.window, self.wizard_panel, comparison)
         self.review = ReviewController(self.window, review_page, comparison)
