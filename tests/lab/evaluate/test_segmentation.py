@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 
 from handcal.camera.images import write_frame
 from handcal.cli.main import main
@@ -173,6 +174,13 @@ def test_a_folder_is_judged_by_the_command(
     assert read_image(sheet, cv2.IMREAD_COLOR).shape == (320, 4 * 320, 3)
     assert {path.name for path in sheet.parent.glob("report.*")} == {"report.pdf", "report.html"}
     assert "9: no hand-sized object" in capsys.readouterr().out
+
+
+def test_points_at_the_frame_are_drawn_in_full(folder: Path) -> None:
+    report = run_segmentation_test(SegmentationTestSettings(str(folder), "depth")).report
+    axes = Canvas().subplots(1, 2)
+    report.figures[0].draw(axes)
+    assert not any(line.get_clip_on() for ax in axes for line in ax.lines)
 
 
 def test_the_test_can_be_cancelled(folder: Path) -> None:
