@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
-from handcal.report.document import Figure, Report, Table
+from handcal.report.document import Figure, Item, Report, Table
 from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, fill_row, paragraph, with_name
 from handcal_gui.widgets.image_view import ImageView
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.sentence import sentence
@@ -53,9 +54,18 @@ class ResultsView(QWidget):
         tables = _key_tables(outcome.report)
         for title, table in zip(_titles(tables), tables, strict=True):
             self._add(title, _table_page(table))
+        names = {figure.name for figure in outcome.report.figures}
         for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
-            title = sentence(figure.name.replace("-", " "))
+            only = figure.name.removesuffix("-1")  # unless there is a second one
+            name = figure.name if f"{only}-2" in names else only
+            title = sentence(name.replace("-", " "))
             self._add(title, _figure_page(title, figure, picture))
+        if terms := [item for item in _first_items(outcome.report) if isinstance(item, str)]:
+            text = paragraph("terms", "\n\n".join(terms))
+            text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            text.setAlignment(Qt.AlignmentFlag.AlignTop)
+            text.setMargin(SPACING_PX)
+            self._add(tr("Terms and methods"), scrollable(text))
 
     def _add(self, title: str, page: QWidget) -> None:
         self._pages.append(page)
@@ -96,6 +106,11 @@ class ResultsView(QWidget):
         self._stack.addWidget(shown)
 
 
+def _first_items(report: Report) -> Sequence[Item]:
+    """Return what the report's first section holds, which says how all was found."""
+    return report.sections[0].items if report.sections else ()
+
+
 def _key_tables(report: Report) -> list[Table]:
     """Return the tables with a header, from the first section that has any."""
     for section in report.sections:
@@ -126,7 +141,7 @@ def _figure_page(title: str, figure: Figure, picture: UInt8) -> QWidget:
     view = ImageView(tr("Figure {}").format(title))
     view.setAccessibleDescription(figure.caption)
     view.show_image(picture)
-    file = tr("White as on paper: this is the exported figures/{}.png.").format(figure.name)
+    file = tr("Drawn on white, as in the exported figures/{}.png.").format(figure.name)
     return _page(view, f"{figure.caption} {file}".lstrip())
 
 
