@@ -54,18 +54,18 @@ class ResultsView(QWidget):
         tables = _key_tables(outcome.report)
         for title, table in zip(_titles(tables), tables, strict=True):
             self._add(title, _table_page(table))
-        names = {figure.name for figure in outcome.report.figures}
-        for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
-            only = figure.name.removesuffix("-1")  # unless there is a second one
-            name = figure.name if f"{only}-2" in names else only
-            title = sentence(name.replace("-", " "))
-            self._add(title, _figure_page(title, figure, picture))
         if terms := [item for item in _first_items(outcome.report) if isinstance(item, str)]:
             text = paragraph("terms", "\n\n".join(terms))
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             text.setAlignment(Qt.AlignmentFlag.AlignTop)
             text.setMargin(SPACING_PX)
             self._add(tr("Terms and methods"), scrollable(text))
+        names = {figure.name for figure in outcome.report.figures}
+        for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
+            only = figure.name.removesuffix("-1")  # unless there is a second one
+            name = figure.name if f"{only}-2" in names else only
+            title = sentence(name.replace("-", " "))
+            self._add(title, _figure_page(title, figure, picture))
 
     def _add(self, title: str, page: QWidget) -> None:
         self._pages.append(page)

@@ -98,7 +98,7 @@ def test_a_study_runs_to_its_end(
     assert student.child(QLabel, "lead").text() == "Squares grow."
     tabs = student.child(QTabWidget, "figures")
     titles = [tabs.tabText(place) for place in range(tabs.count())]
-    assert titles == ["Numbers", "Some squares", "Terms and methods"]
+    assert titles == ["Numbers", "Terms and methods", "Some squares"]
     item = student.child(QTableWidget, "numbers").item(9, 0)
     assert item is not None
     assert item.text() == "81"

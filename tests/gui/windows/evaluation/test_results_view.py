@@ -80,5 +80,5 @@ def test_tabs_of_figures_are_numbered_only_where_there_are_several(qtbot: QtBot)
     view.show_outcome(Outcome(Path(), report, 3 * [np.zeros((9, 9, 3), np.uint8)]))
     tabs = child(view, QTabWidget)
     titles = [tabs.tabText(place) for place in range(tabs.count())]
-    assert titles == ["Wearers", "Of 1", "Of 2", "Terms and methods"]
+    assert titles == ["Terms and methods", "Wearers", "Of 1", "Of 2"]
     assert text(view, "terms") == "icp: rigid."
