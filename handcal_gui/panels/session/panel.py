@@ -212,7 +212,7 @@ class SessionPanel(QWidget):
         form.addRow(tr("Wearer"), self._wearer)
         form.addRow(tr("Folder"), self._folder)
         form.addRow(tr("Started"), self._started)
-        form.addRow(tr("&Eye distance (mm)"), self._eye_distance)
+        form.addRow(tr("Eye dis&tance (mm)"), self._eye_distance)
         form.addRow(self._eye_distance_problem)
         self._eye_distance_problem.hide()
         self._tabs.addTab(self._alignments, tr("Alignments"))
