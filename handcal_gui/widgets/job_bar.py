@@ -26,12 +26,12 @@ def show_share(bar: QProgressBar, share: float) -> None:
 def may_cancel(window: QWidget, running: str) -> bool:
     """Ask before a window is closed whose job is running; Esc keeps it running."""
     box = QMessageBox(QMessageBox.Icon.Question, window.windowTitle(), running, parent=window)
-    box.addButton(tr("&Cancel and close"), QMessageBox.ButtonRole.DestructiveRole)
+    end = box.addButton(tr("&Cancel and close"), QMessageBox.ButtonRole.DestructiveRole)
     keep = box.addButton(tr("&Keep running"), QMessageBox.ButtonRole.RejectRole)
     box.setDefaultButton(keep)
     box.setEscapeButton(keep)
     box.exec()
-    return box.clickedButton() is not keep
+    return box.clickedButton() is end
 
 
 class JobBar(QWidget):

@@ -211,7 +211,7 @@ class EvaluationPage(QWidget):
         if finding is None or not self._is_cancelled:
             return finding
         if finding.health is Health.GOOD:  # ready for a start from the beginning
-            return replace(finding, found=tr("Cancelled; nothing is kept"))
+            return replace(finding, found=tr("Cancelled; the next run starts from the beginning"))
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
     def _lay_out(self, spec: EvaluationSpec) -> None:

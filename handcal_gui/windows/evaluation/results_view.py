@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
-from handcal.report.document import Figure, Item, Report, Table
+from handcal.report.document import Figure, Report, Table
 from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
@@ -54,7 +53,8 @@ class ResultsView(QWidget):
         tables = _key_tables(outcome.report)
         for title, table in zip(_titles(tables), tables, strict=True):
             self._add(title, _table_page(table))
-        if terms := [item for item in _first_items(outcome.report) if isinstance(item, str)]:
+        first = [item for section in outcome.report.sections[:1] for item in section.items]
+        if terms := [item for item in first if isinstance(item, str)]:
             text = paragraph("terms", "\n\n".join(terms))
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             text.setAlignment(Qt.AlignmentFlag.AlignTop)
@@ -104,11 +104,6 @@ class ResultsView(QWidget):
         self._stack = QStackedLayout(self)
         self._stack.addWidget(self._empty)
         self._stack.addWidget(shown)
-
-
-def _first_items(report: Report) -> Sequence[Item]:
-    """Return what the report's first section holds, which says how all was found."""
-    return report.sections[0].items if report.sections else ()
 
 
 def _key_tables(report: Report) -> list[Table]:

@@ -210,6 +210,7 @@ class TrialsDialog(PreparationDialog):
             return self._record(order, connect, depth_camera, desk.leader, progress)
 
         self._table.hide()
+        self._stored = ""
         self._bar.run(tr("Waiting for the headset"), work, self._show_trials)
 
     def done(self, result: int) -> None:

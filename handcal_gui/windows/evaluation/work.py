@@ -123,7 +123,7 @@ class FileEvaluation:
     """Returns a request for missing entries; empty if there are none."""
     order: Callable[[Any, Progress], HasReport]
     """Evaluates the files and writes the report."""
-    kept: str = tr("If it is cancelled, nothing is kept.")
+    kept: str = tr("If it is cancelled, the next run starts from the beginning.")
 
     def readiness(self, entries: Any) -> Readiness:
         """Return which entry is missing, or whether an earlier report will be replaced."""

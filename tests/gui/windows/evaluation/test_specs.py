@@ -67,7 +67,7 @@ def test_studies_are_those_of_the_commands() -> None:
     assert (noise.order, methods.order) == (run_noise_study, run_method_comparison)
 
 
-def test_another_study_in_the_folder_is_told_by_what_was_entered(tmp_path: Path) -> None:
+def test_another_study_in_the_folder_is_named_by_what_was_entered(tmp_path: Path) -> None:
     evaluation = make_specs()["noise"].evaluation
     quick = NoiseStudySettings("quick", output=str(tmp_path))
     study = noise_cases(quick)
