@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox
 
 from handcal.errors import FileError
 from handcal.io.resources import resource_path
 from handcal_gui.dialogs.keys import KeysDialog
 from handcal_gui.translation import tr
+from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow
 from handcal_gui.windows.manual import Manual
@@ -28,15 +29,15 @@ def add_help_menu(window: MainWindow, manual: Manual, support: Callable[[], obje
     support : callable
         Opens the dialog that writes a support bundle.
     """
-    add = window.add_action
-    add("Help", tr("&Guide"), "Shift+F1", lambda: _read(window, manual, "docs/guide.md"))
-    add("Help", tr("&Manual"), "", lambda: _read(window, manual, "docs/index.md"))
-    add("Help", tr("Headset &protocol"), "", lambda: _read(window, manual, "docs/protocol.md"))
+    add, read = window.add_action, partial(read_manual, window, manual)
+    add("Help", tr("&Guide"), "Shift+F1", lambda: read("docs/guide.md"))
+    add("Help", tr("&Manual"), "", lambda: read("docs/index.md"))
+    add("Help", tr("Headset &protocol"), "", lambda: read("docs/protocol.md"))
     add("Help", tr("&Examples in Python"), "", lambda: _show_folder(window, "examples"))
     add("Help", tr("&Unity package"), "", lambda: _show_folder(window, "unity"))
     add("Help", tr("&Support bundle…"), "", support)
     add("Help", tr("&Keys"), "F1", lambda: _show_keys(window))
-    add("Help", tr("&Licences"), "", lambda: _read(window, manual, "THIRD-PARTY.md"))
+    add("Help", tr("&Licences"), "", lambda: read("THIRD-PARTY.md"))
     add("Help", tr("&About handcal"), "", lambda: _show_about(window))
 
 
@@ -49,7 +50,8 @@ def _show_keys(window: MainWindow) -> None:
     keep_on_screen(dialog)
 
 
-def _read(window: MainWindow, manual: Manual, page: str) -> None:
+def read_manual(window: MainWindow, manual: Manual, page: str) -> None:
+    """Show a page of the manual, or the reason why it cannot be shown."""
     try:
         manual.open(page)
     except FileError as error:
@@ -62,8 +64,7 @@ def _show_folder(window: MainWindow, name: str) -> None:
     except FileError as error:
         window.banner.show_message(str(error))
         return
-    if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-        window.banner.show_message(tr("No file manager was found; the folder is {}").format(folder))
+    open_path(window, folder)
 
 
 def _show_about(window: MainWindow) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
@@ -20,7 +21,8 @@ from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController
 from handcal_gui.docks import Panels
 from handcal_gui.edit_menu import add_edit_menu
-from handcal_gui.help_menu import add_help_menu
+from handcal_gui.help_menu import add_help_menu, read_manual
+from handcal_gui.keys import NoAltLetters
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
 from handcal_gui.pages.start.start_page import StartPage
@@ -88,6 +90,7 @@ class Program(QObject):
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
         self.manual = Manual(self.window)
+        NoAltLetters(self.window)
         comparison = Comparison(panels.results)
         self.live = CalibrationController(self.window, self.wizard_panel, comparison)
         self.review = ReviewController(self.window, review_page, comparison)
@@ -200,6 +203,7 @@ class Program(QObject):
         self.start.evaluation_wanted.connect(self.windows.evaluate)
         self.windows.open_requested.connect(self.open_session)
         self.windows.resume_requested.connect(self.resume_session)
+        self.windows.manual_wanted.connect(partial(read_manual, self.window, self.manual))
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
         self.live.export_requested.connect(lambda: self.windows.export())

@@ -56,10 +56,13 @@ class SeparateWindows(QObject):
     ----------
     open_requested, resume_requested : Signal(Path)
         A session to open, or to resume.
+    manual_wanted : Signal(str)
+        A page of the manual to show.
     """
 
     open_requested = Signal(object)
     resume_requested = Signal(object)
+    manual_wanted = Signal(str)
     _ending = Signal()
 
     def __init__(
@@ -219,6 +222,7 @@ class SeparateWindows(QObject):
         window = EvaluationWindow(make_specs(), entries, self._window)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(self._remember_evaluation)
+        window.manual_wanted.connect(self.manual_wanted)
         self._ending.connect(window.stop)
         window.show()
         keep_on_screen(window)

@@ -64,7 +64,7 @@ _REVIEW_PERCENT = 36
 """Of a large window's width, for the page of a stored session with its residual map."""
 _MENUS = {
     "File": tr("&File"),
-    "Edit": tr("Edi&t"),  # Alt+E is taken by panels
+    "Edit": tr("&Edit"),
     "View": tr("&View"),
     "Help": tr("&Help"),
 }

@@ -5,6 +5,7 @@ Paths are texts, empty where there is none.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -12,6 +13,8 @@ from typing import Literal, TypeAlias
 from handcal.errors import FileError
 from handcal.hand.settings import Roi
 from handcal.io.files import user_path
+from handcal.report.write import may_be_replaced
+from handcal.session.journal import JOURNAL, find_journals
 from handcal.types import Eye
 
 Size: TypeAlias = Literal["full", "quick"]
@@ -123,7 +126,23 @@ class SegmentationTestSettings:
 
 
 def output_folder(text: str) -> Path:
-    """Return the folder for results; FileError if there is none."""
+    """Return the folder for results, whose earlier report may be replaced.
+
+    Raises
+    ------
+    FileError
+        If there is none, it is among sessions, or it holds files of the user's.
+    """
     if not text:
         raise FileError("choose a folder for the results")
-    return user_path(text).absolute()
+    folder = user_path(text).absolute()
+    is_in_session = any(os.path.exists(path / JOURNAL) for path in (folder, *folder.parents))
+    if is_in_session or find_journals(folder) or find_journals(folder.parent):
+        raise FileError(f"{folder} holds sessions, or lies among them: choose another folder")
+    for file in (folder / "report.pdf", folder / "report.html"):
+        if os.path.exists(file) and not may_be_replaced(file):
+            raise FileError(
+                f"{folder} holds files that are not of an evaluation, such as {file.name}: "
+                "choose another folder"
+            )
+    return folder

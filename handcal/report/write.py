@@ -40,3 +40,13 @@ def write_report(
     write_html(html, report, progress.part(0.4, 1.0))
     progress.at(1.0)
     return pdf, html
+
+
+def may_be_replaced(file: Path) -> bool:
+    """Return whether a PDF or HTML is empty, or was written by `write_report`."""
+    marks = b"/Creator (handcal ", b'name="generator" content="handcal '
+    try:
+        content = file.read_bytes()
+    except OSError:
+        return False
+    return not content or any(mark in content for mark in marks)

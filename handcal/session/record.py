@@ -65,7 +65,7 @@ class SessionRecord:
     fine_tuned: Mapping[Eye, Float64] | None
     """each (3,); the φ last set by hand; None if none was set since the last results."""
     is_finished: bool
-    """True if the session was finished, and nothing was recorded since."""
+    """True if the session was finished, and nothing but `ASIDE` was recorded since."""
     journal_bytes: int
     """Length of the journal's complete lines."""
     torn_bytes: int

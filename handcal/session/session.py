@@ -299,7 +299,7 @@ class Session(Closable):
     def finish(self) -> None:
         """Record the end of the session; FileError if the journal cannot be written.
 
-        Anything recorded afterwards makes the session unfinished again.
+        Anything recorded afterwards but `ASIDE` makes the session unfinished again.
         """
         self._append(SessionEvent.FINISHED, {})
 

@@ -10,6 +10,7 @@ from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 from handcal.display import as_shifts
 from handcal.session import journal
+from handcal.session.comparison import COMPARED
 from handcal.session.facts import AlignmentFacts, SessionFacts, read_facts, with_facts
 from handcal.session.journal import Event
 from handcal.session.trial import Trial, read_trial
@@ -52,8 +53,17 @@ class SessionEvent(StrEnum):
     FINISHED = "finished"
 
 
-ASIDE = (SessionEvent.NOTES_SAVED, SessionEvent.WEARER_CORRECTED, SessionEvent.UPGRADED)
-"""Events after which a finished session stays finished."""
+ASIDE = (
+    SessionEvent.NOTES_SAVED,
+    SessionEvent.WEARER_CORRECTED,
+    SessionEvent.UPGRADED,
+    SessionEvent.TRIAL_SAVED,
+    SessionEvent.TRIAL_DELETED,
+    SessionEvent.TRIAL_RESTORED,
+    SessionEvent.FINE_TUNED,
+    COMPARED,
+)
+"""Events after which a finished session stays finished: of its user test, and corrections."""
 
 VERIFYING = "verifying"
 """The station's event at the start of a verification and after each nudge."""

@@ -14,7 +14,7 @@ from handcal.session.state import ASIDE, VERIFYING, SessionEvent
 
 @dataclass(frozen=True, slots=True)
 class UnfinishedSession:
-    """A session whose journal does not end in `finished`."""
+    """A session whose journal does not end in `finished`, but for what is `ASIDE`."""
 
     path: Path
     started: str = ""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QLabel,
     QListWidget,
@@ -26,6 +25,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import show_share
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.opening import open_path
 
 _NOTHING = tr("nothing was exported; the sessions and earlier exports are unchanged")
 _NOTHING_ADVICE = tr("see the reasons below, then go back to choose another folder or try again")
@@ -42,7 +42,7 @@ class ExportProgress(QWidget):
         self._end = FindingLine("exportEnd")
         self._report = Path()
         self._open_report = button("openReport", tr("Open &report"))
-        self._open_report.clicked.connect(lambda: _open(self._report))
+        self._open_report.clicked.connect(lambda: open_path(self, self._report))
         self._files = with_name(QListWidget(), "files", tr("Files"))
         self._files.setWordWrap(True)
         self._files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -94,7 +94,7 @@ class ExportProgress(QWidget):
         self._show_end(
             Finding("", Health.LIMITED if made.missing else Health.GOOD, count),
             tr("&Open folder"),
-            lambda: _open(folder),
+            lambda: open_path(self, folder),
         )
 
     def show_failure(self, why: str) -> None:
@@ -119,7 +119,3 @@ class ExportProgress(QWidget):
         self._bar.hide()
         self._end.show_finding(finding, fix, mend)
         self._end.show()
-
-
-def _open(path: Path) -> None:
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))

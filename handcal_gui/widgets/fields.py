@@ -99,11 +99,7 @@ class NumberField(QDoubleSpinBox):
         typed = self._typed(text)
         if typed is None:
             return super().fixup(text)
-        nearest = self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
-        taken = f"{nearest}{self.suffix()}"
-        said = tr("Changed to {}. {}").format(taken, _range_text(self))
-        show_briefly(self, "\n".join(filter(None, (said, self.note))))
-        return taken
+        return _nearest(self, typed, self.note)
 
     def _typed(self, text: str) -> float | None:
         """Return the number in a text, whatever the range; None if there is none."""
@@ -113,7 +109,10 @@ class NumberField(QDoubleSpinBox):
 
 
 class WholeNumberField(QSpinBox):
-    """A field for a whole number, which takes no separators: it showed 1,5 and was 15."""
+    """A field for a whole number, which takes no separators: it showed 1,5 and was 15.
+
+    For a number out of range, the nearest one is taken, as in `NumberField`.
+    """
 
     def __init__(self, low: int, high: int) -> None:
         super().__init__(minimum=low, maximum=high)
@@ -127,7 +126,19 @@ class WholeNumberField(QSpinBox):
         """Refuse a point or a comma."""
         if {".", ","} & set(text.removesuffix(self.suffix())):
             return QValidator.State.Invalid, text, place
-        return super().validate(text, place)
+        state, text, place = super().validate(text, place)
+        if state == QValidator.State.Invalid and self._is_number(text):
+            state = QValidator.State.Intermediate
+        return state, text, place
+
+    def fixup(self, text: str) -> str:
+        """Return the nearest number that is allowed, and say which are."""
+        if not self._is_number(text):
+            return super().fixup(text)
+        return _nearest(self, int(text.removesuffix(self.suffix())))
+
+    def _is_number(self, text: str) -> bool:
+        return re.fullmatch(r"-?\d{1,18}", text.removesuffix(self.suffix()), re.ASCII) is not None
 
 
 def number(
@@ -242,6 +253,16 @@ def _show_range(spin: QAbstractSpinBox, event: QEvent) -> bool:
     text = f"{field.toolTip()}\n{_range_text(field)}".strip()
     QToolTip.showText(cast(QHelpEvent, event).globalPos(), text, field)
     return True
+
+
+def _nearest(spin: QAbstractSpinBox, typed: float, note: str = "") -> str:
+    """Return the text of the allowed number nearest to one typed, and say so over its field."""
+    field = cast(QDoubleSpinBox, spin)
+    nearest = min(max(typed, field.minimum()), field.maximum())
+    taken = f"{field.textFromValue(nearest)}{field.suffix()}"
+    said = tr("Changed to {}. {}").format(taken, _range_text(field))
+    show_briefly(field, "\n".join(filter(None, (said, note))))
+    return taken
 
 
 def _range_text(field: QDoubleSpinBox) -> str:

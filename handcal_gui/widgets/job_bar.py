@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QLabel, QProgressBar, QWidget
+from PySide6.QtWidgets import QLabel, QMessageBox, QProgressBar, QWidget
 
 from handcal_gui.engine.jobs import Job, Work
 from handcal_gui.theme import SPACING_PX
@@ -23,6 +23,17 @@ def show_share(bar: QProgressBar, share: float) -> None:
     bar.setValue(round(_WHOLE * share))
 
 
+def may_cancel(window: QWidget, running: str) -> bool:
+    """Ask before a window is closed whose job is running; Esc keeps it running."""
+    box = QMessageBox(QMessageBox.Icon.Question, window.windowTitle(), running, parent=window)
+    end = box.addButton(tr("&Cancel and close"), QMessageBox.ButtonRole.DestructiveRole)
+    keep = box.addButton(tr("&Keep running"), QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(keep)
+    box.setEscapeButton(keep)
+    box.exec()
+    return box.clickedButton() is end
+
+
 class JobBar(QWidget):
     """Runs jobs one at a time; its space stays reserved in between.
 
@@ -36,10 +47,12 @@ class JobBar(QWidget):
     ----------
     failed : Signal(str)
         Reason why a job failed, for the user.
+    cancelled : Signal()
     busy_changed : Signal(bool)
     """
 
     failed = Signal(str)
+    cancelled = Signal()
     busy_changed = Signal(bool)
 
     def __init__(self, end: str = "", parent: QWidget | None = None) -> None:
@@ -70,6 +83,7 @@ class JobBar(QWidget):
         self._job.succeeded.connect(self._succeed)
         self._job.failed.connect(self._fail)
         self._job.cancelled.connect(self._end)
+        self._job.cancelled.connect(self.cancelled)
         self._doing.setText(f"{doing}…")
         self._bar.setRange(0, 0)  # busy indicator until a share is reported
         self._job.start()

@@ -26,7 +26,8 @@ def keep_on_screen(window: QWidget) -> None:
     has_frame = window.frameGeometry() != window.geometry()
     if not (has_frame or window.isMaximized() or window.isFullScreen()):
         room = window.screen().availableGeometry().marginsRemoved(_FRAME_PX)
-        window.resize(window.size().boundedTo(room.size()))
+        # Not `move`, which is of the frame: with none yet, the title bar ended above the screen.
+        window.setGeometry(placed(window.geometry(), room))
     QTimer.singleShot(0, window, lambda: _place(window))
 
 

@@ -155,7 +155,7 @@ class Manual(QWidget):
         add_action(self, tr("Search all pages"), "Ctrl+F", self._begin_search)
 
     def open(self, page: str) -> None:
-        """Show a shipped page, such as ``docs/guide.md``.
+        """Show a shipped page, such as ``docs/guide.md``, or ``docs/guide.md#keys`` of it.
 
         Raises
         ------
@@ -169,7 +169,10 @@ class Manual(QWidget):
             above = self.parentWidget() or self
             self.move(above.frameGeometry().center() - self.rect().center())
         self.show()  # first, as pictures are no wider than the page
-        self.page.setSource(QUrl.fromLocalFile(str(resource_path(page))))
+        file, _, heading = page.partition("#")
+        url = QUrl.fromLocalFile(str(resource_path(file)))
+        url.setFragment(heading)
+        self.page.setSource(url)
         keep_on_screen(self)
         self.raise_()
         self.activateWindow()

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtCore import QObject, QRect, Qt
-from PySide6.QtWidgets import QAbstractButton, QLabel, QMenuBar, QTabBar, QWidget
+import pytest
+from PySide6.QtCore import QObject, QRect, Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QLabel,
+    QMenuBar,
+    QMessageBox,
+    QPushButton,
+    QTabBar,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 Child = TypeVar("Child", bound=QObject)
@@ -66,3 +77,28 @@ def button(parent: QObject, kind: type[Button], text: str) -> Button:
     """Return the first button of a kind and a text, regardless of its letter."""
     found = parent.findChildren(kind)
     return next(one for one in found if one.text().replace("&", "") == text.replace("&", ""))
+
+
+def answer_questions(monkeypatch: pytest.MonkeyPatch, answer: str) -> list[str]:
+    """Have message boxes answered by the button of a text; return the list of what they say."""
+    said: list[str] = []
+
+    def press(box: QMessageBox) -> int:
+        said.append(box.text())
+        button(box, QPushButton, answer).click()
+        return 0
+
+    monkeypatch.setattr(QMessageBox, "exec", press)
+    return said
+
+
+def note_opened(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Have no file or folder opened by a program; return the list of those that would be."""
+    opened: list[Path] = []
+
+    def note(url: QUrl) -> bool:
+        opened.append(Path(url.toLocalFile()))
+        return True
+
+    monkeypatch.setattr(QDesktopServices, "openUrl", note)
+    return opened

@@ -1,9 +1,13 @@
 import json
 from pathlib import Path
 
+import numpy as np
+
 from handcal.rig.example import example_rig
+from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
+from handcal.session.trial import make_trial
 from handcal.session.unfinished import unfinished_and_repaired
 from handcal.types import Alignment
 
@@ -24,6 +28,13 @@ def test_only_those_not_finished_are_listed_the_newest_first(
     with make(tmp_path, "c-done") as done:
         done.finish()
         done.save_notes("notes do not begin it again")
+        trial = make_trial(example_rig().eyes["left"], "left", 0.5, np.zeros(3), np.zeros(3))
+        done.save_fine_tuned({"left": np.zeros(3)})
+        done.save_trial(trial)
+        done.record(COMPARED, **comparison_json(Comparison("offline", "first", {})))
+        done.delete("trial", 1)
+        done.restore("trial", 1)
+    assert Session.open(tmp_path / "c-done").is_finished
     make(tmp_path, "a-second").close()
     (tmp_path / "other").mkdir()
     (tmp_path / "file").write_text("not a folder")

@@ -57,15 +57,21 @@ def read_masked_names(folder: Path) -> dict[str, dict[str, Any]]:
     Raises
     ------
     FileError
-        If the file is missing or malformed, or describes no frames or too many.
+        If the file or an image is missing, or it is malformed, or describes no frames or too many.
     """
     path = folder / "meta.json"
+    if not path.exists():
+        raise FileError(f"{folder} holds no meta.json, which describes the frames there")
     described = read_json(path)
     if not 0 < len(described) <= _MOST_FRAMES:
         raise FileError(f"{path} must describe 1 to {_MOST_FRAMES:,} frames")
     for name, about in described.items():
         if not re.fullmatch(r"[\w.-]+", name) or not isinstance(about, dict):
             raise FileError(f"{path}: {name!r} does not describe a frame")
+        _camera(about, name, path)
+        for file in (folder / f"{name}_depth.png", folder / f"{name}_handmask.png"):
+            if not file.exists():
+                raise FileError(f"there is no {file}, although meta.json describes the frame")
     return dict(sorted(described.items(), key=lambda item: (item[0].zfill(64), item[0])))
 
 
@@ -74,8 +80,8 @@ def read_masked_frames(folder: Path, described: dict[str, dict[str, Any]]) -> It
 
     For each name of `described`: ``NAME_depth.png`` (16 bits), ``NAME_handmask.png`` (not 0 on the
     hand) and, if there is one, ``NAME_color.png`` or ``.jpg``, to which the depth is aligned.
-    ``meta.json`` gives by name ``intrinsics`` (fx, fy, cx, cy in pixels), ``width``, ``height``,
-    ``depth_unit_m`` and optionally ``joints3d_mm``, 21 joints in the camera's frame, in
+    ``meta.json`` gives by name ``intrinsics`` (a list: fx, fy, cx, cy, in pixels), ``width``,
+    ``height``, ``depth_unit_m`` and optionally ``joints3d_mm``, 21 joints in the camera's frame, in
     millimetres: the wrist, then four of each finger, the thumb's first.
 
     Raises
@@ -85,11 +91,7 @@ def read_masked_frames(folder: Path, described: dict[str, dict[str, Any]]) -> It
     """
     path = folder / "meta.json"
     for name, about in described.items():
-        values = about.get("intrinsics")
-        if not isinstance(values, list) or len(values) != 4:
-            raise FileError(f"{path}: {name} must give intrinsics as fx, fy, cx, cy")
-        lens = dict(zip(("fx", "fy", "cx", "cy"), values, strict=True))
-        camera = intrinsics_from(about | lens, path)
+        camera = _camera(about, name, path)
         if about.get("depth_aligned_to_color", True) is not True:
             raise FileError(f"{path}: the depth of {name} must be aligned to its colour")
         depth = read_depth(folder / f"{name}_depth.png", camera)
@@ -110,6 +112,16 @@ def read_masked_frames(folder: Path, described: dict[str, dict[str, Any]]) -> It
             color_intrinsics=None if color is None else camera,
         )
         yield MaskedFrame(name, frame, mask > 0, *_wrist(about, name, path))
+
+
+def _camera(about: dict[str, Any], name: str, path: Path) -> Intrinsics:
+    values = about.get("intrinsics")
+    if not isinstance(values, list) or len(values) != 4:
+        raise FileError(
+            f"{path}: the intrinsics of {name} must be a list of four numbers without names, "
+            "[fx, fy, cx, cy] in pixels"
+        )
+    return intrinsics_from(about | dict(zip(("fx", "fy", "cx", "cy"), values, strict=True)), path)
 
 
 def _wrist(about: dict[str, Any], name: str, path: Path) -> tuple[Float64 | None, Float64 | None]:

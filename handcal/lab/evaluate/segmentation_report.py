@@ -85,7 +85,8 @@ def _draw(rows: Sequence[Any], axes: Sequence[Axes]) -> None:
         (axes[1], "area_change", _PERCENT, "Stability", "change of the area, %"),
     ):
         known = [(n, scale * row[key]) for n, row in enumerate(rows, 1) if row[key] is not None]
-        ax.plot([n for n, _ in known], [value for _, value in known], "o", markersize=3)
+        places, values = [n for n, _ in known], [value for _, value in known]
+        ax.plot(places, values, "o", markersize=3, clip_on=False)
         ax.set_ylim(bottom=0.0)
         name_axes(ax, title, "frame", label)
 

@@ -34,12 +34,14 @@ _INTERVALS = (
 def user_test_report(test: UserTest, result: UserTestResult) -> Report:
     """Return the report of a user test."""
     total = result.total
+    simulated = sum(bool(record.simulated) for record in test.sessions.values())
+    told = f" Simulated sessions: {simulated} of {len(test.sessions)}." if simulated else ""
     return Report(
         title="User test",
         subject=f"{_count(len(result.by_wearer), 'wearer')}, "
         f"{_count(len(test.sessions), 'session')}, {_count(total.trials, 'trial')}",
         lead=f"{_mean(total)} Of all corners: {mean_sd(total.arcmin)} arcmin, "
-        f"{mean_sd(total.px)} px (± SD).",
+        f"{mean_sd(total.px)} px (± SD).{told}",
         sections=list(_sections(test, result)),
     )
 

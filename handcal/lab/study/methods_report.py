@@ -34,6 +34,8 @@ _TIME = (
     "for the paper's solver. Methods for one eye at a time count both."
 )
 _REFUSED = "Refused: wearers whose alignments the method cannot make a projection of."
+_FEWEST = 20
+"""Of fewer wearers, a mean's standard error is more than a fifth of their spread."""
 _ROW_MM, _FIGURE_MM = 4.2, 12.0
 _NAMES_MM = 42.0
 
@@ -45,11 +47,13 @@ def methods_report(settings: MethodSettings, rows: Sequence[StudyRow]) -> Report
         float(_arcmin(_of(first, name)).mean())
         for name in (PAPER, f"{HANDCAL_BOTH} 1", f"{HANDCAL_BOTH} 3", f"{HANDCAL_EACH} 3")
     )
+    too_few = "Too few wearers for figures to report. " if settings.wearers < _FEWEST else ""
     return Report(
         title="Calibration methods compared",
         subject=f"{settings.wearers} simulated wearers, {len(_methods(rows))} methods",
-        lead=f"Mean reprojection error: the paper's method {paper:.1f} arcmin; handcal {one:.1f} "
-        f"with one alignment, {three:.1f} with three, and {each:.1f} with three of each eye.",
+        lead=f"{too_few}Mean reprojection error: the paper's method {paper:.1f} arcmin; "
+        f"handcal {one:.1f} with one alignment, {three:.1f} with three, and {each:.1f} with three "
+        "of each eye.",
         sections=list(_sections(settings, rows)),
     )
 

@@ -284,6 +284,7 @@ def _draw(
                 markersize=3,
                 linestyle=line,
                 linewidth=1.0,
+                clip_on=False,
             )
             ax.fill_between(values, low, high, color=color, alpha=0.2, linewidth=0.0)
     ax.axhline(LINE_MM, color="0.3", linewidth=0.6)

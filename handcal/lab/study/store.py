@@ -22,6 +22,8 @@ StudyRow: TypeAlias = dict[str, float | int | str | bool | None]
 """One row of a study's table; None for an empty cell."""
 
 _STUDY = "study.json"
+_ENTERED = "seed", "wearers", "open3d", "noise_scale"
+"""Settings that a user enters; several others differ only between sizes."""
 _LIBRARIES = "handcal", "numpy", "scipy", "opencv-python-headless"
 
 
@@ -88,8 +90,7 @@ class StudyFolder:
             write_json(file, study)
         elif others := _differences(read_json(file), study):
             raise FileError(
-                f"{path} holds another study ({others}); "
-                "choose another folder, or delete this one to start again"
+                f"{path} holds another study ({others}); choose another folder, or the same entries"
             )
 
     def has_chunk(self, number: int) -> bool:
@@ -123,12 +124,26 @@ def _sha256(value: object) -> str:
 
 
 def _differences(stored: Mapping[str, Any], study: Mapping[str, Any]) -> str:
-    """Return the differences as one line; empty if there are none."""
-    parts = []
-    for key in study:
-        old, new = stored.get(key), study[key]
-        if isinstance(old, dict) and isinstance(new, dict):
-            parts.append(_differences(old, new))
-        elif old != new:
-            parts.append(f"{key} {old!r} there, {new!r} here")
-    return "; ".join(filter(None, parts))
+    """Return the differences as one line, by what was entered; empty if there are none."""
+    if name := _changes({"name": stored.get("name")}, {"name": study["name"]}):
+        return name["name"]
+    changes = _changes(stored.get("settings"), study["settings"])
+    entered = {key: change for key, change in changes.items() if key in _ENTERED}
+    if len(changes) > len(entered) + 1:
+        changes = {"size": "another size"} | entered
+    changes |= _changes(stored.get("versions"), study["versions"])
+    if not changes:
+        changes = _changes(stored, {"cases": study["cases"]})
+    if not changes and stored.get("cases_sha256") != study["cases_sha256"]:
+        changes = {"cases": "other cases"}
+    return "; ".join(changes.values())
+
+
+def _changes(stored: Any, values: Mapping[str, Any]) -> dict[str, str]:
+    """Return by key what differs from what is stored, in words."""
+    old = stored if isinstance(stored, dict) else {}
+    return {
+        key: f"{key} {old.get(key)!r} there, {new!r} here"
+        for key, new in values.items()
+        if old.get(key) != new
+    }

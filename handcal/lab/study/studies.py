@@ -79,7 +79,7 @@ def run_procedure_study(settings: ProcedureStudySettings, progress: Progress) ->
     with TemporaryDirectory() as scratch:
         rows = run_study(
             study,
-            output_folder(settings.output or scratch),
+            output_folder(settings.output) if settings.output else Path(scratch),
             workers=settings.processes or None,
             scheduler=settings.scheduler or None,
             progress=progress,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
@@ -11,6 +12,7 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QComboBox,
+    QCompleter,
     QLineEdit,
     QSizePolicy,
     QWidget,
@@ -88,6 +90,11 @@ class NewCalibration(Card):
         self._wearer.setLineEdit(name)
         self._wearer.setEditable(True)
         self._wearer.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        completer = self._wearer.completer()
+        assert completer is not None
+        # A list: typed in by itself, a former wearer's name would be taken for the present one's.
+        completer.setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
+        name.returnPressed.connect(partial(self._start_past, completer))
         self._wearer_problem = paragraph("wearerProblem")
         self._wearer_problem.hide()
         self._wearer.editTextChanged.connect(self._show_wearer_problem)
@@ -285,6 +292,12 @@ class NewCalibration(Card):
         """Take no blanks before a name: the space bar pressed the former page's button."""
         if typed != typed.lstrip():
             self._wearer.setEditText(typed.lstrip())
+
+    def _start_past(self, completer: QCompleter) -> None:
+        """Start on Enter while a list of names is open, which keeps the key from the form."""
+        names = completer.popup()
+        if names is not None and names.isVisible() and not names.currentIndex().isValid():
+            self._button.click()
 
     def _show_wearer_problem(self, typed: str) -> None:
         try:

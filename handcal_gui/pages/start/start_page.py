@@ -107,7 +107,7 @@ class StartPage(QWidget):
             tr("Evaluate"), tr("Simulated studies, the cube test, and the user test."), "results"
         )
         evaluate = button(
-            "evaluate", tr("&Evaluate…"), help_text=tr("Measure the accuracy of calibrations")
+            "evaluate", tr("Evalua&te…"), help_text=tr("Measure the accuracy of calibrations")
         )
         self._evaluate.add_to_head(evaluate)
         self._fit_soon = fit_soon(self._fit, self)

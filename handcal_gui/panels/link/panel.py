@@ -58,7 +58,7 @@ class LinkPanel(QWidget):
         self._connect.clicked.connect(self.connect_requested)
         self._restart = button(
             "restartHeadset",
-            tr("R&estart headset"),
+            tr("Res&tart headset"),
             help_text=tr("Restart the virtual headset's program"),
         )
         self._restart.clicked.connect(self.restart_headset_requested)

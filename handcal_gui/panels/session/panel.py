@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
@@ -24,6 +23,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.record_tabs import RecordTabs
 from handcal_gui.widgets.session_rows import (
@@ -196,7 +196,7 @@ class SessionPanel(QWidget):
 
     def _show_folder(self) -> None:
         if self._record is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._record.path.absolute())))
+            open_path(self, self._record.path)
 
     def _lay_out(self) -> None:
         self._open_folder.setToolTip(tr("Show the session's folder in the file manager"))
@@ -212,7 +212,7 @@ class SessionPanel(QWidget):
         form.addRow(tr("Wearer"), self._wearer)
         form.addRow(tr("Folder"), self._folder)
         form.addRow(tr("Started"), self._started)
-        form.addRow(tr("&Eye distance (mm)"), self._eye_distance)
+        form.addRow(tr("Eye dis&tance (mm)"), self._eye_distance)
         form.addRow(self._eye_distance_problem)
         self._eye_distance_problem.hide()
         self._tabs.addTab(self._alignments, tr("Alignments"))

@@ -14,7 +14,7 @@ from handcal_gui.widgets.numbers import pluralize
 
 _SHOW: dict[Place, str] = {"first": tr("Sho&w first"), "second": tr("Sh&ow second")}
 _ANSWERS: dict[Answer, str] = {
-    "first": tr("First is b&etter"),
+    "first": tr("First is be&tter"),
     "second": tr("Se&cond is better"),
     "neither": tr("&Neither"),
 }

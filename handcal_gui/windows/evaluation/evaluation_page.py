@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
@@ -38,6 +38,8 @@ class EvaluationSpec:
     """Creates the form for its entries."""
     preparations: tuple[Preparation, ...] = ()
     """Buttons and dialogs that prepare data and devices."""
+    note: str = ""
+    """HTML about the format of its data, with a link to a page of the manual."""
 
 
 class EvaluationPage(QWidget):
@@ -52,10 +54,13 @@ class EvaluationPage(QWidget):
     Attributes
     ----------
     busy_changed : Signal(bool)
+    manual_wanted : Signal(str)
+        The user wants to read a page of the manual.
     form : EntriesForm
     """
 
     busy_changed = Signal(bool)
+    manual_wanted = Signal(str)
 
     def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -63,7 +68,7 @@ class EvaluationPage(QWidget):
         self._entries = entries
         self._readiness: Readiness | None = None
         self._failure = self._waits_for = ""
-        self._is_done = False
+        self._is_done = self._is_cancelled = False
         self.form = spec.form()
         self.form.show_entries(entries)
         self._button = main_button("run", tr("Run"))
@@ -76,12 +81,13 @@ class EvaluationPage(QWidget):
         keep_space(self._found)
         self._results = ResultsView()
         self._look = LatestJob(self._check, self)
-        self._lay_out(spec.question)
+        self._lay_out(spec)
         self.form.changed.connect(self._on_entries_changed)
         self._button.clicked.connect(self.run)
         for prepare in self._preparing:
             prepare.closed.connect(self._take_entries)
         self._bar.failed.connect(self._show_failure)
+        self._bar.cancelled.connect(self._note_cancelled)
         self._bar.busy_changed.connect(self._change_busy)
         self._look.answered.connect(self._on_readiness)
         self._look.failed.connect(self._show_failure)
@@ -92,6 +98,11 @@ class EvaluationPage(QWidget):
         return self._entries
 
     @property
+    def kept(self) -> str:
+        """Sentence that says what of the evaluation is kept if it is cancelled."""
+        return self._evaluation.kept
+
+    @property
     def is_busy(self) -> bool:
         """True while the evaluation runs."""
         return self._bar.is_busy
@@ -99,7 +110,7 @@ class EvaluationPage(QWidget):
     def run(self) -> None:
         """Start or resume the evaluation."""
         entries = self._entries
-        self._failure, self._is_done = "", False
+        self._failure, self._is_done, self._is_cancelled = "", False, False
         self._results.show_outcome(None)
         self._bar.run(
             tr("Starting"),
@@ -134,7 +145,7 @@ class EvaluationPage(QWidget):
 
     def _take_entries(self, entries: Any) -> None:
         self._entries = entries
-        self._failure, self._is_done = "", False
+        self._failure, self._is_done, self._is_cancelled = "", False, False
         self._ask()
 
     def _ask(self) -> None:
@@ -163,6 +174,9 @@ class EvaluationPage(QWidget):
     def _show_failure(self, why: str) -> None:
         self._failure = why
         self._refresh()
+
+    def _note_cancelled(self) -> None:
+        self._is_cancelled = True
 
     def _change_busy(self, is_busy: bool) -> None:
         self.form.setEnabled(not is_busy)
@@ -193,14 +207,26 @@ class EvaluationPage(QWidget):
             return Finding("", Health.LIMITED, found, tr("only one can run at a time"))
         if self._is_done:
             return Finding("", Health.GOOD, tr("Done"))
-        return self._readiness.finding if self._readiness else None
+        finding = self._readiness.finding if self._readiness else None
+        if finding is None or not self._is_cancelled:
+            return finding
+        if finding.health is Health.GOOD:  # ready for a start from the beginning
+            return replace(finding, found=tr("Cancelled; the next run starts from the beginning"))
+        return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
-    def _lay_out(self, question: str) -> None:
+    def _lay_out(self, spec: EvaluationSpec) -> None:
+        note = paragraph("format", spec.note)
+        note.setTextFormat(Qt.TextFormat.RichText)
+        by = Qt.TextInteractionFlag
+        note.setTextInteractionFlags(by.LinksAccessibleByMouse | by.LinksAccessibleByKeyboard)
+        note.linkActivated.connect(self.manual_wanted)
+        note.setVisible(bool(spec.note))
         vbox(
             paragraph(
                 "question",
-                tr("{} Check the entries, then start at the lower right.").format(question),
+                tr("{} Check the entries, then start at the lower right.").format(spec.question),
             ),
+            note,
             self.form,
             self._found,
             (self._results, 1),

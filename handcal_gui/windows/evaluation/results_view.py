@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.report.document import Figure, Report, Table
@@ -15,8 +14,9 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, fill_row, paragraph, with_name
 from handcal_gui.widgets.image_view import ImageView
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.evaluation.work import Outcome
 
@@ -53,8 +53,18 @@ class ResultsView(QWidget):
         tables = _key_tables(outcome.report)
         for title, table in zip(_titles(tables), tables, strict=True):
             self._add(title, _table_page(table))
+        first = [item for section in outcome.report.sections[:1] for item in section.items]
+        if terms := [item for item in first if isinstance(item, str)]:
+            text = paragraph("terms", "\n\n".join(terms))
+            text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            text.setAlignment(Qt.AlignmentFlag.AlignTop)
+            text.setMargin(SPACING_PX)
+            self._add(tr("Terms and methods"), scrollable(text))
+        names = {figure.name for figure in outcome.report.figures}
         for figure, picture in zip(outcome.report.figures, outcome.pictures, strict=True):
-            title = sentence(figure.name.replace("-", " "))
+            only = figure.name.removesuffix("-1")  # unless there is a second one
+            name = figure.name if f"{only}-2" in names else only
+            title = sentence(name.replace("-", " "))
             self._add(title, _figure_page(title, figure, picture))
 
     def _add(self, title: str, page: QWidget) -> None:
@@ -62,7 +72,7 @@ class ResultsView(QWidget):
         self._tabs.addTab(page, title)
 
     def _open(self, name: str) -> None:
-        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._folder / name)))
+        open_path(self, self._folder / name)
 
     def _lay_out(self) -> None:
         foot, buttons = QWidget(), []
@@ -126,7 +136,7 @@ def _figure_page(title: str, figure: Figure, picture: UInt8) -> QWidget:
     view = ImageView(tr("Figure {}").format(title))
     view.setAccessibleDescription(figure.caption)
     view.show_image(picture)
-    file = tr("White as on paper: this is the exported figures/{}.png.").format(figure.name)
+    file = tr("Drawn on white, as in the exported figures/{}.png.").format(figure.name)
     return _page(view, f"{figure.caption} {file}".lstrip())
 
 

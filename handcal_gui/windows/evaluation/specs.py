@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QLineEdit, QSpinBox, QWidget
 
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_folder import find_captures
+from handcal.lab.evaluate.masked_frames import read_masked_names
 from handcal.lab.evaluate.run import run_cube_test, run_segmentation_test, run_user_test
 from handcal.lab.evaluate.user_test import holds_trials
 from handcal.lab.settings import SegmentationTestSettings
@@ -19,6 +20,7 @@ from handcal.lab.study.studies import (
     run_noise_study,
 )
 from handcal.session.journal import JOURNAL
+from handcal.session.record import replay
 from handcal_gui.evaluation_entries import CubeEntries, UserEntries
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -94,7 +96,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             _users_form,
             (
                 Preparation(
-                    tr("Rec&ord…"),
+                    tr("Re&cord…"),
                     tr(
                         "Record the trials of one session with a cube in the room; enter the "
                         "session first."
@@ -113,6 +115,11 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             ),
             FileEvaluation(_missing_frames, run_segmentation_test),
             _segmentation_form,
+            note=tr(
+                "A frame NAME is NAME_depth.png, NAME_handmask.png and, if there is one, "
+                "NAME_color.png; meta.json describes all frames: "
+            )
+            + f'<a href="docs/commands.md#handcal-evaluate-segmentation">{tr("its contents")}</a>.',
         ),
     }
 
@@ -139,6 +146,10 @@ def _missing_sessions(entries: UserEntries) -> str:
         return tr("there is no session in {}: {}").format(entries.sessions, request)
     if holds_trials(folder):
         return ""
+    if (folder / JOURNAL).is_file():
+        return tr(
+            "the session of {} holds no trial: record some in the panel Trials, or press Record…"
+        ).format(replay(folder).state.wearer or tr("a wearer without a name"))
     return tr(
         "no session in {} holds a trial: record some in the panel Trials, or choose one session "
         "and press Record…"
@@ -146,7 +157,11 @@ def _missing_sessions(entries: UserEntries) -> str:
 
 
 def _missing_frames(entries: SegmentationTestSettings) -> str:
-    return _missing_folder(entries.folder, tr("choose a folder of frames with true masks"))
+    request = tr("choose a folder of frames with true masks")
+    missing = _missing_folder(entries.folder, request)
+    if not missing:
+        read_masked_names(user_path(entries.folder))  # raises an error if they are not usable
+    return missing
 
 
 def _missing_folder(folder: str, request: str) -> str:

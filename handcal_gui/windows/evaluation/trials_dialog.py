@@ -12,9 +12,11 @@ from typing import TypeAlias
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QWidget
 
+from handcal.errors import FileError
 from handcal.io.files import user_path
 from handcal.progress import Progress
 from handcal.session.journal import JOURNAL
+from handcal.session.session import Session
 from handcal.session.trial import Trial
 from handcal.station.doctor import Finding, Health
 from handcal.station.user_test import StudyLeader, TrialOrder, record_user_trials
@@ -29,6 +31,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset
@@ -140,7 +143,7 @@ class TrialsDialog(PreparationDialog):
         self._record = record
         self._desk: _Desk | None = None
         self._step: _Step | None = None
-        self._has_session = os.path.isfile(user_path(entries.sessions) / JOURNAL)
+        self._has_session, self._stored = False, ""
         self.form = EntriesForm(
             {
                 "headset": (
@@ -207,6 +210,7 @@ class TrialsDialog(PreparationDialog):
             return self._record(order, connect, depth_camera, desk.leader, progress)
 
         self._table.hide()
+        self._stored = ""
         self._bar.run(tr("Waiting for the headset"), work, self._show_trials)
 
     def done(self, result: int) -> None:
@@ -240,9 +244,8 @@ class TrialsDialog(PreparationDialog):
             ],
         )
         self._table.show()
-        self._found.show_finding(
-            Finding("", Health.GOOD, tr("trials stored: {}").format(len(trials)))
-        )
+        self._stored = tr("trials stored: {}").format(len(trials))
+        self._found.show_finding(self._place_found())
         self._refresh()
 
     def _show_failure(self, why: str) -> None:
@@ -251,18 +254,29 @@ class TrialsDialog(PreparationDialog):
         self._refresh()
 
     def _place_found(self) -> Finding:
-        """Return where the trials will be stored, or why they cannot."""
-        folder = self.entries.sessions
-        if self._has_session:
+        """Return whose session takes the trials, and what it holds, or why it cannot."""
+        folder = user_path(self.entries.sessions)
+        self._has_session = os.path.isfile(folder / JOURNAL)
+        if not self._has_session:
             return Finding(
-                "", Health.GOOD, tr("session found: trials will be stored in {}").format(folder)
+                "",
+                Health.BROKEN,
+                tr("{} is not one session").format(self.entries.sessions),
+                tr("close this window and choose the wearer's session under Sessions"),
             )
-        return Finding(
-            "",
-            Health.BROKEN,
-            tr("{} is not one session").format(folder),
-            tr("close this window and choose the wearer's session under Sessions"),
-        )
+        try:
+            record = Session.open(folder)
+        except FileError as error:
+            self._has_session = False
+            return Finding("", Health.BROKEN, str(error))
+        whose = record.wearer or tr("a wearer without a name")
+        if record.simulated:
+            whose = tr("{} (simulated: {})").format(whose, record.simulated)
+        session = tr("the session of {} holds no trial yet").format(whose)
+        if record.trials:
+            count = pluralize(len(record.trials), tr("trial"), tr("trials"))
+            session = tr("the session of {} holds {}; new ones are added").format(whose, count)
+        return Finding("", Health.GOOD, self._stored or session, self._stored and session)
 
     def _keep(self) -> None:
         self.entries = self.form.take(self.entries)
@@ -277,7 +291,11 @@ class TrialsDialog(PreparationDialog):
         for move in self._moves.values():
             move.setEnabled(step is not None and step.is_adjusting)
         self._next.setText(tr("They coincide") if step is None else step.button)
-        first = "" if self._bar.is_busy else tr("Let the wearer put the headset on, and start.")
+        first = tr("Let the wearer put the headset on, and start.")
+        if self._stored:
+            first = tr("The trials are stored. Close, or start again to add others.")
+        if self._bar.is_busy:
+            first = ""
         self._instruction.setText(first if step is None else step.text)
 
     def _lay_out(self) -> None:

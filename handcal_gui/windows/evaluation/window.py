@@ -20,7 +20,9 @@ from PySide6.QtWidgets import (
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.fields import button, with_name
+from handcal_gui.widgets.job_bar import may_cancel
+from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage, EvaluationSpec
 
@@ -29,7 +31,7 @@ _RAIL_PX = 24 * SPACING_PX
 
 
 class EvaluationWindow(QDialog):
-    """Offers evaluations, one of which can run at a time; closing cancels it.
+    """Offers evaluations, one of which can run at a time; closing asks, and cancels it.
 
     Parameters
     ----------
@@ -42,9 +44,12 @@ class EvaluationWindow(QDialog):
     ----------
     remembered : Signal(EvaluationEntries)
         The settings as entered, to be proposed next time.
+    manual_wanted : Signal(str)
+        The user wants to read a page of the manual.
     """
 
     remembered = Signal(object)
+    manual_wanted = Signal(str)
 
     def __init__(
         self,
@@ -67,11 +72,14 @@ class EvaluationWindow(QDialog):
         for name, spec in specs.items():
             page = EvaluationPage(spec, getattr(entries, name))
             page.busy_changed.connect(partial(self._change_busy, name))
+            page.manual_wanted.connect(self.manual_wanted)
             self._stack.addWidget(page)
             item = QListWidgetItem(spec.title)
             item.setSizeHint(QSize(0, 4 * SPACING_PX))
             self._rail.addItem(item)
             self._pages[name] = page
+        self._close = button("close", tr("Cl&ose"), help_text=tr("The entries are kept"))
+        self._close.clicked.connect(self.reject)
         self._lay_out()
         self._rail.currentRowChanged.connect(self._go_to)
         self._rail.setCurrentRow(0)
@@ -92,7 +100,11 @@ class EvaluationWindow(QDialog):
         self._rail.setCurrentRow(list(self._pages).index(name))
 
     def reject(self) -> None:
-        """Close; a running evaluation is cancelled first."""
+        """Close; a running evaluation is cancelled first, if the user agrees."""
+        for name, page in self._pages.items():
+            question = tr("{} is running. {}").format(self._specs[name].title, page.kept)
+            if page.is_busy and not self._is_closing and not may_cancel(self, question):
+                return
         busy = [page for page in self._pages.values() if page.is_busy]
         self._is_closing = bool(busy)
         for page in busy:
@@ -128,4 +140,6 @@ class EvaluationWindow(QDialog):
         scale_font(self._title, 1.6, is_bold=True)
         self._rail.setFixedWidth(_RAIL_PX)
         right = vbox(self._title, (self._stack, 1), spacing=SPACING_PX)
-        hbox(self._rail, (right, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)
+        close = hbox(self._close, KeyCap("closeKey", "Escape"), 1, spacing=SPACING_PX)
+        left = vbox((self._rail, 1), close, spacing=SPACING_PX)
+        hbox(left, (right, 1), on=self, margins=2 * SPACING_PX, spacing=2 * SPACING_PX)

@@ -61,6 +61,10 @@ class HasReport(Protocol):
 class Evaluation(Protocol):
     """Interface of an evaluation; its entries are a dataclass with an `output` folder."""
 
+    @property
+    def kept(self) -> str:
+        """Sentence that says what of a cancelled evaluation is kept."""
+
     def readiness(self, entries: Any) -> Readiness:
         """Check the entries; raise HandcalError if they are wrong."""
 
@@ -76,6 +80,7 @@ class StudyEvaluation:
     """Returns the cases for given settings."""
     order: Callable[[Any, Progress], HasReport]
     """Runs or resumes the study and writes its report."""
+    kept: str = tr("If it is cancelled, its finished parts are kept.")
 
     def readiness(self, entries: Any) -> Readiness:
         """Return how much of the study the folder contains."""
@@ -118,6 +123,7 @@ class FileEvaluation:
     """Returns a request for missing entries; empty if there are none."""
     order: Callable[[Any, Progress], HasReport]
     """Evaluates the files and writes the report."""
+    kept: str = tr("If it is cancelled, the next run starts from the beginning.")
 
     def readiness(self, entries: Any) -> Readiness:
         """Return which entry is missing, or whether an earlier report will be replaced."""

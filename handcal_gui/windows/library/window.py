@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QAction, QDesktopServices, QShowEvent
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -41,6 +41,7 @@ from handcal_gui.widgets.fields import (
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.result_rows import NOTHING
 from handcal_gui.widgets.session_rows import RESUME_HELP
 from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel
@@ -271,7 +272,7 @@ class LibraryWindow(QDialog):
         self._start(partial(correct_names, {entry.path: name for entry in entries}))
 
     def _show_folder_of_chosen(self) -> None:
-        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.chosen[0].path.absolute())))
+        open_path(self, self.chosen[0].path)
 
     def _copy_paths(self) -> None:
         paths = [str(entry.path.absolute()) for entry in self.chosen]

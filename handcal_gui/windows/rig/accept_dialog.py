@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QSize, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QDialog, QGridLayout, QLabel, QWidget
 
 from handcal.errors import HandcalError
@@ -36,6 +35,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve import CAMERA_MISSING
@@ -201,7 +201,8 @@ class AcceptDialog(QDialog):
         self._refresh()
 
     def _open_page(self) -> None:
-        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._page)))
+        if self._page is not None:
+            open_path(self, self._page)
 
     def _refresh(self) -> None:
         for eye, shown in self._counts.items():

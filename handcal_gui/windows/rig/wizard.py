@@ -21,12 +21,14 @@ from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.banner import Banner
 from handcal_gui.widgets.fields import button, paragraph, with_name
+from handcal_gui.widgets.job_bar import may_cancel
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.display_page import DisplayPage
 from handcal_gui.windows.rig.project import UNREADABLE, RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.result_page import ResultPage
+from handcal_gui.windows.rig.solve_box import SolveBox
 from handcal_gui.windows.rig.step_inputs import STEP_TITLES, Step
 from handcal_gui.windows.rig.stereo_page import StereoPage
 from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
@@ -144,7 +146,7 @@ class RigWizard(QDialog):
         self._rail.currentRowChanged.connect(self._go_to)
         self._back.clicked.connect(lambda: self.show_step(self.step - 1))
         self._next.clicked.connect(lambda: self.show_step(self.step + 1))
-        self._close.clicked.connect(self.accept)
+        self._close.clicked.connect(self.reject)
         self.project.rig_changed.connect(self._refresh)
         self.project.inputs_changed.connect(self._refresh)
         self.project.failed.connect(self._banner.show_message)
@@ -168,6 +170,13 @@ class RigWizard(QDialog):
     def show_step(self, step: int) -> None:
         """Show a step."""
         self._rail.setCurrentRow(step)
+
+    def reject(self) -> None:
+        """Close; a running solve is cancelled first, if the user agrees."""
+        is_solving = any(box.bar.is_busy for box in self.findChildren(SolveBox))
+        running = tr("A step is being solved. If it is cancelled, its former result is kept.")
+        if not is_solving or may_cancel(self, running):
+            super().reject()
 
     def done(self, result: int) -> None:
         """Store all entries, end background work, and close."""

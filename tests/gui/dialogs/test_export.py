@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -27,7 +26,7 @@ from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.dialogs.export import ExportDialog
 from handcal_gui.widgets.path_field import PathField
-from tests.gui.helpers import child, letters, text
+from tests.gui.helpers import child, letters, note_opened, text
 
 
 class Exporter:
@@ -124,25 +123,23 @@ def test_what_is_chosen_is_exported_and_remembered(
     assert (exporter.folders, exporter.settings) == ([target], [expected])
     assert files(dialog) == ["a.csv", str(Path("clouds") / "b.ply")]
     assert str(target) in text(dialog, "exportEndFound")
-    opened: list[QUrl] = []
-    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    opened = note_opened(monkeypatch)
     press(dialog, "exportEndFix").click()
-    assert [url.toLocalFile() for url in opened] == [str(target)]
+    assert opened == [target]
     assert press(dialog, "openReport").isHidden()  # none was made
 
 
 def test_the_report_that_was_made_opens_with_a_letter(
     qtbot: QtBot, dialog: ExportDialog, exporter: Exporter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened: list[QUrl] = []
-    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    opened = note_opened(monkeypatch)
     exporter.names = ("a.csv", "report.html", "report.pdf")
     exporter.may_end.set()
     press(dialog, "export").click()
     qtbot.waitUntil(press(dialog, "openReport").isVisible)
     assert sorted(letters(dialog, is_shown=True)) == ["b", "c", "o", "r"]
     press(dialog, "openReport").click()
-    assert [url.toLocalFile() for url in opened] == [str(exporter.folders[0] / "report.pdf")]
+    assert opened == [exporter.folders[0] / "report.pdf"]
     press(dialog, "back").click()
     exporter.names = ("a/report.pdf", "b/report.pdf")
     press(dialog, "export").click()

@@ -131,6 +131,21 @@ def test_a_number_out_of_range_is_typed_in_full_and_the_range_is_said(
     )
 
 
+@pytest.mark.parametrize(("typed", "taken"), [("0", "2"), ("12345", "10000")])
+def test_a_whole_number_out_of_range_is_not_replaced_by_the_former_one(
+    qtbot: QtBot, typed: str, taken: str
+) -> None:
+    field = whole_number("x", 2, 10_000, "")
+    qtbot.addWidget(field)
+    field.show()
+    field.setValue(100)
+    field.selectAll()
+    QTest.keyClicks(field.lineEdit(), typed)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    assert field.text() == taken
+    assert child(field, QLabel, "brief").text() == f"Changed to {taken}. Allowed: 2 to 10000"
+
+
 @pytest.mark.parametrize("typed", ["1.234", "1e3", "nan", "x"])
 def test_what_is_no_number_is_not_typed(qtbot: QtBot, typed: str) -> None:
     field = number("x", -30.0, 30.0, 0.01, " mm", "")

@@ -51,3 +51,4 @@ def test_room_is_left_for_a_frame_that_is_not_known_yet(qtbot: QtBot) -> None:
     keep_on_screen(window)
     qtbot.waitUntil(lambda: window.height() == available.height() - 40)
     assert window.width() < available.width()
+    assert window.y() == 32, "the title bar is not above the screen"

@@ -76,9 +76,9 @@ def test_each_letter_of_a_calibration_leads_to_one_place(
         begin(program, snapshot, size_px, **changes)
         child(window, QPushButton, "comparison-cancel").show()  # while it is solved
         panels += of_docks(qtbot, program)
-    assert {letter for shown in panels for letter in shown} == {*"wcenkpog"}
+    assert {letter for shown in panels for letter in shown} == {*"wctnkpog"}
     menus = letters(window, is_shown=True)[:4]
-    assert menus == [*"ftvh"]
+    assert menus == [*"fevh"]
     for view in all_views(snapshot, record):
         say(program, snapshot(State.APPLIED), view)
         around = [letter for one in (guide, guide.bar) for letter in letters(one, is_shown=True)]
@@ -153,7 +153,7 @@ def test_a_letter_leads_to_the_panel_in_sight_and_to_none_behind_tabs(
     press(window, Qt.Key.Key_W, alt)
     qtbot.waitUntil(whole.isChecked)
     window.docks["session"].raise_()
-    press(window, Qt.Key.Key_E, alt)
+    press(window, Qt.Key.Key_T, alt)
     qtbot.waitUntil(eye_distance.hasFocus)
     window.docks["trials"].raise_()
     with qtbot.waitSignal(panels.trials.compare_requested):
@@ -178,7 +178,7 @@ def test_each_letter_of_a_stored_session_leads_to_one_place(
     around = letters(review, is_shown=True)
     assert len(around) == 4
     for shown in of_docks(qtbot, program):
-        found = [*"ftvh", *around, *shown]
+        found = [*"fevh", *around, *shown]
         assert len(set(found)) == len(found), found
 
 

@@ -11,7 +11,8 @@ from handcal.display import TARGET_DEPTHS_M
 from handcal.errors import CancelledError, FileError, HandcalError
 from handcal.io.images import write_png
 from handcal.lab.evaluate.run import run_cube_test, run_user_test
-from handcal.lab.settings import CubeTestSettings, UserTestSettings
+from handcal.lab.settings import CubeTestSettings, NoiseStudySettings, UserTestSettings
+from handcal.lab.study.studies import run_noise_study
 from handcal.progress import Progress
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import write_cube
@@ -64,6 +65,27 @@ def test_results_never_go_into_a_study(sessions: Path, tmp_path: Path) -> None:
         run_user_test(UserTestSettings((str(sessions),), str(tmp_path)))
     with pytest.raises(FileError, match="holds a study"):
         run_cube_test(CubeTestSettings(str(sessions), output=str(tmp_path)))
+
+
+@pytest.mark.parametrize("name", ["report.html", "report.pdf"])
+def test_files_of_the_users_are_never_replaced(sessions: Path, tmp_path: Path, name: str) -> None:
+    settings = UserTestSettings((str(sessions),), str(tmp_path / "results"))
+    run_user_test(settings)
+    run_user_test(settings)  # its own report may be replaced
+    own = tmp_path / "results" / name
+    own.write_text("<p>written with handcal")
+    with pytest.raises(FileError, match=f"not of an evaluation, such as {name}: choose another"):
+        run_user_test(settings)
+    with pytest.raises(FileError, match=f"not of an evaluation, such as {name}: choose another"):
+        run_noise_study(NoiseStudySettings("quick", output=settings.output), Progress())
+    assert own.read_text() == "<p>written with handcal"
+
+
+def test_results_never_go_among_sessions(sessions: Path) -> None:
+    (session, *_) = (path.parent for path in sessions.glob("*/journal.jsonl"))
+    for output in (sessions, sessions / "results", session, session / "figures" / "new"):
+        with pytest.raises(FileError, match="holds sessions, or lies among them"):
+            run_user_test(UserTestSettings((str(sessions),), str(output)))
 
 
 def test_an_evaluation_can_be_cancelled(sessions: Path, tmp_path: Path) -> None:

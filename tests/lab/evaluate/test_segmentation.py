@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 
 from handcal.camera.images import write_frame
 from handcal.cli.main import main
@@ -175,6 +176,13 @@ def test_a_folder_is_judged_by_the_command(
     assert "9: no hand-sized object" in capsys.readouterr().out
 
 
+def test_points_at_the_frame_are_drawn_in_full(folder: Path) -> None:
+    report = run_segmentation_test(SegmentationTestSettings(str(folder), "depth")).report
+    axes = Canvas().subplots(1, 2)
+    report.figures[0].draw(axes)
+    assert not any(line.get_clip_on() for ax in axes for line in ax.lines)
+
+
 def test_the_test_can_be_cancelled(folder: Path) -> None:
     with pytest.raises(CancelledError):
         run_segmentation_test(
@@ -200,6 +208,21 @@ def test_a_wrong_description_is_one_clear_line(
     (folder / "meta.json").write_text(json.dumps({"9": about["9"] | edit}))
     with pytest.raises(FileError, match=reason):
         list(read_masked_frames(folder, read_masked_names(folder)))
+
+
+def test_a_folder_of_no_frames_is_known_before_they_are_read(folder: Path) -> None:
+    named = {"fx": 1.0, "fy": 1.0, "cx": 1.0, "cy": 1.0}
+    about = json.loads((folder / "meta.json").read_text())
+    read_masked_names(folder)
+    (folder / "meta.json").write_text(json.dumps({"9": about["9"] | {"intrinsics": named}}))
+    with pytest.raises(FileError, match=r"a list of four numbers without names, \[fx, fy, cx, cy"):
+        read_masked_names(folder)
+    (folder / "meta.json").write_text(json.dumps({"8": about["9"]}))
+    with pytest.raises(FileError, match=r"there is no .*8_depth\.png"):
+        read_masked_names(folder)
+    (folder / "meta.json").unlink()
+    with pytest.raises(FileError, match=r"holds no meta\.json"):
+        read_masked_names(folder)
 
 
 @pytest.mark.parametrize("content", ["{}", '{"../a": {}}', '{"a": 3}', "[]", "no"])

@@ -175,6 +175,9 @@ def test_the_report_counts_simulated_sessions_and_blinded_comparisons(user_test:
     sessions[name] = replace(record, events=(*record.events, *events), settings=settings)
     said = summary(sessions)
     assert said["Simulated sessions"] == "1"
+    test = replace(user_test, sessions=sessions)
+    lead = user_test_report(test, evaluate_user_test(test)).lead
+    assert lead.endswith(f" Simulated sessions: 1 of {len(sessions)}.")
     assert said["Blinded comparisons"] == "1 better with the calibration, 0 without it, 1 neither"
 
 

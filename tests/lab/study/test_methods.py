@@ -194,6 +194,8 @@ def test_the_report_tells_every_method(errorless_rows: list[StudyRow]) -> None:
     ]
     report = methods_report(settings, rows)
     assert "the paper's method" in report.lead
+    assert report.lead.startswith("Too few wearers for figures to report. ")
+    assert methods_report(replace(settings, wearers=20), rows).lead.startswith("Mean reprojection")
     assert [figure.name for figure in report.figures] == ["reprojection-0mm", "reprojection-2mm"]
     titles = [section.title for section in report.sections]
     assert "One eye at a time, or both" in titles

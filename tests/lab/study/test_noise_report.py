@@ -134,3 +134,12 @@ def test_a_single_alignment_has_no_interval() -> None:
     report = noise_report(SETTINGS, rows)
     assert table(report, "Rotation") == [["5", "1.0", "1.0", "1.0", "1.0"]]
     assert report.figures[0].rows[0]["length_low_mm"] is None
+
+
+def test_points_at_the_frame_are_drawn_in_full(report: Report) -> None:
+    [figure] = [one for one in report.figures if one.name == "rotation"]
+    axes = Canvas().subplots(1, 2)
+    figure.draw(axes)
+    lines = [line for ax in axes for line in ax.lines if line.get_marker() != "None"]
+    assert lines
+    assert not any(line.get_clip_on() for line in lines)

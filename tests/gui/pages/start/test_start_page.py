@@ -66,6 +66,20 @@ def test_typing_a_name_and_enter_starts(
     assert threading.main_thread() not in inspector.threads
 
 
+def test_a_former_name_is_offered_in_a_list_and_never_typed_in_by_itself(
+    qtbot: QtBot, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    page.new.show_wearers(["Ann", "Bob"])
+    for typed, expected in ((" ", ""), ("A", "A"), ("n", "An")):
+        QTest.keyClicks(wearer(page).lineEdit(), typed)
+        assert wearer(page).currentText() == expected
+    qtbot.waitUntil(lambda: QApplication.activePopupWidget() is not None)
+    with qtbot.waitSignal(page.start_requested) as started:
+        QTest.keyClick(QApplication.activePopupWidget(), Qt.Key.Key_Return)
+    assert started.args[1] == "An"
+
+
 def test_keys_of_the_former_page_are_no_name_and_start_nothing(
     qtbot: QtBot, open_page: Callable[..., StartPage]
 ) -> None:
@@ -154,7 +168,7 @@ def test_each_letter_leads_to_one_place(
     inspector.healths["headset"] = Health.LIMITED
     page = open_page(source="realsense", headset="network")
     qtbot.waitUntil(lambda: button(page, "headsetFix").text() != "")
-    found = [*"ftvh", *letters(page)]  # of the window's menus, and of hidden buttons, too
+    found = [*"fevh", *letters(page)]  # of the window's menus, and of hidden buttons, too
     assert len(set(found)) == len(found) >= 22
 
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QLabel,
@@ -27,7 +26,7 @@ from handcal.station.states import State
 from handcal.types import EyeDistance
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.record_table import RecordTable
-from tests.gui.helpers import button, child, show, text
+from tests.gui.helpers import button, child, note_opened, show, text
 
 
 @pytest.fixture
@@ -149,11 +148,10 @@ def test_a_finished_session_is_only_looked_at(
 def test_opens_the_folder(
     panel: SessionPanel, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened: list[QUrl] = []
-    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    opened = note_opened(monkeypatch)
     panel.show_record(record, None)
     button(panel, QPushButton, "Open folder").click()
-    assert [url.toLocalFile() for url in opened] == [str(record.path)]
+    assert opened == [record.path]
 
 
 def test_an_eye_distance_is_taken_in_millimetres_or_refused(

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.windows.evaluation.window import EvaluationWindow
+from tests.gui.helpers import child
 
 
 def test_the_start_page_leads_to_evaluations(qtbot: QtBot, tmp_path: Path) -> None:
@@ -25,6 +28,22 @@ def test_the_start_page_leads_to_evaluations(qtbot: QtBot, tmp_path: Path) -> No
     assert window.isVisible()
     assert program.windows.evaluate() is window
     assert window.entries.users.sessions == program.preferences.station.sessions
+    window.show_page("segmentation")
+    child(window.page, QLabel, "format").linkActivated.emit(
+        "docs/commands.md#handcal-evaluate-segmentation"
+    )
+    assert program.manual.isVisible()
+    shown = program.manual.page.textCursor().block().text()
+    assert shown == "handcal evaluate segmentation"
+    window.show_page("noise")
+    scheduler = child(window.page, QLineEdit, "scheduler")
+    window.activateWindow()
+    scheduler.setFocus()
+    qtbot.waitUntil(scheduler.hasFocus)
+    QTest.keyClick(scheduler, Qt.Key.Key_U, Qt.KeyboardModifier.AltModifier)
+    QTest.keyClick(scheduler, Qt.Key.Key_V)
+    assert scheduler.text() == "v", "Alt+U leads nowhere, and types nothing"
+    scheduler.clear()
     window.page.form.enter(seed=11)
     program.window.close()
     assert not window.isVisible()

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from PySide6.QtCore import QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
     QLabel,
@@ -28,7 +28,7 @@ from handcal_gui.widgets.fields import MainButton
 from handcal_gui.windows.evaluation.evaluation_page import EvaluationPage
 from handcal_gui.windows.evaluation.specs import make_specs
 from handcal_gui.windows.evaluation.window import EvaluationWindow
-from tests.gui.helpers import letters
+from tests.gui.helpers import answer_questions, letters, note_opened
 
 Kind = TypeVar("Kind", bound=QWidget)
 PATIENCE_MS = 20_000
@@ -97,18 +97,17 @@ def test_a_study_runs_to_its_end(
     student.wait_for_text("Done")
     assert student.child(QLabel, "lead").text() == "Squares grow."
     tabs = student.child(QTabWidget, "figures")
-    assert [tabs.tabText(place) for place in range(tabs.count())] == ["Numbers", "Some squares"]
+    titles = [tabs.tabText(place) for place in range(tabs.count())]
+    assert titles == ["Numbers", "Terms and methods", "Some squares"]
     item = student.child(QTableWidget, "numbers").item(9, 0)
     assert item is not None
     assert item.text() == "81"
-    opened: list[QUrl] = []
-    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    opened = note_opened(monkeypatch)
     for name in ("openPdf", "openHtml", "openFolder"):
         student.child(QPushButton, name).click()
     folder = Path(entries.output)
-    paths = [Path(url.toLocalFile()) for url in opened]
-    assert paths == [folder / "report.pdf", folder / "report.html", folder]
-    assert all(path.exists() for path in paths)
+    assert opened == [folder / "report.pdf", folder / "report.html", folder]
+    assert all(path.exists() for path in opened)
     student.wait_for_button("Show results")
 
 
@@ -122,6 +121,7 @@ def test_a_study_is_cancelled_and_goes_on(numbers: Any, student: Student) -> Non
     student.child(QPushButton, "cancel").click()
     numbers.may_go_on.set()
     student.wait_for_text("of this study. Completed trials are kept.")
+    assert student.found.startswith("Cancelled; ")
     assert not student.child(QPushButton, "openPdf").isVisible()
     student.press("Resume")
     student.wait_for_text("Done")
@@ -160,19 +160,26 @@ def test_one_runs_at_a_time(numbers: Any, student: Student) -> None:
     student.window.show_page("noise")
     student.page.cancel()
     numbers.may_go_on.set()
+    student.wait_for_text("Cancelled; ")
     student.window.show_page("methods")
     student.wait_for_button("Run")
     student.wait_for_text("Ready")
 
 
-def test_closing_cancels_and_remembers(
-    numbers: Any, student: Student, entries: NoiseStudySettings
+def test_closing_asks_cancels_and_remembers(
+    numbers: Any, student: Student, entries: NoiseStudySettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     numbers.pauses_at = 3
     chunks = Path(entries.output, "chunks")
     student.press("Run")
     student.wait(lambda: len(list(chunks.glob("*.json"))) == 3)
+    said = answer_questions(monkeypatch, "Keep running")
+    QTest.keyClick(student.window, Qt.Key.Key_Escape)
+    assert said == ["Numbers is running. If it is cancelled, its finished parts are kept."]
+    assert not student.child(QLabel, "doing").text().startswith("Cancelling")
+    answer_questions(monkeypatch, "Cancel and close")
     student.window.close()
+    assert student.child(QLabel, "doing").text().startswith("Cancelling")
     assert student.window.isVisible()  # until the case being done has ended
     student.enter(seed=7)
     numbers.may_go_on.set()
@@ -195,7 +202,7 @@ def test_each_page_has_one_main_button_and_keys(qtbot: QtBot) -> None:
         buttons = [one for one in window.findChildren(QPushButton) if one.isVisible()]
         assert [one for one in buttons if one.isDefault()] == [main]
         assert main.mapTo(window, main.rect().center()).y() > 440, "at the bottom"
-        found = letters(window.page)  # of hidden buttons, too
+        found = [*letters(window.page), "o"]  # of hidden buttons, too, and of Close
         assert len(set(found)) == len(found)
         assert all("&" in label.text() for label in window.page.form.findChildren(QLabel))
         assert [one for one in window.findChildren(QLabel, "mainKey") if one.isVisible()]

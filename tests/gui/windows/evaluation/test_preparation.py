@@ -22,6 +22,7 @@ class ScenarioDialog(PreparationDialog):
     def __init__(self, entries: NoiseStudySettings, parent: QWidget) -> None:
         super().__init__(parent)
         self.entries = entries
+        self.resize(5000, 5000)
 
 
 @pytest.fixture
@@ -75,6 +76,8 @@ def test_prepared_data_is_checked_again(
     qtbot.waitUntil(run.isEnabled)
     dialog = open_dialog(window)
     assert dialog.entries == entries
+    screen = dialog.screen().availableGeometry()
+    qtbot.waitUntil(lambda: screen.contains(dialog.frameGeometry()))
     dialog.entries = replace(entries, output=str(tmp_path / "prepared"))
     dialog.accept()
     assert not run.isEnabled()

@@ -71,3 +71,14 @@ def test_a_figure_is_a_sheet_of_paper_that_says_which_file_it_is(qtbot: QtBot) -
     shown = sheet.grab().toImage()
     assert shown.pixelColor(shown.rect().center()) == Qt.GlobalColor.white
     assert shown.pixelColor(2, 2) == sheet.palette().window().color() != Qt.GlobalColor.white
+
+
+def test_tabs_of_figures_are_numbered_only_where_there_are_several(qtbot: QtBot) -> None:
+    view = show(qtbot, ResultsView(), 500, 400)
+    figures = [Figure(name, "", lambda _: None, []) for name in ("wearers-1", "of-1", "of-2")]
+    report = Report("", "", "", [Section("", ["icp: rigid.", *figures])])
+    view.show_outcome(Outcome(Path(), report, 3 * [np.zeros((9, 9, 3), np.uint8)]))
+    tabs = child(view, QTabWidget)
+    titles = [tabs.tabText(place) for place in range(tabs.count())]
+    assert titles == ["Terms and methods", "Wearers", "Of 1", "Of 2"]
+    assert text(view, "terms") == "icp: rigid."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,8 @@ from handcal.lab.settings import (
 )
 from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
 from handcal.lab.study.noise import QUICK_NOISE
-from handcal.lab.study.studies import run_method_comparison, run_noise_study
+from handcal.lab.study.store import StudyFolder
+from handcal.lab.study.studies import noise_cases, run_method_comparison, run_noise_study
 from handcal.progress import Progress
 from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
@@ -66,6 +67,19 @@ def test_studies_are_those_of_the_commands() -> None:
     assert (noise.order, methods.order) == (run_noise_study, run_method_comparison)
 
 
+def test_another_study_in_the_folder_is_named_by_what_was_entered(tmp_path: Path) -> None:
+    evaluation = make_specs()["noise"].evaluation
+    quick = NoiseStudySettings("quick", output=str(tmp_path))
+    study = noise_cases(quick)
+    StudyFolder(tmp_path, study.name, asdict(study.settings), [study.cases])
+    with pytest.raises(FileError) as refused:
+        evaluation.readiness(replace(quick, size="full", seed=2))
+    assert str(refused.value) == (
+        f"{tmp_path} holds another study (another size; seed 1 there, 2 here); "
+        "choose another folder, or the same entries"
+    )
+
+
 def test_what_is_entered_for_a_user_test_reaches_it(tmp_path: Path) -> None:
     entries = UserEntries(str(tmp_path / "none"), str(tmp_path / "results"))
     evaluation = make_specs()["users"].evaluation
@@ -97,6 +111,8 @@ def test_a_user_test_is_ready_once_a_session_holds_a_trial(
         readiness = evaluation.readiness(entries)
         assert not readiness.can_run
         assert "record some in the panel Trials" in readiness.finding.found
+    whose = record.wearer or "a wearer without a name"
+    assert evaluation.readiness(one).finding.found.startswith(f"the session of {whose} holds no")
     with Session(record.path) as session:
         number = session.save_trial(
             make_trial(rig.eyes["left"], "left", 0.5, [0.0] * 3, [1e-3] * 3)
@@ -128,7 +144,8 @@ def test_frames_are_chosen_before_the_segmentation_is_tested(tmp_path: Path) -> 
     entries = replace(entries, folder=str(tmp_path / "none"))
     assert "there is no folder" in evaluation.readiness(entries).finding.found
     (tmp_path / "none").mkdir()
-    assert evaluation.readiness(entries).can_run
+    with pytest.raises(FileError, match=r"none holds no meta\.json"):
+        evaluation.readiness(entries)
     with pytest.raises(FileError, match=r"meta\.json"):
         evaluation.run(entries, Progress())
 

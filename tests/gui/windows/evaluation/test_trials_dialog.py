@@ -86,6 +86,8 @@ def test_the_study_leader_places_the_cube_and_moves_the_drawing(
 ) -> None:
     recorder = Recorder()
     dialog = make(recorder)
+    held = "The session of Simulated wearer holds 6 trials; new ones are added."
+    assert part(dialog, QLabel, "trialsFound").text() == held
     instruction, follow = part(dialog, QLabel, "instruction"), part(dialog, QPushButton, "next")
     right = part(dialog, QPushButton, "right")
     part(dialog, QPushButton, "start").click()
@@ -111,7 +113,8 @@ def test_the_study_leader_places_the_cube_and_moves_the_drawing(
     assert right_px > 0.0
     assert down_px < 0.0
     assert recorder.order == TrialOrder(session)
-    assert part(dialog, QLabel, "trialsFound").text() == "Trials stored: 1."
+    assert part(dialog, QLabel, "trialsFound").text() == f"Trials stored: 1. {held}"
+    assert instruction.text().startswith("The trials are stored. Close, or start again")
 
 
 def test_a_failure_is_shown_and_trials_can_be_started_again(
@@ -143,6 +146,17 @@ def test_closing_ends_a_running_trial(
     qtbot.waitUntil(lambda: instruction.text().startswith("Put the cube"), timeout=20_000)
     dialog.reject()
     assert not dialog.isVisible()
+
+
+def test_a_simulated_session_is_said_to_be_one(qtbot: QtBot, tmp_path: Path) -> None:
+    settings = {"station": {"source": "simulator", "headset": "virtual"}}
+    with Session.create(tmp_path, example_rig(), settings, wearer="Ann") as session:
+        pass
+    dialog = TrialsDialog(UserEntries(sessions=str(session.path)))
+    qtbot.addWidget(dialog)
+    assert part(dialog, QLabel, "trialsFound").text() == (
+        "The session of Ann (simulated: camera, headset and wearer) holds no trial yet."
+    )
 
 
 def test_a_folder_of_sessions_is_refused_at_once(qtbot: QtBot, tmp_path: Path) -> None:
