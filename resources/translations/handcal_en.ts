@@ -1237,10 +1237,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Evaluate…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Search, compare, export and repair sessions</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1254,6 +1250,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Measure the accuracy of calibrations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Evalua&amp;te…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2631,7 +2631,7 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>R&amp;estart headset</source>
+        <source>Res&amp;tart headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2688,6 +2688,14 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>{}: {} Compare shows it beside the present results.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Cancel and close</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Keep running</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3030,7 +3038,7 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Eye distance (mm)</source>
+        <source>Eye dis&amp;tance (mm)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3054,7 +3062,7 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>First is b&amp;etter</source>
+        <source>First is be&amp;tter</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3450,10 +3458,6 @@ trials above and below it. A single trial has no SD.</source>
     </message>
     <message>
         <source>Effect</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>No file manager was found; the folder is {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4079,7 +4083,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Edi&amp;t</source>
+        <source>&amp;Edit</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4300,10 +4304,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Rec&amp;ord…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Record the trials of one session with a cube in the room; enter the session first.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4320,6 +4320,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>A frame NAME is NAME_depth.png, NAME_handmask.png and, if there is one, NAME_color.png; meta.json describes all frames: </source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>there is no file {}: choose another, or leave the field empty</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4333,6 +4337,14 @@ one turns out.</source>
     </message>
     <message>
         <source>there is no session in {}: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the session of {} holds no trial: record some in the panel Trials, or press Record…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>a wearer without a name</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4425,6 +4437,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Captures</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Re&amp;cord…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4964,6 +4980,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Cancelled; the next run starts from the beginning</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Cancelled; {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} Check the entries, then start at the lower right.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4992,6 +5016,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Terms and methods</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Report as PDF, for reading and archiving</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5008,7 +5036,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>White as on paper: this is the exported figures/{}.png.</source>
+        <source>Drawn on white, as in the exported figures/{}.png.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5196,10 +5224,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>session found: trials will be stored in {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>{} is not one session</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5208,7 +5232,23 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} (simulated: {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the session of {} holds no trial yet</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the session of {} holds {}; new ones are added</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Let the wearer put the headset on, and start.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The trials are stored. Close, or start again to add others.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5221,6 +5261,18 @@ one turns out.</source>
     </message>
     <message>
         <source>Evaluations</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The entries are kept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} is running. {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>If it is cancelled, its finished parts are kept.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5241,6 +5293,10 @@ one turns out.</source>
     </message>
     <message>
         <source>{:,} of {:,} cases</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>If it is cancelled, the next run starts from the beginning.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6454,6 +6510,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>A step is being solved. If it is cancelled, its former result is kept.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Cl&amp;ose</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6541,6 +6601,20 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>handcal hit an unexpected error ({}); the session is kept: resume it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No program opened it; the folder is at
+{}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>No program opened it; the file is at
+{}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Copy path</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
