@@ -4320,10 +4320,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>A frame NAME is NAME_depth.png, NAME_handmask.png and, if there is one, NAME_color.png; meta.json describes all frames: </source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>there is no file {}: choose another, or leave the field empty</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4441,6 +4437,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Re&amp;cord…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A frame NAME is NAME_depth.png, NAME_handmask.png and, if there is one, NAME_color.png; meta.json describes all frames: &lt;a href=&quot;{}&quot;&gt;its contents&lt;/a&gt;.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -117,9 +117,8 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             _segmentation_form,
             note=tr(
                 "A frame NAME is NAME_depth.png, NAME_handmask.png and, if there is one, "
-                "NAME_color.png; meta.json describes all frames: "
-            )
-            + f'<a href="docs/commands.md#handcal-evaluate-segmentation">{tr("its contents")}</a>.',
+                'NAME_color.png; meta.json describes all frames: <a href="{}">its contents</a>.'
+            ).format("docs/commands.md#handcal-evaluate-segmentation"),
         ),
     }
 
