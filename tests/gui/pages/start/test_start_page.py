@@ -72,11 +72,15 @@ def test_a_former_name_is_offered_in_a_list_and_never_typed_in_by_itself(
     page = open_page()
     page.new.show_wearers(["Ann", "Bob"])
     for typed, expected in ((" ", ""), ("A", "A"), ("n", "An")):
-        QTest.keyClicks(wearer(page).lineEdit(), typed)
+        field = wearer(page).lineEdit()
+        assert field is not None
+        QTest.keyClicks(field, typed)
         assert wearer(page).currentText() == expected
     qtbot.waitUntil(lambda: QApplication.activePopupWidget() is not None)
+    offered = QApplication.activePopupWidget()
+    assert offered is not None
     with qtbot.waitSignal(page.start_requested) as started:
-        QTest.keyClick(QApplication.activePopupWidget(), Qt.Key.Key_Return)
+        QTest.keyClick(offered, Qt.Key.Key_Return)
     assert started.args[1] == "An"
 
 
