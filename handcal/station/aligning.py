@@ -52,6 +52,8 @@ class Refused:
     reason: str
     """The reason as the journal names it."""
     angle_deg: float | None = None
+    was: str = ""
+    """The cause in the past tense, if the live hand shows whether it lasts; else empty."""
 
 
 class Aligning:
@@ -73,6 +75,8 @@ class Aligning:
         One that waits for the frame of its time.
     refusal : str
         Reason why the last confirmation was refused; empty if none was.
+    refused_for : str
+        `Refused.was` of that confirmation.
 
     Raises
     ------
@@ -92,7 +96,7 @@ class Aligning:
         self.cursor_id = cursor_id
         self.eyes = eyes
         self.confirmation: Confirmation | None = None
-        self.refusal = ""
+        self.refusal = self.refused_for = ""
         self._rig = rig
         self._settings = settings
         self._limits: GuardSettings = settings.guard
@@ -185,7 +189,8 @@ class Aligning:
         except PosePendingError:
             return None
         except (HandError, PoseError) as error:
-            return Refused(f"{error}. Align and confirm again.", "no hand")
+            was = str(error).partition("; ")[0] if isinstance(error, HandError) else ""
+            return Refused(f"{error}. Align and confirm again.", "no hand", was=was)
         if refused := self._refuse(hand, rotation_W, shape):
             return refused
         hands_used = self.cursor, hand
@@ -226,6 +231,7 @@ class Aligning:
                 f"{turn_advice(R_D_W @ rotation_W).text} and confirm again.",
                 "turned",
                 angle_deg,
+                f"your hand was turned by {angle_deg:.1f}°, more than {limit_deg:g}°",
             )
         if self._has_changed(shape):
             return Refused(
@@ -233,6 +239,7 @@ class Aligning:
                 f"{change_text(shape, R_D_W)}. "
                 "Hold it as it was and confirm again, or make the cursor again.",
                 "shape changed",
+                was="the shape of your hand had changed",
             )
         return None
 

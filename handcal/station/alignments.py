@@ -96,6 +96,11 @@ class AlignmentSteps:
         return "" if self._aligning is None else self._aligning.refusal
 
     @property
+    def refused_for(self) -> str:
+        """Its cause in the past tense, if the live hand shows whether it lasts; else empty."""
+        return "" if self._aligning is None else self._aligning.refused_for
+
+    @property
     def applied_shift_m(self) -> Mapping[Eye, Float64]:
         """φ that the headset renders each eye with, solved or set by hand."""
         return MappingProxyType(dict(self._drawing.shift_m))
@@ -322,13 +327,13 @@ class AlignmentSteps:
         self.evidence.drawn_as_sent()
         self._items.save(self._items.next_number(), accepted.alignment)
         self.state = State.ALIGNED
-        aligning.refusal = ""
+        aligning.refusal = aligning.refused_for = ""
         self._store.write(
             lambda session: session.save_alignment(accepted.alignment, accepted.facts)
         )
 
     def _refuse(self, refused: Refused, aligning: Aligning) -> None:
-        aligning.refusal = refused.prompt
+        aligning.refusal, aligning.refused_for = refused.prompt, refused.was
         self._link.send_prompt(refused.prompt, self.eyes)
         self._store.event(
             "refused",

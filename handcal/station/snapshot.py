@@ -52,6 +52,8 @@ class Procedure:
     """The newest verification of each eye."""
     former_shift_m: Mapping[Eye, Float64] = field(default_factory=dict)
     """each (3,); φ to which `Calibration.go_back` returns."""
+    refused_for: str = ""
+    """`refusal` in the past tense, if the live hand shows whether its cause lasts; else empty."""
 
 
 def read_procedure(
@@ -77,6 +79,7 @@ def read_procedure(
         verifying=None if calibration.verifying is None else calibration.verifying.view(),
         verifications=dict(calibration.verifications),
         former_shift_m=calibration.former_shift_m,
+        refused_for=calibration.refused_for,
     )
 
 

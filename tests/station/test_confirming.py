@@ -65,6 +65,7 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
     eventually(lambda: "turned by" in stage.shown().prompt)
     assert "more than 9°. Tilt your hand anticlockwise and confirm again." in stage.shown().prompt
     assert stage.calibration.refusal == stage.shown().prompt
+    assert "hand was turned by" in stage.calibration.refused_for
     name, data = events(session)[-1]
     assert (name, data["reason"]) == ("refused", "turned")
     assert data["angle_deg"] == pytest.approx(15.0, abs=1.0)
@@ -73,7 +74,7 @@ def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(
     stage.press()
     assert stage.see(T_D_NEAR).state is State.ALIGNED
     assert Session.open(session.path).refused == 1
-    assert stage.calibration.refusal == ""
+    assert stage.calibration.refusal == stage.calibration.refused_for == ""
     assert len(stage.calibration.alignments) == 1
 
 
@@ -101,6 +102,7 @@ def test_a_hand_of_another_shape_is_refused_and_told(stage: Stage, session: Sess
     stage.press()
     assert stage.see(thumb_out_rad=0.4).state is State.ALIGN
     assert "shape of your hand has changed" in stage.calibration.refusal
+    assert stage.calibration.refused_for == "the shape of your hand had changed"
     assert events(session)[-1][1]["reason"] == "shape changed"
     seen = stage.hold()
     assert not seen.is_over_limit

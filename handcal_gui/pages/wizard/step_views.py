@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handcal.register.guard import turn_advice
 from handcal.register.results import USED, Results
 from handcal.report.cells import signed
 from handcal.station.snapshot import Procedure, Snapshot
@@ -85,14 +86,12 @@ def connect_view(snapshot: Snapshot) -> WizardView:
 
 def align_view(snapshot: Snapshot) -> WizardView:
     """Return the view while the wearer overlays the cursor."""
-    procedure, seen = snapshot.procedure, snapshot.observation
-    is_straight = seen is not None and seen.rotation_rad is not None and not seen.is_over_limit
-    limit_deg = round(float(np.degrees(procedure.guard_limit_rad)), 1)
-    cursor = procedure.cursor
+    procedure = snapshot.procedure
+    cursor, was = procedure.cursor, procedure.refused_for
     seen_ns = snapshot.t_host_ns - cursor.t_host_ns if cursor is not None else 0
     preconditions = (
         hand_found(snapshot),
-        Precondition(tr("Hand rotated by less than {:g}°").format(limit_deg), is_straight),
+        _as_cursor(snapshot),
         _looked(tr("Cursor shown for {:g} s"), seen_ns),
     )
     close = ""
@@ -112,8 +111,29 @@ def align_view(snapshot: Snapshot) -> WizardView:
             _all_hold(preconditions) and is_placed(snapshot) and snapshot.link.connected,
         ),
         (ButtonSpec(Action.REDO, tr("&Make another cursor"), discards=tr("Discards this cursor")),),
-        procedure.refusal if preconditions[0].holds else "",  # or it tells a lost hand to turn
+        # The preconditions say what the live hand lacks.
+        "" if was or not preconditions[0].holds else procedure.refusal,
+        fact=tr("Last refused: {}.").format(_lowered(was)) if was else "",
     )
+
+
+def _as_cursor(snapshot: Snapshot) -> Precondition:
+    """Return whether the guard would accept the live hand; if not, with its reason."""
+    seen, limit_rad = snapshot.observation, snapshot.procedure.guard_limit_rad
+    limit_deg = round(float(np.degrees(limit_rad)), 1)
+    straight = tr("Hand rotated by less than {:g}°").format(limit_deg)
+    if seen is None or seen.rotation_rad is None:
+        return Precondition(straight, False)
+    angle_rad = float(np.linalg.norm(seen.rotation_rad))
+    if seen.has_changed and angle_rad <= limit_rad:
+        return Precondition(sentence(seen.shape_text), False)
+    if seen.is_over_limit:
+        advice = turn_advice(seen.rotation_rad).text
+        text = tr("Hand rotated by {:.1f}°, more than {:g}°: {}").format(
+            np.degrees(angle_rad), limit_deg, _lowered(advice)
+        )
+        return Precondition(text, False)
+    return Precondition(straight, True)
 
 
 def solve_view(snapshot: Snapshot) -> WizardView:
@@ -277,6 +297,11 @@ def _kept(results: Results) -> tuple[Eye, ...]:
 def _looked(text: str, shown_ns: int) -> Precondition:
     """Return whether the wearer has had the time to look at a drawing, as a precondition."""
     return Precondition(text.format(_LEAST_LOOK_NS / 1e9), shown_ns > _LEAST_LOOK_NS)
+
+
+def _lowered(text: str) -> str:
+    """Return a text to follow a colon."""
+    return text[:1].lower() + text[1:]
 
 
 def _all_hold(preconditions: Sequence[Precondition]) -> bool:

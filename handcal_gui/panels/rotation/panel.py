@@ -68,7 +68,8 @@ class RotationPanel(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the rotation of a snapshot; without a new frame the angle stays."""
         procedure, observation = snapshot.procedure, snapshot.observation
-        self._show_refusals(snapshot.record.refused, procedure.refusal)
+        was = procedure.refused_for  # without an order that may no longer apply
+        self._show_refusals(snapshot.record.refused, f"{was}." if was else procedure.refusal)
         self._show_limit(procedure.guard_limit_rad)
         is_aligning = procedure.cursor is not None and procedure.state is State.ALIGN
         if self._history and not (is_aligning and procedure.cursor is self._cursor):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, get_args
 
+import numpy as np
 import pytest
 
 from handcal.errors import FileError
@@ -55,6 +56,34 @@ def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) 
     lost = {"hand": None, "cloud": None, "problem": "hand cut by the image border"}
     assert not Wizard().view(snapshot(procedure={"refusal": refusal}, observation=lost)).note
     assert Wizard().view(snapshot()).preconditions[1].holds
+
+
+def test_a_refusal_becomes_past_and_orders_nothing(snapshot: Maker) -> None:
+    refused = {"refusal": "Tilt your hand.", "refused_for": "Your hand was turned by 18.6°"}
+    view = Wizard().view(snapshot(procedure=refused))
+    assert (view.note, view.fact) == ("", "Last refused: your hand was turned by 18.6°.")
+
+
+@pytest.mark.parametrize(
+    ("turned_deg", "has_changed", "text"),
+    [
+        (18.6, False, "Hand rotated by 18.6°, more than 9°: tilt your hand anticlockwise"),
+        (-18.6, True, "Hand rotated by 18.6°, more than 9°: tilt your hand clockwise"),
+        (7.7, True, "Thumb 10 mm further out than in the cursor"),
+    ],
+)
+def test_align_says_how_the_hand_differs_from_the_cursor(
+    snapshot: Maker, turned_deg: float, has_changed: bool, text: str
+) -> None:
+    seen = {
+        "rotation_rad": np.radians([0.0, 0.0, turned_deg]),
+        "is_over_limit": True,
+        "has_changed": has_changed,
+        "shape_text": "thumb 10 mm further out than in the cursor",
+    }
+    limit = {"guard_limit_rad": float(np.radians(9.0))}
+    view = Wizard().view(snapshot(observation=seen, procedure=limit))
+    assert view.preconditions[1] == Precondition(text, False)
 
 
 def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot: Maker) -> None:

@@ -171,6 +171,9 @@ def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapsh
     assert text(panel, "refusals") == "2 confirmations refused. Your hand is turned."
     panel.show_snapshot(snapshot(procedure={"refusal": "the headset draws something else."}))
     assert text(panel, "refusals") == "1 confirmation refused. The headset draws something else."
+    over = {"refusal": TURNED, "refused_for": "your hand was turned by 18.6°"}
+    panel.show_snapshot(snapshot(procedure=over))
+    assert text(panel, "refusals") == "1 confirmation refused. Your hand was turned by 18.6°."
 
 
 def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:
