@@ -25,6 +25,7 @@ from handcal_gui.pages.wizard.step_views import (
     eye_names,
     kept_fact,
     save_view,
+    sending,
     verification_view,
 )
 from handcal_gui.pages.wizard.steps import Wizard
@@ -171,9 +172,11 @@ class PlannedWizard(Wizard):
     def _solved(self, step: Step, snapshot: Snapshot) -> WizardView:
         text = tr("Solve for the positions of the eyes; the hand stays up.")
         main = self._take_step(tr("Solve"), tr("Solving…"), True)
-        if snapshot.procedure.state is State.SOLVED:
-            text = tr("Send the corrected projections to the headset; the hand stays up.")
-            main = self._take_step(tr("Send to the headset"), _SENDING, True)
+        results = snapshot.procedure.results
+        if snapshot.procedure.state is State.SOLVED and results is not None:
+            instruction, label = sending(results)
+            text = tr("{} The hand stays up.").format(instruction)
+            main = self._take_step(label, _SENDING, True)
         redo = ButtonSpec(
             Action.REDO,
             tr("&Discard and repeat"),

@@ -166,22 +166,8 @@ def solve_view(snapshot: Snapshot) -> WizardView:
             (aligned, *verdicts),
             ButtonSpec(Action.APPLY, tr("Sending…"), False),
         )
-    label = tr("Send to the headset")
-    instruction = tr("Send the corrected projections to the headset.")
-    kept = _kept(procedure.results)
-    if len(kept) == len(verdicts):
-        instruction = tr("Keep the offline calibration of {}.").format(eye_names(kept))
-        label = tr("Keep offline")
-    elif kept:
-        instruction = tr(
-            "Send the projections to the headset; {} keeps the offline calibration."
-        ).format(eye_names(kept))
+    instruction, label = sending(procedure.results)
     is_faulty = any(one.verdict in UNUSABLE for one in verdicts)
-    if is_faulty:
-        instruction = tr(
-            "Do not use this result: keep the offline calibration of {}, and follow the advice "
-            "below."
-        ).format(eye_names(kept))
     return WizardView(
         Step.SOLVE,
         instruction,
@@ -190,6 +176,33 @@ def solve_view(snapshot: Snapshot) -> WizardView:
         (redo,),
         runs_after_s=None if is_faulty else READ_S,
     )
+
+
+def sending(results: Results) -> tuple[str, str]:
+    """Return what the main button does with a solved result, and its label."""
+    kept = _kept(results)
+    used = [eye for eye in results.verdicts if eye not in kept]
+    if not kept:
+        text = tr("Send the corrected projections to the headset.")
+        return text, tr("Send to the headset")
+    faulty = [eye for eye in kept if results.verdicts[eye].name in UNUSABLE]
+    if not used:
+        text = tr("Keep the offline calibration of {}.")
+        if faulty:
+            text = tr(
+                "Do not use this result: keep the offline calibration of {}, and follow the "
+                "advice below."
+            )
+        return text.format(eye_names(kept)), tr("Keep offline")
+    text = tr("Send the {} eye's projection; the {} eye keeps the offline calibration.")
+    if faulty:
+        text = tr(
+            "Send the {} eye's projection; the {} eye keeps the offline calibration, because its "
+            "result is {}."
+        )
+    used_word, kept_word = EYE_WORDS[used[0]], EYE_WORDS[kept[0]]
+    text = text.format(used_word, kept_word, results.verdicts[kept[0]].name)
+    return text, tr("Send {} eye").format(used_word)
 
 
 def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardView:

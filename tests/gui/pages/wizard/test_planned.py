@@ -21,6 +21,13 @@ Maker = Callable[..., Snapshot]
 VERIFIED = dict.fromkeys(EYES, Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0)))
 
 
+def with_verdicts(seen: Snapshot, *names: VerdictName) -> Snapshot:
+    assert seen.procedure.results is not None
+    verdicts = {eye: Verdict(name, "as told") for eye, name in zip(EYES, names, strict=True)}
+    results = replace(seen.procedure.results, verdicts=verdicts)
+    return replace(seen, procedure=replace(seen.procedure, results=results))
+
+
 def begun(snapshot: Maker) -> PlannedWizard:
     wizard = PlannedWizard()
     wizard.move(Action.NEXT, planned_snapshot(snapshot, StepName.RAISE))
@@ -61,6 +68,26 @@ def test_a_person_takes_a_step_only_of_a_held_plan(snapshot: Maker, name: StepNa
     held = wizard.view(planned_snapshot(snapshot, name)).main
     assert (held.action, held.is_enabled) == (Action.TAKE_STEP, True)
     assert not held.label.endswith("…")
+
+
+@pytest.mark.parametrize(
+    ("left", "label", "says"),
+    [
+        ("accept", "Send left eye", "the right eye keeps the offline calibration"),
+        ("contradicted", "Keep offline", "Do not use this result"),
+    ],
+)
+def test_a_plan_says_what_is_sent_as_the_paper_s_guide_does(
+    snapshot: Maker, left: VerdictName, label: str, says: str
+) -> None:
+    wizard = begun(snapshot)
+    wizard.is_held = True
+    view = wizard.view(
+        with_verdicts(planned_snapshot(snapshot, StepName.APPLY), left, "implausible")
+    )
+    assert view.main.label == label
+    assert says in view.sentence
+    assert view.sentence.endswith(". The hand stays up.")
 
 
 def test_the_plan_is_held_before_it_begins_and_after_it_ends(snapshot: Maker) -> None:

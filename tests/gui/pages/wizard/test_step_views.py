@@ -132,13 +132,17 @@ def test_of_a_result_that_must_not_be_used_the_offline_calibration_is_kept(
     snapshot: Maker, name: VerdictName
 ) -> None:
     view = Wizard().view(judged(snapshot, "accept", name, State.SOLVED))
-    assert view.sentence.startswith("Do not use this result: keep the offline")
-    assert "of the right eye" in view.sentence
-    assert view.main == ButtonSpec(Action.APPLY, "Send to the headset")
+    assert view.sentence == (
+        "Send the left eye's projection; the right eye keeps the offline calibration, because its "
+        f"result is {name}."
+    )
+    assert view.main == ButtonSpec(Action.APPLY, "Send left eye")
     assert view.runs_after_s is None, "a person decides"
     assert actions(view) == [Action.REDO]
     assert all(offer.discards for offer in view.others), "by a click or its letter only"
     none = Wizard().view(judged(snapshot, name, name, State.SOLVED))
+    assert none.sentence.startswith("Do not use this result: keep the offline")
+    assert "of both eyes" in none.sentence
     assert none.main == ButtonSpec(Action.APPLY, "Keep offline")
 
 
@@ -164,8 +168,8 @@ def test_of_one_eye_that_must_not_be_used_the_next_step_repeats(
         (
             "keep",
             "accept",
-            "Send the projections to the headset; the left eye keeps the offline calibration.",
-            "Send to the headset",
+            "Send the right eye's projection; the left eye keeps the offline calibration.",
+            "Send right eye",
         ),
     ],
 )
