@@ -1445,10 +1445,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Send the corrected projections to the headset; the hand stays up.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>&amp;Discard and repeat</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1669,6 +1665,26 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Last refused: {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Hand rotated by {:.1f}°, more than {:g}°: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send the {} eye&apos;s projection; the {} eye keeps the offline calibration.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send the {} eye&apos;s projection; the {} eye keeps the offline calibration, because its result is {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Send {} eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Close the {} eye. Move the outline onto the hand: in the headset, or here with the arrow keys, + and −.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1814,10 +1830,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>{} and wait until camera and headset are connected.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Send the projections to the headset; {} keeps the offline calibration.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
