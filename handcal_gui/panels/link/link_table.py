@@ -139,13 +139,14 @@ class LinkTable(QWidget):
 
 
 def _texts(link: LinkStatistics, rates: LinkRates | None) -> dict[tuple[str, int], str]:
-    """Return the texts of the numbers above, by name and half."""
-    drift_ppm = link.clock_drift_ppm
+    """Return the texts of the numbers above, by name and half; those of a lost headset are past."""
+    is_here = link.connected
+    drift_ppm = link.clock_drift_ppm if is_here else None
     texts = {
-        ("latency", _IN): _text(link.latency_ms, "ms"),
-        ("clock", _BOTH): _clock(link),
+        ("latency", _IN): _text(link.latency_ms if is_here else None, "ms"),
+        ("clock", _BOTH): _clock(link) if is_here else UNKNOWN,
         ("clock-drift", _BOTH): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
-        ("poses", _IN): _text(link.pose_rate_hz, "Hz"),
+        ("poses", _IN): _text(link.pose_rate_hz if is_here else None, "Hz"),
         ("resent", _OUT): str(link.resent),
         ("in-flight", _OUT): str(link.unacked),
         ("failed", _OUT): str(link.failed),

@@ -24,7 +24,7 @@ from handcal_gui import translation
 from handcal_gui.panels.link import link_table
 from handcal_gui.panels.link.link_table import REJECTIONS
 from handcal_gui.panels.link.panel import LinkPanel
-from handcal_gui.widgets.number_label import NumberLabel
+from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.plots import Plot
 from tests.gui.conftest import NOW_NS
 from tests.gui.helpers import button, child, show
@@ -60,6 +60,8 @@ def test_it_shows_if_the_headset_is_connected_and_the_problem(
     there = panel.grab().toImage()
     panel.show_snapshot(snapshot(link={"connected": False}, link_problem="Switch it on."))
     assert text(panel, "state") == "Switch it on."
+    past = ("latency-2", "poses-2", "clock-3", "clock-drift-3")
+    assert {text(panel, number) for number in past} == {UNKNOWN}
     assert panel.grab().toImage() != there
 
 
