@@ -233,10 +233,9 @@ class HeadsetServer(Sender):
             self._require_running()
             try:
                 return self._poses.at(self._clock.to_headset_ns(t_host_ns))
-            except PosePendingError:
-                if self.connected:
-                    raise
-                raise PosePendingError("the headset sends no poses") from None
+            except PosePendingError as error:
+                why = str(error) if self.connected else "the headset sends no poses"
+                raise PosePendingError(why) from None
 
     def statistics(self) -> LinkStatistics:
         """Return the link's counters and estimates."""

@@ -58,7 +58,10 @@ def test_it_shows_if_the_headset_is_connected_and_the_problem(
     panel.show_snapshot(snapshot())
     assert text(panel, "state") == "Connected"
     there = panel.grab().toImage()
-    panel.show_snapshot(snapshot(link={"connected": False}, link_problem="Switch it on."))
+    lost = {"connected": False}
+    panel.show_snapshot(
+        snapshot(t_host_ns=NOW_NS + 10**10, link=lost, link_problem="Switch it on.")
+    )
     assert text(panel, "state") == "Switch it on."
     past = ("latency-2", "poses-2", "clock-3", "clock-drift-3")
     assert {text(panel, number) for number in past} == {UNKNOWN}
