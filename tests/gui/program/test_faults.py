@@ -55,7 +55,7 @@ def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> N
     )
     studio.headset.confirm()
     live.wait(lambda: live.snapshot.record.refused == 1)
-    assert "more than 9°" in live.child(QLabel, "wizardNote").text()
+    live.wait(lambda: "more than 9°" in live.child(QLabel, "wizardFact").text())
     assert live.record.alignments == {}
     studio.camera.shows = "live"
     live.wait(
@@ -67,6 +67,7 @@ def test_a_turned_hand_is_refused_then_taken(live: Technician, studio: Any) -> N
     studio.headset.confirm()
     live.wait_for_state(State.ALIGNED)
     live.wait(lambda: len(live.record.alignments) == 1)
+    live.wait(lambda: live.child(QLabel, "wizardFact").isHidden())
     assert live.child(QLabel, "wizardNote").text() == ""
 
 
