@@ -14,7 +14,8 @@ from handcal_gui.pages.wizard.wizard import WizardPanel
 
 _LOOK_S = 0.7
 _MOST_ADDED = 4
-"""Most times that another alignment is begun, however many are advised."""
+"""Most times that more is measured, however often that is advised."""
+_ADDS = Action.ANOTHER, Action.VERIFY_LEFT, Action.VERIFY_RIGHT
 _PATIENCE_S = 120.0
 _PATIENCE_STEPS = 600
 """Engine steps to wait for as well, for a busy machine; an idle one makes five a second or more."""
@@ -92,10 +93,10 @@ class Autopilot(QObject):
             return
         if view.main.action is Action.NEXT_WEARER:
             self._end(self.finished.emit)
-        elif view.main.action is Action.ANOTHER and self._added == _MOST_ADDED:
+        elif view.main.action in _ADDS and self._added == _MOST_ADDED:
             self._wizard_panel.asked.emit(Action.NEXT)
         elif view.main.action not in WEARERS:
-            self._added += view.main.action is Action.ANOTHER
+            self._added += view.main.action in _ADDS
             self._wizard_panel.press_main()
 
     def _end(self, tell: Callable[[], None]) -> None:

@@ -29,7 +29,14 @@ from handcal_gui.pages.wizard.step_views import (
     verification_view,
 )
 from handcal_gui.pages.wizard.steps import Wizard
-from handcal_gui.pages.wizard.view import EYE_WORDS, Action, ButtonSpec, Step, WizardView
+from handcal_gui.pages.wizard.view import (
+    EYE_WORDS,
+    Action,
+    ButtonSpec,
+    Precondition,
+    Step,
+    WizardView,
+)
 from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
 
@@ -218,18 +225,12 @@ class PlannedWizard(Wizard):
 
     def _done(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         procedure, preconditions = snapshot.procedure, eyes_accepted(snapshot)
+        if any(one.verdict not in ("accept", "keep") for one in preconditions) or not preconditions:
+            view = self._not_accepted(preconditions, snapshot)
+            return view if preconditions else replace(view, sentence=f"{sentence(planned.text)}.")
+        text = tr("Not every eye has been verified. Finish as it is, or verify an eye.")
         main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
-        if any(one.verdict in UNUSABLE for one in preconditions):
-            text = tr("Do not use this result. Follow the advice below, then add alignments.")
-        elif any(one.verdict == "repeat" for one in preconditions) or not preconditions:
-            text = tr("Not accepted yet: add an alignment, or verify an eye again.")
-            advice = procedure.results.advice if procedure.results is not None else {}
-            again = tuple(eye for eye, one in advice.items() if one.verify)
-            if again and all(eye in procedure.verifications for eye in self.usable_eyes):
-                text = tr(
-                    "Not accepted yet: verify {} again. Another alignment would change little."
-                ).format(eye_names(again))
-        elif set(procedure.verifications) >= set(self.usable_eyes):
+        if set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
             if snapshot.record.verified_now >= set(self.usable_eyes):
                 text = tr("The wearer has verified the result. Finish, or verify an eye again.")
@@ -238,17 +239,38 @@ class PlannedWizard(Wizard):
                         "Verified; the result is not used for every eye. Finish, or verify again."
                     )
             main = ButtonSpec(Action.NEXT, tr("Finish"))
-        else:
-            text = tr("Not every eye has been verified. Finish, or verify an eye again.")
+        verify = (_VERIFY_AGAIN[eye] for eye in self.usable_eyes)
+        others = (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *verify)
+        fact = _drawn_otherwise(procedure) or kept_fact(procedure)
+        return WizardView(Step.VERIFY, text, preconditions, main, others, fact=fact)
+
+    def _not_accepted(
+        self, preconditions: tuple[Precondition, ...], snapshot: Snapshot
+    ) -> WizardView:
+        """Return the view of a plan that has ended without an accepted result."""
+        procedure, can_do = snapshot.procedure, is_steady(snapshot)
+        text = tr("Not accepted yet. Raise the hand and hold it still, then add an alignment.")
+        main = ButtonSpec(Action.ANOTHER, tr("Add alignment"), can_do)
+        others = [_VERIFY_AGAIN[eye] for eye in self.usable_eyes]
+        advice = procedure.results.advice if procedure.results is not None else {}
+        again = tuple(eye for eye, one in advice.items() if one.verify)
+        if any(one.verdict in UNUSABLE for one in preconditions):
+            text = tr("Do not use this result. Follow the advice below, then add alignments.")
+        elif again and all(eye in procedure.verifications for eye in self.usable_eyes):
+            text = tr(
+                "Not accepted yet: verify {} again. Another alignment would change little."
+            ).format(eye_names(again))
+            first = _VERIFY_AGAIN[again[0]]
+            others.remove(first)
+            others.insert(0, ButtonSpec(Action.ANOTHER, tr("&Add alignment")))
+            label = tr("Verify the {} eye").format(EYE_WORDS[again[0]])
+            main = ButtonSpec(first.action, label, can_do)
         return WizardView(
             Step.VERIFY,
-            text if preconditions else f"{sentence(planned.text)}.",
-            preconditions,
+            text,
+            (hand_found(snapshot), hand_still(snapshot), *preconditions),
             main,
-            (
-                ButtonSpec(Action.ANOTHER, tr("&Add alignment")),
-                *(_VERIFY_AGAIN[eye] for eye in self.usable_eyes),
-            ),
+            (*others, ButtonSpec(Action.NEXT, tr("Finish a&s it is"))),
             fact=_drawn_otherwise(procedure) or kept_fact(procedure),
         )
 

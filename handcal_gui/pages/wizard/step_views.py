@@ -272,8 +272,10 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
             unearned=unearned,
         )
     finish = tr("Everything is already saved. The session finishes by itself; Hold keeps it open.")
-    if is_held:
+    if is_held or not judged:
         finish = tr("Everything is already saved. Finish the session when you are done.")
+    if judged and not is_settled:
+        finish = tr("Not accepted. Go back to add an alignment, or finish as it is; all is saved.")
     if snapshot.problem:
         finish = tr("Solve the problem below, then finish the session.")
     return WizardView(
@@ -283,7 +285,7 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         ButtonSpec(Action.FINISH, tr("Finish session")),
         others,
         fact=kept_fact(snapshot.procedure),
-        runs_after_s=None if snapshot.problem else READ_S,
+        runs_after_s=READ_S if is_settled and not snapshot.problem else None,
         unearned=unearned,
     )
 

@@ -220,8 +220,8 @@ class Wizard:
                 runs_after_s=READ_S,
             )
         each = (
-            ButtonSpec(Action.REPEAT_LEFT, tr("Add &left eye")),
-            ButtonSpec(Action.REPEAT_RIGHT, tr("Add &right eye")),
+            ButtonSpec(Action.REPEAT_LEFT, tr("Align &left eye")),
+            ButtonSpec(Action.REPEAT_RIGHT, tr("Align &right eye")),
         )
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
@@ -241,13 +241,14 @@ class Wizard:
             )
         if advice := _advice(snapshot):
             eyes = eye_names(advice.eyes or EYES)
+            others = (one for one in each if _REPEATS[one.action] != advice.eyes)
             few = advice.is_accepted and advice.alignments <= _MOST_BY_ITSELF
             return WizardView(
                 Step.VERIFY,
-                tr("Not accepted yet: align {} again, or keep the result as it is.").format(eyes),
+                tr("Not accepted yet: align {} again, or finish as it is.").format(eyes),
                 preconditions,
-                ButtonSpec(Action.ANOTHER, tr("Add {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("Keep a&s it is")), *each),
+                ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
+                (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *others),
                 runs_after_s=ADVICE_S if few else None,
             )
         if not is_usable:
@@ -256,7 +257,7 @@ class Wizard:
                 tr("Do not use this result. Follow the advice below, then add alignments."),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add alignment")),
-                (ButtonSpec(Action.NEXT, tr("Keep a&s it is")), *each),
+                (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *each),
             )
         if not self._skipped:
             return WizardView(

@@ -129,17 +129,17 @@ def test_the_wearer_keeps_the_hand_up(snapshot: Maker) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "is_verified", "label", "says"),
+    ("name", "is_verified", "action", "label", "says"),
     [
-        ("accept", True, "Finish", "has verified"),
-        ("keep", True, "Finish", "not used for every eye"),
-        ("accept", False, "Finish as it is", "Not every eye has been verified"),
-        ("repeat", True, "Finish as it is", "Not accepted yet"),
-        ("contradicted", True, "Finish as it is", "Do not use"),
+        ("accept", True, Action.NEXT, "Finish", "has verified"),
+        ("keep", True, Action.NEXT, "Finish", "not used for every eye"),
+        ("accept", False, Action.NEXT, "Finish as it is", "Not every eye has been verified"),
+        ("repeat", True, Action.ANOTHER, "Add alignment", "Not accepted yet. Raise the hand"),
+        ("contradicted", True, Action.ANOTHER, "Add alignment", "Do not use"),
     ],
 )
 def test_the_end_says_what_was_reached(
-    snapshot: Maker, name: VerdictName, is_verified: bool, label: str, says: str
+    snapshot: Maker, name: VerdictName, is_verified: bool, action: Action, label: str, says: str
 ) -> None:
     done = planned_snapshot(snapshot, StepName.DONE, verifications=VERIFIED if is_verified else {})
     assert done.procedure.results is not None
@@ -148,12 +148,13 @@ def test_the_end_says_what_was_reached(
     done = replace(done, procedure=replace(done.procedure, results=results))
     view = begun(snapshot).view(done)
     assert says in view.sentence
-    assert (view.main.action, view.main.label) == (Action.NEXT, label)
-    assert [one.action for one in view.others] == [
-        Action.ANOTHER,
-        Action.VERIFY_LEFT,
-        Action.VERIFY_RIGHT,
-    ]
+    assert (view.main.action, view.main.label) == (action, label)
+    (other,) = {Action.NEXT, Action.ANOTHER} - {action}
+    others = [one.action for one in view.others]
+    assert sorted(others) == sorted([other, Action.VERIFY_LEFT, Action.VERIFY_RIGHT])
+    assert done.observation is not None
+    lowered = replace(done, observation=replace(done.observation, is_steady=False))
+    assert begun(snapshot).view(lowered).main.is_enabled == (action is Action.NEXT)
 
 
 def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot: Maker) -> None:
@@ -182,9 +183,13 @@ def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
         advice={"right": again},
     )
     done = replace(done, procedure=replace(done.procedure, results=results))
-    assert begun(snapshot).view(done).sentence == (
+    view = begun(snapshot).view(done)
+    assert view.sentence == (
         "Not accepted yet: verify the right eye again. Another alignment would change little."
     )
+    assert (view.main.action, view.main.label) == (Action.VERIFY_RIGHT, "Verify the right eye")
+    others = [one.action for one in view.others]
+    assert others == [Action.ANOTHER, Action.VERIFY_LEFT, Action.NEXT]
 
 
 def test_one_usable_eye_is_the_only_one_offered(snapshot: Maker) -> None:
