@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -49,7 +49,14 @@ class NumberTable(QTableWidget):
     wraps : bool
         Where not all columns fit, uncertainties, units and parts of headings have their own lines;
         without it, only the units of headings.
+
+    Attributes
+    ----------
+    hidden_changed : Signal(str)
+        The headings of the hidden columns, separated by semicolons.
     """
+
+    hidden_changed = Signal(str)
 
     def __init__(
         self,
@@ -84,6 +91,7 @@ class NumberTable(QTableWidget):
             )
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
+        self._hidden = ""
 
     def show_rows(self, columns: Sequence[str], rows: Sequence[Row]) -> None:
         """Replace the contents."""
@@ -132,6 +140,10 @@ class NumberTable(QTableWidget):
             self.setColumnWidth(column, needed_px[column] + spare_px // len(shown))
             self.setColumnHidden(column, column not in shown)
         self._explain(hidden=range(len(shown), len(columns)))
+        hidden = "; ".join(self._columns[len(shown) :])
+        if hidden != self._hidden:
+            self._hidden = hidden
+            self.hidden_changed.emit(hidden)
 
     def _needed_px(self) -> list[int]:
         header = self.horizontalHeader()
