@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 from contextlib import suppress
@@ -23,6 +24,8 @@ from handcal.station.settings import StationSettings
 from handcal.types import EyePlan
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.translation import tr
+
+_LOG = logging.getLogger(__name__)
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
 PREFERENCES_VERSION = 4
@@ -122,12 +125,12 @@ class PreferencesFile:
             bad = self.path.with_name(f"{self.path.name}.bad")
             with suppress(OSError):
                 self.path.replace(bad)
-            return Preferences(), (
-                tr(
-                    "The preferences could not be read and were reset; the old file was kept as "
-                    "{}: {}"
-                ).format(bad, error)
-            )
+            _LOG.warning("the preferences could not be read: %s", error)
+            return Preferences(), tr(
+                "The preferences could not be read and were reset: check the start page and "
+                "Preferences (Ctrl+,) before you start. The old file is {}; the log beside it "
+                "says what was wrong."
+            ).format(bad)
 
     def save(self, preferences: Preferences) -> None:
         """Write the preferences, or raise FileError."""

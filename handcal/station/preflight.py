@@ -210,7 +210,10 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
         return _broken(f"{settings.host!r} is not an address", advice)
     if not 1 <= settings.port <= 65535:
         return _broken(f"{settings.port} is not a valid port", "choose one from 1 to 65535")
-    _require_free((settings.host, settings.port))
+    try:
+        _require_free((settings.host, settings.port))
+    except LinkError as error:  # which says itself what to do
+        return _broken(*str(error).split("; ", 1))
     try:
         host, port = reachable_address((str(address), settings.port))
     except LinkError:

@@ -43,10 +43,11 @@ class FindingLine(QWidget):
 
     def keep_room(self) -> None:
         """Be as high without a button as with one, so that what is below does not move."""
+        gap_px = SPACING_PX // 2  # or a long finding would touch the next field
         layout = self.layout()
         assert layout is not None
-        layout.setContentsMargins(0, 0, 0, 0)
-        self.setMinimumHeight(max(3 * SPACING_PX, self._button.sizeHint().height()))
+        layout.setContentsMargins(0, 0, 0, gap_px)
+        self.setMinimumHeight(max(3 * SPACING_PX, self._button.sizeHint().height() + gap_px))
 
     def clear(self) -> None:
         """Show nothing."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import flat_header, number_font, set_style
+from handcal_gui.theme import SPACING_PX, flat_header, number_font, set_style
 
 _PARTS = re.compile(" (?=±|mm)")
 """Between the parts of a cell that can have their own lines."""
@@ -47,9 +47,16 @@ class NumberTable(QTableWidget):
         Where not all columns fit, the last ones are hidden and are in the tooltips; otherwise the
         table scrolls.
     wraps : bool
-        Where not all columns fit, uncertainties, units and parts of headings have their own lines;
-        without it, only the units of headings.
+        Where not all columns fit with a gap before each, uncertainties, units and parts of headings
+        have their own lines; without it, only the units of headings.
+
+    Attributes
+    ----------
+    hidden_changed : Signal(str)
+        The headings of the hidden columns, separated by semicolons.
     """
+
+    hidden_changed = Signal(str)
 
     def __init__(
         self,
@@ -84,6 +91,7 @@ class NumberTable(QTableWidget):
             )
         self._columns: tuple[str, ...] = ()
         self._rows: tuple[Row, ...] = ()
+        self._hidden = ""
 
     def show_rows(self, columns: Sequence[str], rows: Sequence[Row]) -> None:
         """Replace the contents."""
@@ -120,10 +128,11 @@ class NumberTable(QTableWidget):
         columns, room_px = range(self.columnCount()), self.viewport().width()
         for column in columns:
             self.showColumn(column)  # a hidden one has no width
+        gaps_px = SPACING_PX * len(columns) if self._wraps else 0  # or numbers run together
         for breaks in range(3 if self._wraps else 2):
             self._break_lines(breaks)
             needed_px = self._needed_px()
-            if sum(needed_px) <= room_px:
+            if sum(needed_px) + gaps_px <= room_px:
                 break
         fits = [c == 0 or sum(needed_px[: c + 1]) <= room_px for c in columns]
         shown = [column for column in columns if fits[column] or not self._hides]
@@ -132,6 +141,10 @@ class NumberTable(QTableWidget):
             self.setColumnWidth(column, needed_px[column] + spare_px // len(shown))
             self.setColumnHidden(column, column not in shown)
         self._explain(hidden=range(len(shown), len(columns)))
+        hidden = "; ".join(self._columns[len(shown) :])
+        if hidden != self._hidden:
+            self._hidden = hidden
+            self.hidden_changed.emit(hidden)
 
     def _needed_px(self) -> list[int]:
         header = self.horizontalHeader()

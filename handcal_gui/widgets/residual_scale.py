@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
+from PySide6.QtCore import QLineF, QRectF, Qt
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.register.verdict import VerdictSettings
@@ -46,8 +46,16 @@ def fill_with_ramp(painter: QPainter, where: QRectF) -> None:
     painter.fillRect(where, gradient)
 
 
+def draw_crosses(painter: QPainter, places_px: Float64, reach_px: float) -> None:
+    """Draw a cross at each of (N, 2) places, so that outliers differ not by colour alone."""
+    for slope in (-1.0, 1.0):
+        arm_px = np.array([reach_px, slope * reach_px])
+        ends = np.hstack([places_px - arm_px, places_px + arm_px])
+        painter.drawLines([QLineF(*end) for end in ends.tolist()])
+
+
 class ResidualScale(QWidget):
-    """A colour scale from 0 to `LARGEST_MM`, and the colour of points without a partner."""
+    """A colour scale from 0 to `LARGEST_MM`, and the cross of points without a partner."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -63,7 +71,7 @@ class ResidualScale(QWidget):
         self.setFixedHeight(max(_BAR_PX, self.fontMetrics().height()))
 
     def paintEvent(self, _: QPaintEvent) -> None:
-        """Draw the bar between its limits, and then the colour of outliers."""
+        """Draw the bar between its limits, and then the cross of outliers."""
         painter = QPainter(self)
         width_of = painter.fontMetrics().horizontalAdvance
         low, high, outlier = tr("Residual 0"), f"≥ {LARGEST_MM:.0f} mm", tr("Outlier")
@@ -72,7 +80,8 @@ class ResidualScale(QWidget):
         left = width_of(low) + gap
         bar = QRectF(left, top, swatch.x() - width_of(high) - 5 * gap - left, _BAR_PX)
         fill_with_ramp(painter, bar)
-        painter.fillRect(swatch, QColor(OUTLIER))
+        painter.setPen(QPen(QColor(OUTLIER), 2))
+        draw_crosses(painter, np.array([swatch.center().toTuple()]), _BAR_PX / 2 - 1)
         painter.setPen(self.palette().windowText().color())
         for x, text in ((0.0, low), (bar.right() + gap, high), (swatch.right() + gap, outlier)):
             where = QRectF(x, 0, self.width(), self.height())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +46,8 @@ _BESIDE_TITLES_PX = 4 * SPACING_PX
 _BESIDE_PX = 50
 """Room beside the widest picture."""
 _FOUND_PX = 230
-_COLUMNS_PX = 150, 200, 450
+_SECTION_CHARACTERS = 40
+"""That fit in a line of the lines found, beside the titles of pages."""
 _MOST_FOUND = 200
 _GUIDE = "guide.md"
 _NOTHING = tr("Nothing found: search for fewer or other words")
@@ -235,10 +237,11 @@ class Manual(QWidget):
         self._shown = found[:_MOST_FOUND]
         self.found.clear()
         for line in self._shown:
-            item = QTreeWidgetItem(self.found, [line.title, line.section, line.text])
+            section = textwrap.fill(line.section, _SECTION_CHARACTERS)
+            item = QTreeWidgetItem(self.found, [line.title, section, line.text])
             item.setToolTip(2, line.text)
-        for column, width_px in enumerate(_COLUMNS_PX):
-            self.found.setColumnWidth(column, width_px)
+        for column in (0, 1):
+            self.found.resizeColumnToContents(column)
         self.found.setVisible(bool(found))
         most = tr(", the first {} listed").format(_MOST_FOUND) if len(found) > _MOST_FOUND else ""
         count = pluralize(len(found), tr("line"), tr("lines")) if found else _NOTHING

@@ -119,13 +119,17 @@ def test_the_old_default_of_a_limit_is_no_choice(file: PreferencesFile) -> None:
 
 
 @pytest.mark.parametrize("station", [3, None, {"calibration": []}, {"calibration": {"solve": 1}}])
-def test_a_strange_file_of_version_1_is_kept(file: PreferencesFile, station: object) -> None:
+def test_a_strange_file_of_version_1_is_kept(
+    file: PreferencesFile, station: object, caplog: pytest.LogCaptureFixture
+) -> None:
     file.path.parent.mkdir()
     file.path.write_text(json.dumps({"station": station}))
     preferences, said = file.load()
     assert preferences == Preferences()
-    assert "were reset" in said
+    assert "were reset: check the start page and Preferences" in said
     assert file.path.with_name("preferences.json.bad").exists()
+    assert "preferences.station" not in said  # no name of a field: the log has it
+    assert "preferences.station" in caplog.text
 
 
 def test_a_newer_file_is_read_as_far_as_known_and_kept(file: PreferencesFile) -> None:

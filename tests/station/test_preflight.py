@@ -247,7 +247,10 @@ def test_a_network_headset_cannot_be_waited_for(
     assert "simulator" in find("headset", replace(settings, headset="network")).found
     live = replace(settings, source="realsense", headset="network")
     assert "cannot listen" in find("headset", replace(live, port=taken_port)).found
-    assert find("headset", replace(live, host="192.0.2.1")).health is Health.BROKEN
+    elsewhere = find("headset", replace(live, host="192.0.2.1"))
+    assert elsewhere.health is Health.BROKEN
+    assert elsewhere.found.endswith("this computer has no such address")
+    assert elsewhere.advice == "enter one of its own, or 0.0.0.0 for all"
     assert find("headset", replace(live, host="pc")).found == "'pc' is not an address"
     assert find("headset", replace(live, port=70_000)).found == "70000 is not a valid port"
     assert find("headset", live, key="short").found == "the pairing key is too short"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QCheckBox, QToolButton, QVBoxLayout, QWidget
 
 from handcal.camera.playback import PlaybackSettings
@@ -73,6 +73,7 @@ class AdvancedFields(QWidget):
         layout.addWidget(self._fold, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self._calibration)
         self._fold.toggled.connect(self._expand)
+        self._fold.clicked.connect(self._enter)
         self._expand(False)
 
     def show_settings(self, settings: StationSettings) -> None:
@@ -101,3 +102,12 @@ class AdvancedFields(QWidget):
         arrow = Qt.ArrowType.DownArrow if is_open else Qt.ArrowType.RightArrow
         self._fold.setArrowType(arrow)
         self._calibration.setVisible(is_open)
+
+    def _enter(self, is_open: bool) -> None:
+        """Lead to the first field if opened by key: the page has no letter left for each of them.
+
+        With the mouse the keys stay where they are, or the wheel would change that field.
+        """
+        if is_open and not self._fold.underMouse():
+            self._fold.setFocus()
+            QTimer.singleShot(0, self, self.focusNextChild)  # once laid out, so that it is in sight

@@ -174,6 +174,11 @@ class NewCalibration(Card):
         self._form.set_pairing_key(pairing_key)
         self.check()
 
+    def fit(self, *, is_low: bool) -> None:
+        """Leave out the text that only greets, and set the form closer, where height is scarce."""
+        self.hint.setVisible(not is_low)
+        self._form.fit(is_low=is_low)
+
     def check(self) -> None:
         """Check the station with the settings shown, unless it may be in use or being opened.
 

@@ -25,7 +25,7 @@ FindOffers = Callable[[Path, Sequence[Path]], KnownSessions]
 
 _LARGEST_PX = 1600, 1000
 """Size beyond which a larger window leaves room around the page."""
-_LOW = 34
+_LOW = 46
 """Height below which the page has no head, in sizes of the font."""
 
 
@@ -174,9 +174,9 @@ class StartPage(QWidget):
         self._fit_soon.start()
 
     def _fit(self) -> None:
-        is_high = self.height() >= _LOW * font_px()
-        for text in (self._head, self.new.hint):
-            text.setVisible(is_high)
+        is_low = self.height() < _LOW * font_px()
+        self._head.setVisible(not is_low)
+        self.new.fit(is_low=is_low)
 
     def _look_in_another_folder(self) -> None:
         if self.new.settings.sessions_path != self._folder:

@@ -80,6 +80,7 @@ class StationForm(QWidget):
         self._advanced = AdvancedFields()
         self._parts = self._plan, self._camera, self._headset, self._advanced
         self._findings = {part: FindingLine(part) for part in PARTS}
+        self._finding_rows: dict[int, FindingLine] = {}
         self._lay_out(wearer)
         self.show_settings(settings)
         for field in (self._rig, self._sessions, *self._parts):
@@ -119,6 +120,12 @@ class StationForm(QWidget):
                 fix, mend = tr("Co&nnect…"), self.connect_wanted.emit
             self._findings[part].show_finding(finding, fix, mend)
 
+    def fit(self, *, is_low: bool) -> None:
+        """Give the findings the width of the labels, too, where height is scarce."""
+        self._grid.setRowMinimumHeight(self._gap_row, 0 if is_low else SPACING_PX)
+        for row, finding in self._finding_rows.items():
+            self._grid.addWidget(finding, row, 0 if is_low else 1, 1, 2 if is_low else 1)
+
     def _change(self, changes: Mapping[str, Any]) -> None:
         self.show_settings(replace(self.settings, **changes))
 
@@ -131,20 +138,22 @@ class StationForm(QWidget):
             "rig": rig,
             "sessions": self._sessions,
         }
-        grid = QGridLayout(self)
+        self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(2 * SPACING_PX)
         grid.setVerticalSpacing(SPACING_PX // 2)
         grid.setColumnStretch(1, 1)
         _add_row(grid, tr("&Wearer"), wearer)
         _add_row(grid, tr("&Plan"), self._plan)
-        grid.setRowMinimumHeight(grid.rowCount(), SPACING_PX)
+        self._gap_row = grid.rowCount()
         for part in PARTS:
             _add_row(grid, TITLES[part], fields[part])
             self._findings[part].keep_room()
+            self._finding_rows[grid.rowCount()] = self._findings[part]
             grid.addWidget(self._findings[part], grid.rowCount(), 1)
         grid.addWidget(self._advanced, grid.rowCount(), 1)
         grid.setRowStretch(grid.rowCount(), 1)  # or the fields move apart on a tall page
+        self.fit(is_low=False)
 
 
 def _add_row(grid: QGridLayout, title: str, field: QWidget) -> None:

@@ -28,6 +28,7 @@ from handcal_gui.panels.cloud.orbit import Direction, Orbit
 from handcal_gui.theme import SPACING_PX, colors, number_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.paint_turns import update_in_turn
+from handcal_gui.widgets.residual_scale import OUTLIER, draw_crosses
 from handcal_gui.widgets.splat import rgb, splat
 
 _RAD_PER_PX = 0.01
@@ -78,7 +79,7 @@ class CloudView(QWidget):
         return self._orbit
 
     def show_points(self, points_mm: Float64, point_colors: UInt8, text: str) -> None:
-        """Show points with a caption, or a message if there are none.
+        """Show points with a caption, or a message if there are none; outliers are crosses.
 
         Parameters
         ----------
@@ -185,8 +186,13 @@ class CloudView(QWidget):
         points_px[:, :2] += np.divide(size, 2.0)
         background = rgb(colors().canvas)
         point_px = np.clip(_POINT_MM * self._orbit.px_per_mm, _LEAST_POINT_PX, _MOST_POINT_PX)
-        image = splat(points_px, self._colors, background, size, round(ratio * point_px))
+        is_outlier = (self._colors == rgb(OUTLIER)).all(axis=1)
+        seen = points_px[~is_outlier], self._colors[~is_outlier]
+        image = splat(*seen, background, size, round(ratio * point_px))
         painter.drawImage(QRectF(self.rect()), image)
+        painter.setPen(QPen(QColor(OUTLIER), 1))
+        draw_crosses(painter, points_px[is_outlier, :2] / ratio, point_px)
+        painter.setPen(self.palette().windowText().color())
 
     def _paint_lines(self, painter: QPainter) -> None:
         if not len(self._from_mm):

@@ -103,7 +103,11 @@ class LinkTable(QWidget):
         }
         self._rejections = {
             reason: self._add_number(
-                reason.replace("_", "-"), f"    {reason.replace('_', ' ')}", _IN, meaning
+                reason.replace("_", "-"),
+                tr("Rejected, {}").format(reason.replace("_", " ")),
+                _IN,
+                meaning,
+                has_own_line=True,
             )
             for reason, meaning in REJECTIONS.items()
         }
@@ -123,17 +127,23 @@ class LinkTable(QWidget):
             number.setVisible(count > 0)
 
     def _add_number(
-        self, name: str, text: str, half: int, meaning: str
+        self, name: str, text: str, half: int, meaning: str, *, has_own_line: bool = False
     ) -> tuple[QLabel, NumberLabel]:
-        """Append a number to a half; return its caption, and the number."""
+        """Append a number to a half; return its caption, and the number.
+
+        On its own line, the caption has the room of the other half, too.
+        """
         row = max(self._rows.values()) if half == _BOTH else self._rows[half]
         self._rows |= {one: row + 1 for one in self._rows if half in (one, _BOTH)}
         caption = ElidedLabel()
         caption.setText(text)
-        caption.setToolTip(f"{text.strip()}: {meaning}")
+        caption.setToolTip(f"{text}: {meaning}")
         number = NumberLabel(f"link-{name}-{half}", _WIDEST[half], meaning)
         caption_column, number_column, columns = _PLACES[half]
-        self._grid.addWidget(caption, row, caption_column)
+        if has_own_line:
+            self._grid.addWidget(caption, row, 0, 1, number_column)
+        else:
+            self._grid.addWidget(caption, row, caption_column)
         self._grid.addWidget(number, row, number_column, 1, columns)
         return caption, number
 

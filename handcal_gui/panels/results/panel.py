@@ -63,7 +63,9 @@ class ResultsPanel(QWidget):
         self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
         self._residuals = ResidualsTab()
-        self._alignments = NumberTable("each-alignment-alone", tr("Each alignment alone"))
+        self._alignments = NumberTable(
+            "each-alignment-alone", tr("Each alignment alone"), wraps=True
+        )
         self._another = QLabel()
         self._another.setWordWrap(True)
         self._compare = CompareTab()

@@ -89,10 +89,15 @@ class SessionsTable(QTableView):
             current = self._sessions.index(rows[0], 0)
             self.selectionModel().setCurrentIndex(current, flags.NoUpdate)
 
-    def show_reason(self) -> None:
+    def show_reason(self, is_missing: bool) -> None:
         """Show why there is no session, and what to do; nothing if there is one."""
         reason = ""
-        if not self._sessions.rows:
+        if is_missing:
+            reason = tr(
+                "This folder does not exist. Calibrate a wearer, which creates it, or choose "
+                "another session folder on the start page."
+            )
+        elif not self._sessions.rows:
             reason = tr(
                 "No session is in this folder yet. Calibrate a wearer, or choose another session "
                 "folder on the start page."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,20 +42,24 @@ class Contents:
     deleted: tuple[Path, ...] = ()
     last: str = ""
     """Name of the session that was deleted last."""
+    is_missing: bool = False
+    """True if there is no such folder."""
 
 
 def read_contents(folder: Path, known: Collection[LibraryEntry]) -> Contents:
     """Read a folder of sessions; those `known` are kept if they have not changed."""
     rows = tuple(map(make_row, read_library(folder, known)))
     deleted = deleted_sessions(folder)
-    return Contents(rows, deleted, _name_of(deleted[-1]) if deleted else "")
+    last = _name_of(deleted[-1]) if deleted else ""
+    return Contents(rows, deleted, last, is_missing=not os.path.isdir(folder))
 
 
 def check_sessions(paths: Sequence[Path], progress: Progress) -> str:
     """Read every file of some sessions; return which are damaged, as a message."""
     sound, lines = _each(paths, _require_sound, tr("Checking {}"), progress)
     count = pluralize(sound, tr("session"), tr("sessions"))
-    return _with_lines(tr("{} sound, every file read.").format(count), lines)
+    said = tr("✓ {} sound, every file read.").format(count)
+    return _with_lines(said if sound or not lines else "", lines)
 
 
 def _require_sound(path: Path) -> None:
@@ -160,7 +165,7 @@ def _each(
             where = _RUNS_HERE if error.is_here else _RUNS_ELSEWHERE
             lines.append(where.format(_name_of(path)))
         except (FileError, ValueError) as error:  # a name may be invalid
-            lines.append(f"{path.name}: {error}")
+            lines.append(f"× {_name_of(path)}: {error}")
     return len(paths) - len(lines), lines
 
 
@@ -168,7 +173,7 @@ def _with_lines(said: str, lines: Sequence[str]) -> str:
     """Return a message with a line for each session, as many as the window has room for."""
     more = len(lines) - _MOST_LINES
     others = [tr("and {} more").format(more)] if more > 0 else []
-    return "\n".join((said, *lines[:_MOST_LINES], *others))
+    return "\n".join(filter(None, (said, *lines[:_MOST_LINES], *others)))
 
 
 def _free(path: Path) -> Path:

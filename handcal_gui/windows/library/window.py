@@ -193,7 +193,7 @@ class LibraryWindow(QDialog):
         )
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
         if self._is_read:
-            self._table.show_reason()
+            self._table.show_reason(self._contents.is_missing)
             self._count.setText(tr("{} in {}{}").format(count, self._folder, selected))
         self._show_trend(chosen[0].wearer if chosen else "")
 

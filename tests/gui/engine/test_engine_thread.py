@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -20,6 +21,7 @@ from handcal.bridge.bridge import Bridge
 from handcal.bridge.bridges import BridgeSettings
 from handcal.errors import FileError
 from handcal.io.closable import Closable
+from handcal.session.facts import SessionFacts
 from handcal.station.states import ProcedureError
 from handcal.station.station import Station
 from handcal_gui.engine.engine_thread import EngineThread
@@ -36,13 +38,14 @@ class FakeStation(Closable):
         self.notes = ""
         self.breaks_at: int | None = None
         self.watchers: list[object] = []
+        self.record: SimpleNamespace | None = None
 
     def step(self) -> Any:
         time.sleep(0.002)
         self.steps += 1
         if self.steps == self.breaks_at:
             raise ZeroDivisionError("oh")
-        return self.steps
+        return SimpleNamespace(record=self.record) if self.record else self.steps
 
     def watch(self, watcher: object) -> None:
         self.watchers.append(watcher)
@@ -157,16 +160,26 @@ def test_a_station_that_cannot_be_opened_says_why(qtbot: QtBot) -> None:
     assert ended.args == ["there is no rig file"]
 
 
-def test_an_engine_that_breaks_down_closes_the_station_and_says_so(qtbot: QtBot) -> None:
+@pytest.mark.parametrize(
+    ("held", "advice"),
+    [
+        ({}, "nothing was recorded: start again"),
+        ({"alignments": {1: "one"}}, "the session is kept: resume it"),
+        ({"facts": SimpleNamespace(verified={"left": "it"})}, "the session is kept: resume it"),
+    ],
+)
+def test_an_engine_that_breaks_down_closes_the_station_and_says_so(
+    qtbot: QtBot, held: dict[str, Any], advice: str
+) -> None:
     station = FakeStation()
+    nothing = {"alignments": {}, "trials": {}, "facts": SessionFacts(), "events": ()}
+    station.record = SimpleNamespace(**{**nothing, **held})
     station.breaks_at = 5
     engine = EngineThread(lambda: cast(Station, station))
     with qtbot.waitSignal(engine.ended, timeout=5000) as ended:
         engine.start()
     engine.close()
-    assert ended.args == [
-        "handcal hit an unexpected error (ZeroDivisionError: oh); the session is kept: resume it"
-    ]
+    assert ended.args == [f"handcal hit an unexpected error (ZeroDivisionError: oh); {advice}"]
     assert station.is_closed
 
 

@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QTextDocument
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.theme import SPACING_PX, use_theme
@@ -233,3 +233,22 @@ def test_it_opens_on_a_small_screen(qtbot: QtBot, manual: Manual) -> None:
     manual.resize(2 * available.width(), 2 * available.height())
     manual.open("docs/guide.md")
     qtbot.waitUntil(lambda: available.contains(manual.frameGeometry()))
+
+
+def test_no_page_and_no_section_of_a_line_found_is_cut(manual: Manual) -> None:
+    manual.open("docs/index.md")
+    manual.resize(960, 510)
+    manual.search.setText("handcal")
+    QApplication.processEvents()
+    rows = [manual.found.topLevelItem(i) for i in range(manual.found.topLevelItemCount())]
+    assert len(rows) == 200
+    assert any("\n" in row.text(1) for row in rows if row)  # of a heading with many commands
+    width_px = [manual.found.columnWidth(column) for column in range(3)]
+    metrics = manual.found.fontMetrics()
+    for row in filter(None, rows):
+        for column in (0, 1):
+            lines_px = map(metrics.horizontalAdvance, row.text(column).splitlines())
+            assert max(lines_px) < width_px[column]
+        height_px = manual.found.visualItemRect(row).height()
+        assert height_px >= metrics.lineSpacing() * len(row.text(1).splitlines())
+    assert sum(width_px[:2]) < 0.65 * manual.found.viewport().width()  # the rest is the line's

@@ -12,10 +12,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
+    QDoubleSpinBox,
     QFileDialog,
     QLabel,
     QListWidget,
     QScrollArea,
+    QToolButton,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -164,6 +166,27 @@ def test_fields_are_reached_by_letters(qtbot: QtBot, open_page: Callable[..., St
         "Rig file",
         "Session folder",
     }
+
+
+def test_the_letter_of_advanced_leads_to_its_first_field(
+    qtbot: QtBot, open_page: Callable[..., StartPage]
+) -> None:
+    page = open_page()
+    page.resize(960, 520)
+    page.activateWindow()
+    qtbot.waitActive(page)
+    QTest.keyClick(page.windowHandle(), Qt.Key.Key_A, Qt.KeyboardModifier.AltModifier)
+    guard = find(page, QDoubleSpinBox, "guard")
+    qtbot.waitUntil(guard.hasFocus)
+    assert guard.visibleRegion().boundingRect() == guard.rect()
+    wearer(page).setFocus()
+    fold = find(page, QToolButton, "advanced")
+    fold.setAttribute(Qt.WidgetAttribute.WA_UnderMouse)
+    for is_open in (False, True):
+        fold.click()
+        assert fold.isChecked() is is_open
+    QApplication.processEvents()
+    assert wearer(page).hasFocus()
 
 
 def test_each_letter_leads_to_one_place(

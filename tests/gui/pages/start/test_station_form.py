@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QPoint
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -15,7 +16,9 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QLabel,
     QLineEdit,
+    QScrollArea,
     QSpinBox,
+    QWidget,
 )
 from pytestqt.qtbot import QtBot
 
@@ -23,9 +26,11 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.hand.settings import SegmentSettings
 from handcal.station.doctor import Health
+from handcal.station.preflight import PARTS
 from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences
+from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.pages.start.conftest import (
     KEY,
@@ -170,3 +175,38 @@ def test_the_pairing_key_is_hidden_until_asked_for(open_page: Callable[..., Star
     assert shown.text() == "another key of the same headset"
     choose(page, "headset", "virtual")
     assert not shown.isVisible()
+
+
+LONG = "a finding with a path, /home/technician/Documents/sessions/none.yaml, and what to do; " * 2
+
+
+@pytest.mark.parametrize(("size_px", "long"), [((960, 521), LONG), ((1280, 660), 2 * LONG)])
+def test_findings_of_every_part_are_in_sight_on_a_small_screen_and_touch_nothing(
+    qtbot: QtBot,
+    inspector: Inspector,
+    open_page: Callable[..., StartPage],
+    size_px: tuple[int, int],
+    long: str,
+) -> None:
+    inspector.healths = dict.fromkeys(PARTS, Health.BROKEN)
+    page = open_page(source="realsense", headset="network", rig="/none.yaml")
+    page.resize(*size_px)
+    for part in ("camera", "headset", "rig"):
+        find(page, QLabel, f"{part}Found").setText(long.strip())
+    form = find(page, QWidget, "stationForm")
+    [area] = [one for one in page.findChildren(QScrollArea) if one.widget() is form]
+
+    def settled() -> None:
+        assert area.verticalScrollBar().maximum() == 0
+        findings = [find(page, FindingLine, f"{part}Finding") for part in PARTS]
+        for finding in findings:
+            label = find(finding, QLabel, finding.objectName().replace("Finding", "Found"))
+            bottom_px = label.mapTo(form, label.rect().bottomLeft()).y()
+            below = [
+                one.mapTo(form, QPoint()).y()
+                for one in form.findChildren(QWidget)
+                if one.isVisible() and one.mapTo(form, QPoint()).y() > bottom_px
+            ]
+            assert min(below) - bottom_px >= 8
+
+    qtbot.waitUntil(settled)

@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QColor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
@@ -13,6 +13,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import Alignment
 from handcal_gui.panels.cloud.cloud_view import CloudView
+from handcal_gui.panels.cloud.orbit import Direction
 from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.preferences import HIDDEN_LAYERS
 from handcal_gui.theme import colors
@@ -188,6 +189,26 @@ def test_the_cursor_of_a_finished_alignment_is_shown_on_demand(
     assert _count(_view(panel), colors().cursor) > 50
     panel.show_snapshot(snapshot())
     assert _count(_view(panel), colors().cursor) == 0
+
+
+def test_an_outlier_is_a_cross_in_the_view_and_in_its_key(qtbot: QtBot) -> None:
+    view, scale = show(qtbot, CloudView(), 300, 300), show(qtbot, ResidualScale(), 300, 20)
+    cube_mm = 80.0 * (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5)
+    shades = np.zeros((9, 3), np.uint8)
+    shades[8] = rgb(OUTLIER)
+    view.show_points(np.vstack([cube_mm, [[0.0, 0.0, 0.0]]]), shades, "mm")
+    view.look(Direction.FRONT)
+    for widget in (view, scale):
+        shown = widget.grab().toImage()
+        rows, columns = np.nonzero(
+            [
+                [shown.pixelColor(x, y) == QColor(OUTLIER) for x in range(shown.width())]
+                for y in range(shown.height())
+            ]
+        )
+        rows, columns = rows - rows.mean(), columns - columns.mean()
+        assert rows.max() >= 2
+        assert np.abs(np.abs(rows) - np.abs(columns)).max() <= 1.5  # on both diagonals only
 
 
 def test_residual_colors_tell_distances_and_outliers_apart() -> None:

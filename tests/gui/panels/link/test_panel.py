@@ -24,6 +24,7 @@ from handcal_gui import translation
 from handcal_gui.panels.link import link_table
 from handcal_gui.panels.link.link_table import REJECTIONS
 from handcal_gui.panels.link.panel import LinkPanel
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
 from handcal_gui.widgets.plots import Plot
 from tests.gui.conftest import NOW_NS
@@ -145,6 +146,20 @@ def test_only_reasons_that_occurred_are_listed_and_explained(
         assert label.isVisible() == (reason in ("unpaired", "wrong_session"))
         assert label.toolTip() == REJECTIONS[reason]
     assert text(panel, "unpaired-2") == "12"
+
+
+@pytest.mark.parametrize("width_px", [344, 384])  # at 960 x 540, and at 1280 x 720
+def test_no_reason_of_a_rejection_is_cut(panel: LinkPanel, snapshot: Maker, width_px: int) -> None:
+    panel.resize(width_px, 470)
+    panel.show_snapshot(snapshot(link={"rejected": dict.fromkeys(Rejection, 1000)}))
+    QApplication.processEvents()
+    captions = [
+        one for one in panel.findChildren(ElidedLabel) if one.text().startswith("Rejected,")
+    ]
+    assert len(captions) == len(Rejection)
+    for caption in captions:
+        assert caption.isVisible()
+        assert caption.width() >= caption.fontMetrics().horizontalAdvance(caption.text())
 
 
 def test_the_history_is_of_half_a_minute(panel: LinkPanel, snapshot: Maker) -> None:

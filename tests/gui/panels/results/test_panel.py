@@ -235,6 +235,18 @@ def test_an_alignment_added_since_is_not_among_the_results(
     assert child(panel, QComboBox, "residuals-choice").count() == 4
 
 
+def test_the_numbers_of_each_alignment_alone_do_not_run_together(solved: ResultsPanel) -> None:
+    table = child(solved, NumberTable, "each-alignment-alone")
+    child(solved, QTabWidget).setCurrentIndex(3)
+    for width_px in range(300, 480, 5):  # around the 360 px of a screen of 960 x 540
+        solved.resize(width_px, 400)
+        QApplication.processEvents()
+        assert not table.horizontalScrollBar().isVisible()
+        for column in range(3):
+            number_px = table.sizeHintForColumn(column)
+            assert table.columnWidth(column) - number_px >= 8, width_px
+
+
 def test_a_comparison_is_asked_for_and_shown(
     solved: ResultsPanel, results: Results, other: Results, qtbot: QtBot
 ) -> None:

@@ -12,11 +12,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
+    QComboBox,
     QLabel,
     QProgressBar,
     QPushButton,
     QTableWidget,
-    QTabWidget,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -96,8 +96,8 @@ def test_a_study_runs_to_its_end(
     student.press("Run")
     student.wait_for_text("Done")
     assert student.child(QLabel, "lead").text() == "Squares grow."
-    tabs = student.child(QTabWidget, "figures")
-    titles = [tabs.tabText(place) for place in range(tabs.count())]
+    choice = student.child(QComboBox, "figures")
+    titles = [choice.itemText(place) for place in range(choice.count())]
     assert titles == ["Numbers", "Terms and methods", "Some squares"]
     item = student.child(QTableWidget, "numbers").item(9, 0)
     assert item is not None

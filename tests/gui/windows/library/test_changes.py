@@ -31,10 +31,14 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
 ) -> None:
     choose(window, "Ada", "Bea", "Cid")
     press(window, "checkSessions")
-    wait_for(qtbot, window, "3 sessions sound, every file read.")
-    assert "cid: alignments/1.npz" in text(window, "message")
+    wait_for(qtbot, window, "✓ 3 sessions sound, every file read.")
+    damaged = text(window, "message").splitlines()[1]
+    assert damaged.startswith("× Cid, ")
+    assert ": alignments/1.npz" in damaged
     assert text(window, "message").endswith("; Repair copies what is sound")
     choose(window, "Cid")
+    press(window, "checkSessions")
+    wait_for(qtbot, window, "× Cid, ")  # not first that none is sound
     press(window, "repairSession")
     wait_for(qtbot, window, "cid-repaired: a copy with 0 alignments")
     qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
@@ -103,7 +107,7 @@ def test_one_that_is_gone_does_not_keep_the_others_from_being_deleted(
     choose(window, "Bea", "Cid")
     delete_session(folder / "bea")  # by another program
     press(window, "deleteSessions")
-    wait_for(qtbot, window, "1 session deleted.\nbea: ")
+    wait_for(qtbot, window, "1 session deleted.\n× bea: ")
     assert "is no longer there" in text(window, "message")
     qtbot.waitUntil(lambda: wearers(window) == ["Ada", "Ada"], timeout=PATIENCE_MS)
 

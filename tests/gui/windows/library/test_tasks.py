@@ -13,10 +13,9 @@ def test_messages_name_a_few_of_many_sessions(tmp_path: Path) -> None:
     for path in paths:
         path.mkdir()
         (path / "journal.jsonl").write_text("nonsense\n")
-    first, *lines, last = check_sessions(paths, Progress()).splitlines()
-    assert first == "0 sessions sound, every file read."
+    *lines, last = check_sessions(paths, Progress()).splitlines()
     assert len(lines) == 8
-    assert lines[0].startswith(f"s-0: {paths[0] / 'journal.jsonl'} does not begin as the journal")
+    assert lines[0].startswith(f"× s-0: {paths[0] / 'journal.jsonl'} does not begin as the journal")
     assert lines[0].endswith("; make it readable, or restore it from a backup")
     assert last == "and 12 more"
     gone = [tmp_path / f"gone-{number}" for number in range(20)]

@@ -274,6 +274,15 @@ def test_an_empty_folder(qtbot: QtBot, tmp_path_factory: pytest.TempPathFactory)
     window.stop()
 
 
+def test_a_folder_that_does_not_exist_is_not_called_empty(qtbot: QtBot, tmp_path: Path) -> None:
+    window = LibraryWindow(tmp_path / "none")
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitUntil(lambda: text(window, "count").startswith("0 sessions"), timeout=PATIENCE_MS)
+    assert text(window, "noSessions").startswith("This folder does not exist. Calibrate a wearer")
+    window.stop()
+
+
 def test_a_search_that_finds_nothing_says_so(window: LibraryWindow) -> None:
     reason = child(window, QLabel, "noSessions")
     assert not reason.isVisible()
