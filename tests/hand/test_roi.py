@@ -190,7 +190,7 @@ def test_the_detector_looks_seldom_and_nearby_at_a_hand_that_is_followed() -> No
 
 @dataclass
 class SlowEyes(Eyes):
-    """A detector that is still at work on a check until it is told to end."""
+    """A detector that is still at work on a check until it may end."""
 
     may_end: threading.Event = field(default_factory=threading.Event)
 
