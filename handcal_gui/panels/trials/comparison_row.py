@@ -1,4 +1,4 @@
-"""A row of buttons for blinded comparisons."""
+"""A row of buttons for blinded comparisons, in the trials panel and in the station's guide."""
 
 from __future__ import annotations
 
