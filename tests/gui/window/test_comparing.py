@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 
+from handcal.rig_types import Rig
+from handcal.session.session import SessionRecord
+from handcal.session.trial import make_trial
 from handcal.station.states import State
 from handcal_gui.program import Program
 from tests.gui.helpers import button, child, letters
@@ -85,3 +91,36 @@ def test_in_the_station_the_key_of_trials_says_where_they_are_recorded(
     window.use_arrangement("panels")
     with qtbot.waitSignal(trials.doubted):  # φ was not moved since
         press(window, Qt.Key.Key_T)
+
+
+@pytest.mark.parametrize("text_scale", [1.0, 1.25], indirect=True)
+@pytest.mark.parametrize("size_px", [(960, 510), (1280, 690), (1280, 720)])
+@pytest.mark.parametrize("count", [0, 3])
+def test_the_trials_panel_shows_a_comparison_whole(
+    program: Program,
+    snapshot: Maker,
+    record: SessionRecord,
+    rig: Rig,
+    size_px: tuple[int, int],
+    count: int,
+) -> None:
+    trial = make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), [1e-3, 0.0, 0.0])
+    tried = replace(record, trials=dict.fromkeys(range(1, count + 1), trial))
+    window, trials = program.window, program.window.panels.trials
+    window.resize(*size_px)
+    window.show_page("live")
+    window.docks["trials"].raise_()
+    trials.show_snapshot(snapshot(State.APPLIED, record=tried))
+    settle()
+    hint = child(trials, QLabel, "trialsHint")
+    assert hint.isVisible() is (count == 0)
+    for has_both, name in ((False, "compareLook"), (True, "compareAsk")):
+        seen = snapshot(State.APPLIED, comparing="first", has_compared_both=has_both, record=tried)
+        trials.show_snapshot(seen)
+        settle()
+        assert not hint.isVisible()
+        asked = child(trials, QLabel, name)
+        assert asked.isVisible()
+        assert asked.heightForWidth(asked.width()) <= asked.height()
+        for shown in (asked, *(button(trials, QPushButton, text) for text in BUTTONS)):
+            assert shown.visibleRegion().boundingRect() == shown.rect(), shown.objectName()
