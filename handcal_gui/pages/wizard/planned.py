@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.plan import NextStep, StepName
-from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Eye, EyePlan
 from handcal_gui.pages.wizard.preconditions import (
@@ -249,12 +250,12 @@ class PlannedWizard(Wizard):
                 ButtonSpec(Action.ANOTHER, tr("&Add alignment")),
                 *(_VERIFY_AGAIN[eye] for eye in self.usable_eyes),
             ),
-            fact=_drawn_otherwise(procedure) or kept_fact(procedure),
+            fact=_drawn_otherwise(snapshot) or kept_fact(procedure),
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:
         view = save_view(snapshot, is_held=self.is_held)
-        view = replace(view, fact=_drawn_otherwise(snapshot.procedure) or view.fact)
+        view = replace(view, fact=_drawn_otherwise(snapshot) or view.fact)
         if not snapshot.record.is_finished:
             return view
         slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))
@@ -267,14 +268,23 @@ class PlannedWizard(Wizard):
         return ButtonSpec(Action.TAKE_STEP, doing, False)
 
 
-def _drawn_otherwise(procedure: Procedure) -> str:
+def _drawn_otherwise(snapshot: Snapshot) -> str:
     """Return a note if the headset draws with a φ other than that of the result; else empty."""
+    procedure = snapshot.procedure
     results, drawn_m = procedure.results, procedure.applied_shift_m
     if results is None or procedure.state is not State.APPLIED:
         return ""
     solved_m = results.rendered_shift_m
     if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
         return ""
-    return tr(
-        "The headset draws with a different φ from this result's: an earlier or a fine-tuned one."
-    )
+    names = [one.name for one in snapshot.record.events]
+    set_by = [name for name in names if name in (WENT_BACK, SessionEvent.FINE_TUNED)]
+    which = tr("a fine-tuned one")
+    if set_by[-2:-1] == [WENT_BACK]:  # which records φ like a fine-tuning
+        is_offline = not any(drawn_m[eye].any() for eye in solved_m)
+        which = tr("the offline calibration's") if is_offline else tr("an earlier one")
+    former_m = procedure.former_shift_m
+    can_return = all(eye in former_m and (former_m[eye] == solved_m[eye]).all() for eye in solved_m)
+    how = tr("Press G to return.") if can_return else tr("Reset φ in Fine-tune to return.")
+    found = tr("The headset draws with a different φ from this result's: {}.").format(which)
+    return f"{found} {how}"
