@@ -178,8 +178,7 @@ class MainWindow(QMainWindow):
         self._middle.insertWidget(int(page == "live"), self.banner)
         self._stack.setCurrentIndex(list(self._pages).index(page))
         is_small = self._is_small()
-        is_alone = self._arrangement == "station"
-        self._guide.fill_window(is_alone and not is_small)
+        self._guide.fill_window(self._arrangement == "station", is_small=is_small)
         self._restore_layout(page, is_small=is_small)
         for name, dock in self._docks.items():
             belongs = name in self._docks_of_page

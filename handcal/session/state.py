@@ -65,6 +65,9 @@ ASIDE = (
 )
 """Events after which a finished session stays finished: of its user test, and corrections."""
 
+WENT_BACK = "went_back"
+"""The station's event before φ is recorded to which the headset was set back."""
+
 VERIFYING = "verifying"
 """The station's event at the start of a verification and after each nudge."""
 

@@ -33,6 +33,7 @@ from handcal.link.server import HeadsetServer
 from handcal.register.results import Results, results_json, solve_session
 from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
+from handcal.session.state import WENT_BACK
 from handcal.station.states import MAX_HAND_SET_SHIFT_M, CalibrationSettings, ProcedureError, State
 from handcal.station.verifications import VerificationSteps
 from handcal.types import EYES, Eye, EyeDistance, Float64, PlanName
@@ -300,7 +301,7 @@ class Calibration(VerificationSteps):
         self._drawing.send(back_m)
         self._former_m = former_m
         self.state = State.APPLIED if self.state is State.APPLIED else State.SHOW_HAND
-        self._store.event("went_back", to=to)
+        self._store.event(WENT_BACK, to=to)
         self.record_shift()
 
     def set_shift(self, shifts_m: Mapping[Eye, ArrayLike]) -> list[Outgoing]:

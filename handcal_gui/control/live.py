@@ -224,6 +224,10 @@ class CalibrationController(QObject):
         for name, dock in self._window.docks.items():
             dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
         panels.session.notes_changed.connect(self._save_notes)
+        asked, trials = self._wizard_panel.comparison, panels.trials
+        asked.ended.connect(trials.end_comparison_requested)
+        asked.show_requested.connect(trials.show_compared_requested)
+        asked.answered.connect(trials.comparison_answered)
         connect_panels(panels, self._submit, self._on_doubted)
 
     def _submit(self, name: str, command: Command) -> int:

@@ -93,6 +93,12 @@ class JobBar(QWidget):
         """Show that the running job does something else by now."""
         self._doing.setText(f"{doing}…")
 
+    def wait_for_user(self) -> None:
+        """Show that the running job waits for the user: nothing moves."""
+        self.say(tr("Waiting for you"))
+        if self._bar.maximum() == 0:
+            show_share(self._bar, 0.0)
+
     def cancel(self) -> None:
         """Cancel the running job at its next check."""
         if self._job is not None:

@@ -130,6 +130,10 @@ class RecordTable(QTableView):
         rows = self.selectionModel().selectedRows()
         return self._records.numbers[rows[0].row()] if rows else None
 
+    def sizeHintForColumn(self, column: int) -> int:
+        """Keep cells apart that are wider than the title of their column."""
+        return super().sizeHintForColumn(column) + SPACING_PX
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Show the columns that fit."""
         super().resizeEvent(event)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.plan import NextStep, StepName
-from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Eye, EyePlan
 from handcal_gui.pages.wizard.preconditions import (
@@ -145,7 +146,8 @@ class PlannedWizard(Wizard):
             case StepName.VERIFY:
                 return self._ask_to_verify(planned, snapshot)
             case StepName.DONE:
-                return self._done(planned, snapshot)
+                fact = _drawn_otherwise(snapshot) or kept_fact(procedure)
+                return replace(self._done(planned, snapshot), fact=fact)
         return self._raise(snapshot)
 
     def _raise(self, snapshot: Snapshot) -> WizardView:
@@ -241,8 +243,7 @@ class PlannedWizard(Wizard):
             main = ButtonSpec(Action.NEXT, tr("Finish"))
         verify = (_VERIFY_AGAIN[eye] for eye in self.usable_eyes)
         others = (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *verify)
-        fact = _drawn_otherwise(procedure) or kept_fact(procedure)
-        return WizardView(Step.VERIFY, text, preconditions, main, others, fact=fact)
+        return WizardView(Step.VERIFY, text, preconditions, main, others)
 
     def _not_accepted(
         self, preconditions: tuple[Precondition, ...], snapshot: Snapshot
@@ -271,12 +272,11 @@ class PlannedWizard(Wizard):
             (hand_found(snapshot), hand_still(snapshot), *preconditions),
             main,
             (*others, ButtonSpec(Action.NEXT, tr("Finish a&s it is"))),
-            fact=_drawn_otherwise(procedure) or kept_fact(procedure),
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:
         view = save_view(snapshot, is_held=self.is_held)
-        view = replace(view, fact=_drawn_otherwise(snapshot.procedure) or view.fact)
+        view = replace(view, fact=_drawn_otherwise(snapshot) or view.fact)
         if not snapshot.record.is_finished:
             return view
         slipped = ButtonSpec(Action.SLIPPED, tr("Headset &slipped"))
@@ -289,14 +289,23 @@ class PlannedWizard(Wizard):
         return ButtonSpec(Action.TAKE_STEP, doing, False)
 
 
-def _drawn_otherwise(procedure: Procedure) -> str:
+def _drawn_otherwise(snapshot: Snapshot) -> str:
     """Return a note if the headset draws with a φ other than that of the result; else empty."""
+    procedure = snapshot.procedure
     results, drawn_m = procedure.results, procedure.applied_shift_m
     if results is None or procedure.state is not State.APPLIED:
         return ""
     solved_m = results.rendered_shift_m
     if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
         return ""
-    return tr(
-        "The headset draws with a different φ from this result's: an earlier or a fine-tuned one."
-    )
+    names = [one.name for one in snapshot.record.events]
+    set_by = [name for name in names if name in (WENT_BACK, SessionEvent.FINE_TUNED)]
+    which = tr("a fine-tuned one")
+    if set_by[-2:-1] == [WENT_BACK]:  # which records φ like a fine-tuning
+        is_offline = not any(drawn_m[eye].any() for eye in solved_m)
+        which = tr("the offline calibration's") if is_offline else tr("an earlier one")
+    former_m = procedure.former_shift_m
+    can_return = all(eye in former_m and (former_m[eye] == solved_m[eye]).all() for eye in solved_m)
+    how = tr("Press G to return.") if can_return else tr("Reset φ in Fine-tune to return.")
+    found = tr("The headset draws with a different φ from this result's: {}.").format(which)
+    return f"{found} {how}"

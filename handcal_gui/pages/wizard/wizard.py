@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QAction, QResizeEvent
+from PySide6.QtGui import QAction, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QWidget
 
 from handcal.station.snapshot import Snapshot
@@ -19,15 +19,22 @@ from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.rows import PreconditionRows, StepRail
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import WEARERS, Action, Step, WizardView
+from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, scale_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.brief import show_briefly
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.sentence import sentence
 
 _MOST_PRECONDITIONS = 3
-_COMPARING = tr("The wearer compares two drawings. Record the answer in Trials, or stop comparing.")
+_COMPARING = {
+    False: tr("The wearer compares two drawings. Record the answer in Trials, or stop comparing."),
+    True: tr("The wearer compares two drawings. Record the answer here, or stop comparing."),
+}
+"""Beside the panels, and in the station, which shows no trials."""
+_NO_TRIALS = tr("Trials are recorded with the panels in sight: press F11, then T")
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
 _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""
@@ -71,6 +78,8 @@ class WizardPanel(QWidget):
     shown : WizardView or None
         The view shown; None before the first snapshot.
     picture : GuidePicture
+    comparison : ComparisonRow
+        Shown in the station while the wearer compares.
     asked : Signal(Action)
         A button was pressed, by a person or automatically.
     plan_changed : Signal(str)
@@ -99,10 +108,14 @@ class WizardPanel(QWidget):
         self.wizard = Wizard()
         self.shown: WizardView | None = None
         self.picture = GuidePicture()
-        self._is_alone = self._is_large = False
+        self.comparison = ComparisonRow()
+        self.comparison.hide()
+        self._is_station = self._is_alone = self._is_large = False
         self._automatic = Automatic()
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
+        self._no_trials = QShortcut("T", self, lambda: show_briefly(self, _NO_TRIALS))
+        self._no_trials.setEnabled(False)  # or it would take the key from the trials
         self._nudges = self._nudge_actions()
         self._undo = add_action(
             self, tr("Movement of the outline"), "", lambda: self.asked.emit(Action.UNDO_NUDGE)
@@ -140,7 +153,12 @@ class WizardPanel(QWidget):
         view = self.wizard.view(snapshot)
         if snapshot.comparing is not None:
             main = replace(view.main, is_enabled=False)
-            view = replace(view, sentence=_COMPARING, main=main, note="", runs_after_s=None)
+            said = _COMPARING[self._is_station]
+            view = replace(view, sentence=said, main=main, others=(), note="", runs_after_s=None)
+        self.comparison.show_comparison(
+            snapshot.comparing, has_seen_both=snapshot.has_compared_both, can_begin=False, count=0
+        )
+        self.comparison.setVisible(self._is_station and snapshot.comparing is not None)
         self.picture.step = view.step
         if view != self.shown:
             before, self.shown = self.shown, view
@@ -157,9 +175,11 @@ class WizardPanel(QWidget):
         self._hold.setChecked(is_held)
         self._refresh()
 
-    def fill_window(self, is_alone: bool) -> None:
-        """Use the room of a window without panels, or less."""
-        self._is_alone = is_alone
+    def fill_window(self, is_station: bool, *, is_small: bool) -> None:
+        """Use the room of a window without panels, or less, and do without the panels."""
+        self._is_station = is_station
+        self._no_trials.setEnabled(is_station)
+        self._is_alone = is_station and not is_small
         self._scale_texts()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -191,7 +211,10 @@ class WizardPanel(QWidget):
         larger = _LARGE_SCALE if self._is_large else 1.0
         for texts, scale in (
             ([self._sentence], _SENTENCE_SCALE[self._is_alone]),
-            ([self._preconditions, self._fact, self._note], _ROW_SCALE[self._is_alone]),
+            (
+                [self._preconditions, self._fact, self._note, self.comparison],
+                _ROW_SCALE[self._is_alone],
+            ),
             ([self.picture.result], 1.0),
         ):
             font = self.font()
@@ -301,6 +324,7 @@ class WizardPanel(QWidget):
         texts = vbox(*said, 0, spacing=SPACING_PX // 2)
         ring = vbox(self._ring, 0)
         layout.addLayout(hbox((texts, 1), ring, spacing=2 * SPACING_PX))
+        layout.addWidget(self.comparison)
         layout.addWidget(self.picture, 1)
 
     def _refresh(self) -> None:

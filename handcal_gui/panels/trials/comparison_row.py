@@ -1,4 +1,4 @@
-"""A row of buttons for blinded comparisons."""
+"""A row of buttons for blinded comparisons, in the trials panel and in the station's guide."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ _COMPARE_HELP = tr(
 
 
 _LOOK = tr(
-    "The wearer holds the hand up, and looks at the first drawing and at the second. An answer can "
-    "be given once both have been shown."
+    "The wearer holds the hand up, and looks at both drawings. Then the answer can be recorded."
 )
 _ASK = tr("Ask the wearer which drawing fits the hand better. Both can be shown again.")
 _NOT_YET = tr("Show the first and the second drawing before the answer")

@@ -146,7 +146,6 @@ class TrialsPanel(QWidget):
         before, self._record = self._record, record
         self._compared = len(read_comparisons(record.events))
         if before is None or trials_id(before) != trials_id(record):
-            self._hint.setVisible(not record.trials)  # the trials need its room
             self._table.show_rows(trial_rows(record))
             self._summary.setText(statistics_text(record.trials))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
@@ -229,6 +228,9 @@ class TrialsPanel(QWidget):
         if not obstacle and self._eye != self._next_eye():
             self._eye = self._next_eye()
             self.eye_changed.emit(self._eye)
+        is_compared = self._snapshot is not None and self._snapshot.comparing is not None
+        has_trials = self._record is not None and bool(self._record.trials)
+        self._hint.setVisible(not has_trials and not is_compared)  # they need its room
         self._shows_target.setEnabled(not obstacle)
         if obstacle or has_ended:
             self._shows_target.setChecked(False)

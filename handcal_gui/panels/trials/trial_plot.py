@@ -18,6 +18,8 @@ _SIGNS: dict[Eye, tuple[str, float]] = {"left": ("o", -0.012), "right": ("t1", 0
 """Symbol, and an offset in metres so that the eyes do not hide each other."""
 _MEAN_HALF_WIDTH_M = 0.025
 _MARGIN_M = 0.05
+_PADDING = 0.1
+"""Room above and below what is drawn, as a share of its height."""
 
 
 class TrialPlot(Plot):
@@ -54,7 +56,7 @@ class TrialPlot(Plot):
             errors = [float(trial.error_arcmin.mean()) for trial in seen]
             line.setData(*_unjoined(np.array(at_m), np.array(errors), 1))
         depths_m = sorted({*TARGET_DEPTHS_M, *(one.target_depth_m for one in trials.values())})
-        ticks, marks, highest = [], [np.empty((0, 2))], 1.0
+        ticks, marks, lowest, highest = [], [np.empty((0, 2))], 0.0, 1.0
         for depth_m in depths_m:
             here = [number for number, one in trials.items() if one.target_depth_m == depth_m]
             name = tr("{:g} (n = {})").format(depth_m, len(here)) if trials else f"{depth_m:g}"
@@ -62,12 +64,13 @@ class TrialPlot(Plot):
             if here:
                 spread = trial_spread(trials, here)
                 mean, sd = spread.mean_arcmin, spread.trial_sd_arcmin or 0.0
+                lowest = min(lowest, mean - sd)
                 highest = max(highest, mean + sd, spread.max_arcmin)
                 across = (-_MEAN_HALF_WIDTH_M, _MEAN_HALF_WIDTH_M, 0.0, 0.0)
                 up = (mean, mean, mean - sd, mean + sd)
                 marks.append(np.column_stack([np.add(depth_m, across), up]))
         self.item.getAxis("bottom").setTicks([ticks])
-        self.item.setYRange(0.0, 1.1 * highest, padding=0.0)
+        self.item.setYRange(lowest, highest, padding=_PADDING)  # no symbol is cut
         at_m, up_arcmin = np.vstack(marks).T
         self._mean.setData(*_unjoined(at_m, up_arcmin, 2))
 

@@ -43,6 +43,7 @@ from handcal_gui.windows.evaluation.preparation import PreparationDialog
 _FIRST_SIZE = QSize(1120, 760)
 _TURNED = tr("Turned to the display's axes")
 _NOT_TURNED = tr("Along the camera's axes")
+_ELSEWHERE = tr("Close this window to choose the file under Camera intrinsics.")
 _BY_ITSELF = tr("A&utomatically")
 _NOT_BY_ITSELF = tr("Automatically: stored images do not wait")
 MOST_POSES = 100
@@ -139,16 +140,11 @@ class CaptureDialog(PreparationDialog):
         self._lay_out()
         self._list.setFocus()  # unlike a text field, it does not consume the space bar
         self._ask()
-        self._found.show_finding(
-            Finding("", Health.LIMITED, tr("choose the camera, and press Show"))
-        )
         self._bar.run(tr("Looking for cameras"), lambda *_: self._prepare(), self._begin)
 
     def start(self) -> None:
         """Show images of the chosen camera."""
-        self._found.show_finding(
-            Finding("", Health.LIMITED, tr("press Take once the image shows this"))
-        )
+        self._found.clear()
         self._camera.start()
         self._list.setFocus()
 
@@ -240,7 +236,7 @@ class CaptureDialog(PreparationDialog):
             self._show_through(self._warped, _TURNED)
 
     def _show_not_turned(self, why: str) -> None:
-        self._show_through(None, f"{_NOT_TURNED}; {why}.")
+        self._show_through(None, f"{_NOT_TURNED}; {why}. {_ELSEWHERE}")
 
     def _show_through(self, warp: Callable[[UInt8], UInt8] | None, axes: str) -> None:
         self._camera.show_through(warp)
@@ -304,7 +300,8 @@ class CaptureDialog(PreparationDialog):
     def _show_not_done(self, why: str) -> None:
         """Show why an image was not taken, or why none can be taken."""
         if self._looked_for is None:
-            self._show_failure(why)
+            where = tr("close this window to choose the files of the cube and the rig")
+            self._found.show_finding(Finding("", Health.BROKEN, why, where))
         else:
             found = tr("not taken: {}").format(why)
             self._found.show_finding(Finding("", Health.LIMITED, found))
@@ -336,6 +333,8 @@ class CaptureDialog(PreparationDialog):
             return tr("All captures have been taken.")
         if self._looked_for is None or self._list.chosen is None:
             return ""
+        if self._camera.images is None:
+            return tr("Choose the camera, and press Show.")
         return f"{instruction(self._list.chosen)}."
 
     def _lay_out(self) -> None:
@@ -345,10 +344,10 @@ class CaptureDialog(PreparationDialog):
         others = self._close, self._by_itself, self._large
         foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
         vbox(
+            self._instruction,
             self.form,
             (middle, 1),
             self._axes,
-            self._instruction,
             self._found,
             foot,
             on=self,

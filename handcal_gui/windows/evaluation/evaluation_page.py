@@ -65,6 +65,8 @@ class EvaluationPage(QWidget):
     def __init__(self, spec: EvaluationSpec, entries: Any, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._evaluation = spec.evaluation
+        self._question_text = spec.question
+        self._question = paragraph("question")
         self._entries = entries
         self._readiness: Readiness | None = None
         self._failure = self._waits_for = ""
@@ -190,8 +192,13 @@ class EvaluationPage(QWidget):
         requests = (prepare.request(self._entries) for prepare in self._preparing)
         self._request.setText(" ".join(filter(None, requests)))
         self._request.setVisible(bool(self._request.text()) and not self.is_busy)
+        is_shown = readiness is not None and readiness.is_done and not self._results.is_empty
         can_run = readiness is not None and readiness.can_run and not self._waits_for
-        self._button.setEnabled(can_run)
+        self._button.setEnabled(can_run and not is_shown)
+        task = tr("Check the entries, then start at the lower right.")
+        if self.is_busy or is_shown:
+            task = self.kept if self.is_busy else tr("Change the entries for another study.")
+        self._question.setText(f"{self._question_text} {task}")
         if readiness is not None:
             self._button.setText(readiness.button)
         self._found.setVisible(not self.is_busy)  # the progress bar says more
@@ -207,10 +214,11 @@ class EvaluationPage(QWidget):
             return Finding("", Health.LIMITED, found, tr("only one can run at a time"))
         if self._is_done:
             return Finding("", Health.GOOD, tr("Done"))
-        finding = self._readiness.finding if self._readiness else None
-        if finding is None or not self._is_cancelled:
-            return finding
-        if finding.health is Health.GOOD:  # ready for a start from the beginning
+        readiness = self._readiness
+        if readiness is None or not self._is_cancelled:
+            return readiness.finding if readiness is not None else None
+        finding = readiness.finding
+        if finding.health is Health.GOOD and not readiness.is_done:  # ready for a new start
             return replace(finding, found=tr("Cancelled; the next run starts from the beginning"))
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
@@ -222,10 +230,7 @@ class EvaluationPage(QWidget):
         note.linkActivated.connect(self.manual_wanted)
         note.setVisible(bool(spec.note))
         vbox(
-            paragraph(
-                "question",
-                tr("{} Check the entries, then start at the lower right.").format(spec.question),
-            ),
+            self._question,
             note,
             self.form,
             self._found,

@@ -59,6 +59,11 @@ class ResultsView(QWidget):
         self._path = with_name(ElidedLabel(), "resultsFolder")
         self._lay_out()
 
+    @property
+    def is_empty(self) -> bool:
+        """True if no result is shown."""
+        return self._stack.currentIndex() == 0
+
     def show_outcome(self, outcome: Outcome | None) -> None:
         """Show a result; None clears the view."""
         self._stack.setCurrentIndex(0 if outcome is None else 1)

@@ -159,6 +159,7 @@ class TrackDialog(PreparationDialog):
         self._task.setCurrentIndex(int(is_busy))
         self.form.setEnabled(not is_busy)
         self._start.setEnabled(not is_busy)
+        self._pose.setEnabled(is_busy)  # dimmed like the image: it is no longer so
         if is_busy:
             self._timer.start()
             return

@@ -221,6 +221,8 @@ class TrialsDialog(PreparationDialog):
     def _answer(self, move: int) -> None:
         if self._desk is not None and self._step is not None:
             if move == 0:
+                is_placed = not self._step.is_adjusting
+                self._bar.say(tr("Looking for the cube") if is_placed else tr("Storing the trial"))
                 self._step = None
                 self._refresh()
             self._desk.answers.put(move)
@@ -228,6 +230,7 @@ class TrialsDialog(PreparationDialog):
     def _show_step(self, step: _Step) -> None:
         if self._bar.is_busy:
             self._step = step
+            self._bar.wait_for_user()
             self._refresh()
 
     def _show_trials(self, trials: tuple[Trial, ...]) -> None:

@@ -32,6 +32,8 @@ class Readiness:
     button: str = tr("Run")
     is_complete: bool = True
     """False if an entry is missing, which is no problem yet."""
+    is_done: bool = False
+    """True if a run would only show what is stored."""
 
     @property
     def can_run(self) -> bool:
@@ -87,9 +89,8 @@ class StudyEvaluation:
         folder = output_folder(entries.output)
         share = share_done(self.study(entries), folder)
         if share == 1.0:
-            return Readiness(
-                _note(tr("{} contains the complete study").format(folder)), tr("Show results")
-            )
+            found = tr("{} contains the complete study").format(folder)
+            return Readiness(Finding("", Health.GOOD, found), tr("Show results"), is_done=True)
         require_writable(folder)
         if share:
             advice = tr("completed trials are kept")

@@ -2,12 +2,15 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
+from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.widgets.record_table import RecordColumn, RecordTable
 from handcal_gui.widgets.record_tabs import RecordTabs
+from tests.gui.helpers import show
 
 COLUMNS = (RecordColumn("No.", "Number"), RecordColumn("What", "Anything", is_number=False))
 
@@ -31,6 +34,15 @@ def test_numbers_stand_on_the_right(table: RecordTable) -> None:
     assert number.data(role) & Qt.AlignmentFlag.AlignRight
     assert what.data(role) & Qt.AlignmentFlag.AlignLeft
     assert number.data(Qt.ItemDataRole.ToolTipRole) == "Number"
+
+
+def test_columns_of_wide_cells_are_apart(qtbot: QtBot) -> None:
+    columns = (RecordColumn("Error", "In arcminutes"), RecordColumn("Time", "Of the recording"))
+    table = show(qtbot, RecordTable("things", "Things", columns, "None"), 300, 200)
+    table.show_rows({1: ("20.7", "08:19:27"), 2: ("1234.7", "08:19:29")})
+    for column, widest in enumerate(("1234.7", "08:19:27")):
+        text_px = QFontMetrics(number_font()).horizontalAdvance(widest)
+        assert table.columnWidth(column) >= text_px + 1.5 * SPACING_PX
 
 
 def test_del_asks_for_the_chosen_thing_by_its_number(qtbot: QtBot, table: RecordTable) -> None:
@@ -91,8 +103,7 @@ def test_columns_that_do_not_fit_are_in_the_tooltip_of_the_row(qtbot: QtBot) -> 
         RecordColumn("Name", "Its name", is_number=False, rank=1),
     )
     table = RecordTable("things", "Things", columns, "Things appear here")
-    qtbot.addWidget(table)
-    table.show()
+    show(qtbot, table, 400, 200)  # all columns fit
     table.show_rows({7: ("7", "1.25", "a name of some length")})
     no, size, name = (table.columnWidth(column) for column in range(3))
     for width, hidden in (

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from handcal.register.verdict import Advice
+from handcal.session.journal import Event
+from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
@@ -210,6 +212,28 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
     back = {eye: np.array([0.009, 0.0, 0.0]) for eye in EYES}
     gone_back = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=back)
     assert "different φ" in wizard.view(gone_back).fact
+    fine_tuned, went_back = SessionEvent.FINE_TUNED, WENT_BACK
+    zero = {eye: np.zeros(3) for eye in EYES}
+    for names, drawn_m, former_m, said in (
+        ([fine_tuned], back, zero, "a fine-tuned one. Reset φ in Fine-tune to return."),
+        ([went_back, fine_tuned], back, rendered, "an earlier one. Press G to return."),
+        ([went_back, fine_tuned], zero, rendered, "the offline calibration's. Press G to return."),
+        (
+            [went_back, fine_tuned],
+            zero,
+            back,
+            "the offline calibration's. Reset φ in Fine-tune to return.",
+        ),
+        ([went_back, fine_tuned, fine_tuned], back, zero, "a fine-tuned one. Reset φ in"),
+    ):
+        events = (*done.record.events, *(Event(99, "", name, {}) for name in names))
+        shifts_m = {"applied_shift_m": drawn_m, "former_shift_m": former_m}
+        seen = planned_snapshot(snapshot, StepName.DONE, **shifts_m)
+        seen = replace(seen, record=replace(seen.record, events=events))
+        assert said in wizard.view(seen).fact
+        wizard.move(Action.NEXT, seen)
+        assert said in wizard.view(seen).fact, "at the last step, too"
+        wizard = begun(snapshot)
 
 
 def test_changed_alignments_can_be_solved_again(snapshot: Maker) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -335,6 +335,33 @@ def test_plot_table_and_text_have_one_statistic(
     assert row[:3] == ["2", f"{np.mean(near):.1f}", f"{sd:.1f}"]
     [ticks] = plot.item.getAxis("bottom")._tickLevels
     assert [name for _, name in ticks] == ["0.4 (n = 2)", "0.5 (n = 0)", "0.6 (n = 1)"]
+
+
+def test_the_plot_shows_whole_marks_and_bars(
+    panel: TrialsPanel, record: SessionRecord, rig: Rig
+) -> None:
+    with Session(record.path) as session:
+        shifts_m: dict[Eye, float] = {"left": 5e-3, "right": 0.0}
+        for eye, shift_m in shifts_m.items():
+            trial = make_trial(rig.eyes[eye], eye, 0.4, np.zeros(3), [shift_m, 0, 0])
+            session.save_trial(trial)
+    panel.resize(384, 300)
+    panel.show_record(Session.open(record.path))
+    child(panel, QTabWidget).setCurrentIndex(2)
+    QApplication.processEvents()
+    plot = child(panel, TrialPlot).item
+    drawn = {line.name(): line for line in plot.listDataItems()}
+    _, up = drawn["Mean ± SD"].getData()
+    _, (bottom, top) = plot.vb.viewRange()
+    assert bottom < np.nanmin(up) < 0.0 < np.nanmax(up) < top, "the bar of one SD"
+    shown = plot.vb.mapRectToScene(plot.vb.boundingRect())
+    for name in ("Left eye", "Right eye"):
+        line = drawn[name]
+        at_m, errors = (values[~np.isnan(values)] for values in line.getData())
+        spot = plot.vb.mapViewToScene(QPointF(at_m[0], errors[0]))
+        half_px = line.opts["symbolSize"] / 2
+        mark = QRectF(spot.x() - half_px, spot.y() - half_px, 2 * half_px, 2 * half_px)
+        assert shown.contains(mark), name
 
 
 def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: SessionRecord) -> None:

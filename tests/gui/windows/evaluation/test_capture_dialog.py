@@ -136,12 +136,16 @@ def test_captures_are_taken_one_after_the_other(
 ) -> None:
     technician = make(entries)
     folder = Path(entries.captures)
-    assert technician.said == "Choose the camera, and press Show."
+    technician.wait_for_instruction("Choose the camera, and press Show.")
+    assert technician.said == "", "an instruction is no warning"
+    sentence = technician.dialog.findChild(QLabel, "instruction")
+    assert isinstance(sentence, QLabel)
+    assert sentence.geometry().bottom() < technician.dialog.form.geometry().top()
     assert (technician.start_button.isVisible(), technician.button.isVisible()) == (True, False)
     technician.wait(technician.start_button.isEnabled)
     technician.press_space()
     technician.wait(technician.button.isVisible)
-    assert technician.said == "Press Take once the image shows this."
+    assert technician.said == ""
     assert technician.told == "centre: show the grid on the display, darken the room."
     technician.press_space()
     technician.wait_for_instruction("centre/pose-1: switch the display off.")
@@ -207,6 +211,7 @@ def test_the_plan_can_be_changed_and_is_remembered(
     make: Callable[[CubeEntries], Technician], entries: CubeEntries
 ) -> None:
     technician = make(entries)
+    technician.start()
     technician.wait_for_instruction("centre: show the grid on the display, darken the room.")
     technician.dialog.form.enter(positions="up,  down", poses=2, drawn="old, new", with_grid=False)
     technician.wait_for_instruction("up/pose-1: switch the display off.")
@@ -225,6 +230,8 @@ def test_without_the_cube_none_can_be_taken(
 ) -> None:
     technician = make(replace(entries, cube="nowhere/other.json"))
     technician.wait(lambda: "There is no nowhere/other.json: choose" in technician.said)
+    where = "Close this window to choose the files of the cube and the rig."
+    assert technician.said.endswith(where)
     assert not technician.start_button.isEnabled()
     assert not technician.told
 
@@ -269,7 +276,8 @@ def test_missing_intrinsics_are_named_with_what_to_do(
     technician = make(entries)
     file = Path(entries.captures, "camera.json")
     told = f"there is no {file}: choose the file of the camera's intrinsics."
-    technician.wait(lambda: technician.axes.text() == f"Along the camera's axes; {told}")
+    where = "Close this window to choose the file under Camera intrinsics."
+    technician.wait(lambda: technician.axes.text() == f"Along the camera's axes; {told} {where}")
 
 
 def test_stored_images_which_do_not_wait_are_not_taken_by_themselves(

@@ -93,7 +93,10 @@ def student(qtbot: QtBot, numbers: Any, entries: NoiseStudySettings) -> Iterator
 def test_a_study_runs_to_its_end(
     student: Student, entries: NoiseStudySettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    question = student.child(QLabel, "question")
+    assert question.text().endswith(" Check the entries, then start at the lower right.")
     student.press("Run")
+    assert question.text().endswith(" If it is cancelled, its finished parts are kept.")
     student.wait_for_text("Done")
     assert student.child(QLabel, "lead").text() == "Squares grow."
     choice = student.child(QComboBox, "figures")
@@ -108,7 +111,22 @@ def test_a_study_runs_to_its_end(
     folder = Path(entries.output)
     assert opened == [folder / "report.pdf", folder / "report.html", folder]
     assert all(path.exists() for path in opened)
-    student.wait_for_button("Show results")
+    student.wait(lambda: student.button.text() == "Show results")
+    assert not student.button.isEnabled(), "they are shown"
+    assert question.text().endswith(" Change the entries for another study.")
+
+
+def test_a_complete_study_is_good_news(
+    numbers: Any, student: Student, entries: NoiseStudySettings
+) -> None:
+    run_study(numbers.work.study(entries), Path(entries.output), workers=1)
+    student.window.show_page("methods")
+    student.window.show_page("noise")
+    student.wait_for_text("contains the complete study")
+    assert student.child(QLabel, "readinessHealth").accessibleName() == "Good"
+    student.press("Show results")
+    student.wait_for_text("Done")
+    assert student.child(QLabel, "lead").isVisible()
 
 
 def test_a_study_is_cancelled_and_goes_on(numbers: Any, student: Student) -> None:

@@ -92,7 +92,7 @@ def test_a_result_stays_until_it_is_made_again_with_what_was_prepared(
     lead = child(window, QLabel, "lead")
     qtbot.waitUntil(run.isEnabled)
     run.click()
-    qtbot.waitUntil(lambda: found.text() == "Done." and run.isEnabled())
+    qtbot.waitUntil(lambda: found.text() == "Done." and run.text() == "Show results")
     open_dialog(window).accept()
     qtbot.waitUntil(lambda: "contains the complete study" in found.text())
     assert (lead.text(), lead.isVisible()) == ("Squares grow.", True)

@@ -51,6 +51,13 @@ def finding(dialog: TrackDialog) -> str:
     return found.text()
 
 
+def darkest(table: QTableWidget) -> int:
+    """Return the lightness of the darkest pixel of a table's cells, on a light ground."""
+    picture = table.viewport().grab().toImage()
+    places = ((x, y) for y in range(picture.height()) for x in range(picture.width()))
+    return min(picture.pixelColor(*place).lightness() for place in places)
+
+
 def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, make: Make) -> None:
     sights: list[CubeSight] = []
 
@@ -86,8 +93,10 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     doing = dialog.findChild(QLabel, "doing")
     assert isinstance(doing, QLabel)
     assert doing.text() == "Tracking…"
+    tracked_ink = darkest(table)
     stop.click()
     qtbot.waitUntil(start.isEnabled, timeout=60_000)
+    assert darkest(table) > tracked_ink + 60, "the last pose is dimmed like the image"
     assert view.message == "Stopped"
     assert finding(dialog) == "The cube is not tracked."
     sight = next(one for one in sights if one.T_D_T is not None and one.tracked is not None)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QWidget
+from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.display import eye_projection
@@ -89,12 +89,16 @@ def test_the_study_leader_places_the_cube_and_moves_the_drawing(
     held = "The session of Simulated wearer holds 6 trials; new ones are added."
     assert part(dialog, QLabel, "trialsFound").text() == held
     instruction, follow = part(dialog, QLabel, "instruction"), part(dialog, QPushButton, "next")
-    right = part(dialog, QPushButton, "right")
+    right, doing = part(dialog, QPushButton, "right"), part(dialog, QLabel, "doing")
     part(dialog, QPushButton, "start").click()
     qtbot.waitUntil(lambda: instruction.text().startswith("Put the cube 0.5 m"), timeout=20_000)
     assert not right.isEnabled()
+    assert doing.text() == "Waiting for you…", "not for the headset"
+    assert part(dialog, QProgressBar, "progress").maximum() > 0, "nothing moves"
     follow.click()
+    assert doing.text() == "Looking for the cube…"
     qtbot.waitUntil(lambda: instruction.text().startswith("Left eye: move"), timeout=20_000)
+    assert doing.text() == "Waiting for you…"
     right.click()
     QTest.keyClick(dialog, Qt.Key.Key_Right)
     part(dialog, QPushButton, "up").click()
