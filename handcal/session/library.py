@@ -42,7 +42,7 @@ class EyeOutcome:
     """Error that is expected without the calibration."""
     expected_arcmin: float | None
     """Error with the calibrated φ: an eye that keeps the offline calibration has that before."""
-    measured_arcmin: float | None
+    remaining_arcmin: float | None
     """Error after the wearer's verification; None if the calibrated φ was not verified."""
     found_arcmin: float | None = None
     """Error that the verification found, and corrected."""

@@ -51,7 +51,7 @@ def picture_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
 
 
 def _after(one: EyeOutcome) -> float | None:
-    return one.expected_arcmin if one.measured_arcmin is None else one.measured_arcmin
+    return one.expected_arcmin if one.remaining_arcmin is None else one.remaining_arcmin
 
 
 def _arcmin(error: float | None) -> str:

@@ -61,9 +61,9 @@ def test_an_entry_says_what_the_session_holds(make: Callable[..., Path], tmp_pat
     assert entry.rig == example_rig().name
     assert (entry.alignments, entry.trials, entry.is_finished) == (1, 2, True)
     left, right = entry.eyes["left"], entry.eyes["right"]
-    assert (left.verdict, left.expected_arcmin, left.measured_arcmin) == ("accept", 7.5, 4.5)
+    assert (left.verdict, left.expected_arcmin, left.remaining_arcmin) == ("accept", 7.5, 4.5)
     assert left.found_arcmin == 11.0
-    assert (right.verdict, right.expected_arcmin, right.measured_arcmin) == ("repeat", 16.0, None)
+    assert (right.verdict, right.expected_arcmin, right.remaining_arcmin) == ("repeat", 16.0, None)
     trials = Session.open(path).trials.values()
     means = [trial.error_arcmin.mean() for trial in trials]
     assert entry.trials_arcmin == pytest.approx(np.mean(means))
@@ -79,7 +79,7 @@ def test_an_eye_that_keeps_the_offline_calibration_has_its_error(
         session.save_results({"eyes": {"right": {"verdict": "keep", **kept}}})
     (entry,) = read_library(tmp_path)
     right = entry.eyes["right"]
-    assert (right.before_arcmin, right.expected_arcmin, right.measured_arcmin) == (6.2, 6.2, None)
+    assert (right.before_arcmin, right.expected_arcmin, right.remaining_arcmin) == (6.2, 6.2, None)
 
 
 def test_results_that_no_longer_hold_are_not_shown(
@@ -123,7 +123,7 @@ def test_strange_results_are_no_obstacle(
         session.save_results({"eyes": eyes})
     (entry,) = read_library(tmp_path)
     for outcome in entry.eyes.values():
-        assert outcome.measured_arcmin is None
+        assert outcome.remaining_arcmin is None
         assert outcome.expected_arcmin is None
 
 

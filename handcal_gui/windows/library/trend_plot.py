@@ -50,7 +50,7 @@ class TrendPlot(Plot):
         numbers, largest = np.arange(1.0, len(entries) + 1.0), 1.0
         for eye in EYES:
             outcomes = [entry.eyes.get(eye) for entry in entries]
-            measured = [None if one is None else one.measured_arcmin for one in outcomes]
+            measured = [None if one is None else one.remaining_arcmin for one in outcomes]
             expected = [None if one is None else one.expected_arcmin for one in outcomes]
             for line, errors in ((self._measured, measured), (self._expected, expected)):
                 known = [np.nan if error is None else error for error in errors]
