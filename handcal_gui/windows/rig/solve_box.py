@@ -61,6 +61,11 @@ class SolveBox(QWidget):
         vbox(self._verdict, self._worst, on=self, margins=0, spacing=SPACING_PX // 2)
         self.show_origin(None)
 
+    @property
+    def failure(self) -> str:
+        """What is shown about a step that failed or is bad; empty otherwise."""
+        return self._shown.found if self._shown.health is Health.BROKEN else ""
+
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
         """Solve in a job and pass the result to `then`."""
 
@@ -73,15 +78,15 @@ class SolveBox(QWidget):
 
     def show_origin(self, origin: Origin | None, outdated: str = "") -> None:
         """Show an earlier result, or that it is outdated; None if there is none."""
-        self._clear()
         if origin is None or outdated:
             text = outdated or tr("Not solved yet")
             self.show_finding(Finding("", Health.LIMITED, text))
-            return
-        text = tr("Solved {}: {}; {}; RMS {:.3f} px").format(
-            local_time(origin.made), origin.verdict, origin.reason, origin.rms_px
-        )
-        self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
+        else:
+            text = tr("Solved {}: {}; {}; RMS {:.3f} px").format(
+                local_time(origin.made), origin.verdict, origin.reason, origin.rms_px
+            )
+            self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
+        self._clear()
 
     def show_finding(self, finding: Finding) -> None:
         """Show a message about the result, followed by what is needed to solve."""
@@ -114,8 +119,8 @@ class SolveBox(QWidget):
         self.shown.emit()
 
     def _show_failure(self, why: str) -> None:
-        self._clear()
         self.show_finding(Finding("", Health.BROKEN, why))
+        self._clear()
 
     def _clear(self) -> None:
         self._worst.hide()
