@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRect, QSize, Qt
-from PySide6.QtGui import QIcon, QPixmap
+from PySide6.QtGui import QIcon, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QHeaderView,
     QStyledItemDelegate,
@@ -18,8 +19,11 @@ from PySide6.QtWidgets import (
 from handcal.rig.report import RigFinding
 from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.translation import tr
+from handcal_gui.widgets.times import local_time
 
 _FOUND, _EXPECTED = 1, 2
+_TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(\+\d\d:\d\d|Z)?")
+"""ISO 8601."""
 
 
 class FindingList(QTreeWidget):
@@ -42,8 +46,9 @@ class FindingList(QTreeWidget):
         self.setHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
         flat_header(self.header())
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.header().setSectionResizeMode(_FOUND, QHeaderView.ResizeMode.Stretch)
+        self.header().setSectionResizeMode(_EXPECTED, QHeaderView.ResizeMode.Fixed)
         for column in (_FOUND, _EXPECTED):
-            self.header().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
             self.setItemDelegateForColumn(column, _Wrapped(self))
         self.header().setStretchLastSection(False)
         self.header().sectionResized.connect(self.scheduleDelayedItemsLayout)
@@ -63,7 +68,8 @@ class FindingList(QTreeWidget):
         blank.fill(Qt.GlobalColor.transparent)
         for one in self._findings:
             expected = "" if one.is_fine else one.expected
-            item = QTreeWidgetItem([one.what, one.found, expected])
+            found = _TIME.sub(lambda time: local_time(time[0]), one.found)
+            item = QTreeWidgetItem([one.what, found, expected])
             judged = (doubtful, tr("Doubtful")), (good, tr("Good"))
             sign, word = judged[one.is_fine] if one.is_judged else (QIcon(blank), "")
             if not one.is_known:
@@ -74,6 +80,20 @@ class FindingList(QTreeWidget):
             item.setData(0, Qt.ItemDataRole.AccessibleDescriptionRole, word)
             self.addTopLevelItem(item)
         self.setColumnHidden(_EXPECTED, all(one.is_fine for one in self._findings))
+        self._fit_columns()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave to what was found the width that what was expected does not need."""
+        super().resizeEvent(event)
+        self._fit_columns()
+
+    def _fit_columns(self) -> None:
+        texts = (one.expected for one in self._findings if not one.is_fine)
+        needed_px = max(map(self.fontMetrics().horizontalAdvance, texts), default=0)
+        least_px = self.header().sectionSizeHint(_EXPECTED)
+        most_px = max(least_px, self.viewport().width() // 4)
+        width_px = min(max(least_px, needed_px + 2 * SPACING_PX), most_px)
+        self.header().resizeSection(_EXPECTED, width_px)
 
 
 class _Wrapped(QStyledItemDelegate):

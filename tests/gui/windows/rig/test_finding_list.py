@@ -7,6 +7,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.rig.report import RigFinding
 from handcal.rig.verdict import CalibrationVerdict
+from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.finding_list import FindingList
 from handcal_gui.windows.rig.solve import SolvedPart
 from handcal_gui.windows.rig.solve_box import SolveBox
@@ -31,6 +32,24 @@ def test_no_column_is_empty(qtbot: QtBot) -> None:
     assert findings.isColumnHidden(2)
     findings.show_findings([RigFinding("Distance", "30 m", False, "0.3 to 10 m")])
     assert not findings.isColumnHidden(2)
+
+
+def test_what_is_found_has_the_width_that_what_is_expected_does_not_need(qtbot: QtBot) -> None:
+    findings = show(qtbot, FindingList("Check of the rig"), 740, 300)  # as in one of 960x540
+    findings.show_findings([RigFinding("Calibration of the left display", LONG, False, "good")])
+    QApplication.processEvents()
+    found_px, expected_px = findings.columnWidth(1), findings.columnWidth(2)
+    assert expected_px < 100 < 350 < found_px
+    assert sum(findings.columnWidth(column) for column in range(3)) <= findings.viewport().width()
+
+
+def test_times_are_shown_as_everywhere(qtbot: QtBot) -> None:
+    findings = show(qtbot, FindingList("Check of the rig"), 700, 300)
+    findings.show_findings([RigFinding("Depth check", "+0.1 mm (9 views, 2026-11-26T08:29:24Z)")])
+    row = findings.topLevelItem(0)
+    assert row is not None
+    assert row.text(1) == f"+0.1 mm (9 views, {local_time('2026-11-26T08:29:24Z')})"
+    assert "T08" not in row.text(1)
 
 
 def test_the_lenses_compared_are_whole_beside_the_numbers(qtbot: QtBot) -> None:
