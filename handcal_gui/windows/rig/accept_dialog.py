@@ -158,7 +158,17 @@ class AcceptDialog(QDialog):
                 self._found.show_finding(Finding("", Health.BROKEN, str(error)))
                 return
             folders = {tr("Viewpoint camera"): self._folder / eye / "grid"}
-        dialog = TakeDialog(folders, board, choose, project.realsense, self, project.inputs.sources)
+        count = self._count(eye, "grid" if what == "grid" else "viewpoint")
+        dialog = TakeDialog(
+            folders,
+            board,
+            choose,
+            project.realsense,
+            self,
+            project.inputs.sources,
+            1 if what == "grid" else FEWEST_VIEWS,
+            count * [()],
+        )
         dialog.remembered.connect(project.remember_sources)
         dialog.finished.connect(self._show_state)
         dialog.finished.connect(self._refresh)

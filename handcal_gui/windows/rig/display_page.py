@@ -250,6 +250,7 @@ class DisplayPage(StepPage):
             self._grid,
             lambda: self.form.enter(grid_images=str(folder)),
             ALIKE,
+            asked=3,
         )
 
     def _take_board(self) -> None:
@@ -259,4 +260,5 @@ class DisplayPage(StepPage):
             self.project.inputs.board,
             self._board,
             lambda: self.form.enter(board_images=str(folder)),
+            asked=8,
         )
