@@ -21,7 +21,7 @@ from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, ico
 from handcal_gui.translation import tr
 from handcal_gui.widgets.times import local_time
 
-_FOUND, _EXPECTED = 1, 2
+_ITEM, _FOUND, _EXPECTED = range(3)
 _TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(\+\d\d:\d\d|Z)?")
 """ISO 8601."""
 
@@ -45,10 +45,9 @@ class FindingList(QTreeWidget):
         self.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self.setHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
         flat_header(self.header())
-        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.header().setSectionResizeMode(_FOUND, QHeaderView.ResizeMode.Stretch)
-        self.header().setSectionResizeMode(_EXPECTED, QHeaderView.ResizeMode.Fixed)
-        for column in (_FOUND, _EXPECTED):
+        for column in (_ITEM, _FOUND, _EXPECTED):
             self.setItemDelegateForColumn(column, _Wrapped(self))
         self.header().setStretchLastSection(False)
         self.header().sectionResized.connect(self.scheduleDelayedItemsLayout)
@@ -83,17 +82,19 @@ class FindingList(QTreeWidget):
         self._fit_columns()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Leave to what was found the width that what was expected does not need."""
+        """Leave to what was found the width that the other columns do not need."""
         super().resizeEvent(event)
         self._fit_columns()
 
     def _fit_columns(self) -> None:
-        texts = (one.expected for one in self._findings if not one.is_fine)
-        needed_px = max(map(self.fontMetrics().horizontalAdvance, texts), default=0)
-        least_px = self.header().sectionSizeHint(_EXPECTED)
-        most_px = max(least_px, self.viewport().width() // 4)
-        width_px = min(max(least_px, needed_px + 2 * SPACING_PX), most_px)
-        self.header().resizeSection(_EXPECTED, width_px)
+        doubtful = [one.expected for one in self._findings if not one.is_fine]
+        for column, texts in (_ITEM, [one.what for one in self._findings]), (_EXPECTED, doubtful):
+            longest_px = max(map(self.fontMetrics().horizontalAdvance, texts), default=0)
+            icon_px = self.iconSize().width() * (column == _ITEM)
+            needed_px = min(longest_px + icon_px + 2 * SPACING_PX, self.viewport().width() // 4)
+            self.header().resizeSection(
+                column, max(needed_px, self.header().sectionSizeHint(column))
+            )
 
 
 class _Wrapped(QStyledItemDelegate):
