@@ -14,14 +14,14 @@ from handcal.rig_types import Origin
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import main_button, paragraph
+from handcal_gui.widgets.fields import main_button
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.times import local_time
-from handcal_gui.windows.rig.rows import COLUMNS
+from handcal_gui.windows.rig.rows import COLUMNS, LENS_COLUMNS
 from handcal_gui.windows.rig.solve import SolvedPart
 
 HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Health.BROKEN}
@@ -36,7 +36,7 @@ class SolveBox(QWidget):
         The Solve button, placed and connected by the page.
     bar : JobBar
     numbers : QWidget
-        The table and the lens models compared, placed by the page.
+        The tables of the numbers and of the lens models compared, placed by the page.
     table : NumberTable
     shown : Signal()
         Another result is shown, or none.
@@ -52,10 +52,10 @@ class SolveBox(QWidget):
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
-        self._lenses = paragraph("lenses")
+        self._lenses = NumberTable("lenses", tr("Lens models compared"))
         self.table = NumberTable("numbers", tr("Numbers"))
         self.numbers = QWidget()
-        vbox((self.table, 1), self._lenses, on=self.numbers, spacing=SPACING_PX)
+        hbox((self.table, 2), (self._lenses, 3), on=self.numbers, spacing=SPACING_PX)
         self._shown = Finding("", Health.LIMITED, tr("Not solved yet"))
         self._need = ""
         vbox(self._verdict, self._worst, on=self, margins=0, spacing=SPACING_PX // 2)
@@ -113,7 +113,7 @@ class SolveBox(QWidget):
                 solved.worst.name, solved.worst.rms_px, solved.worst.why
             )
             self._worst.show_finding(Finding("", Health.LIMITED, worst))
-        self._lenses.setText(f"{sentence(solved.lenses)}.")
+        self._lenses.show_rows(LENS_COLUMNS, solved.lenses)
         self._lenses.setVisible(bool(solved.lenses))
         self.table.show_rows(COLUMNS, solved.rows)
         self.shown.emit()
