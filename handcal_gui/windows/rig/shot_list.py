@@ -212,7 +212,7 @@ class _Rows(QStyledItemDelegate):
 
 
 def _note_of(index: QModelIndex | QPersistentModelIndex) -> str:
-    return str(index.siblingAtColumn(_IMAGE).data()).partition("\n")[2]
+    return str(index.sibling(index.row(), _IMAGE).data()).partition("\n")[2]
 
 
 def _note_px(shown: ShotList, index: QModelIndex | QPersistentModelIndex) -> int:

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QLabel,
+    QStyledItemDelegate,
     QStyleOptionViewItem,
     QTreeWidget,
     QTreeWidgetItem,
@@ -156,7 +157,9 @@ def test_a_box_without_tick_is_seen_in_the_dark(qtbot: QtBot, full: ImagesPanel)
 def test_the_sign_of_a_problem_is_as_large_as_elsewhere(qtbot: QtBot, full: ImagesPanel) -> None:
     shots = child(full, ShotList)
     option = QStyleOptionViewItem()
-    shots.itemDelegate().initStyleOption(option, shots.model().index(8, 1))
+    delegate = shots.itemDelegate()
+    assert isinstance(delegate, QStyledItemDelegate)
+    delegate.initStyleOption(option, shots.model().index(8, 1))
     assert option.decorationSize == QSize(16, 16)
 
 

@@ -112,7 +112,8 @@ def test_what_cannot_be_solved_is_reported(qtbot: QtBot, wizard: RigWizard) -> N
 
 def test_a_failed_step_is_crossed_in_the_rail(qtbot: QtBot, wizard: RigWizard) -> None:
     def sign() -> QImage:
-        return child(wizard, QListWidget, "rigRail").item(STEREO).icon().pixmap(16).toImage()
+        rail: QListWidget = child(wizard, QListWidget, "rigRail")
+        return rail.item(STEREO).icon().pixmap(16).toImage()
 
     undone, entries = sign(), wizard.project.inputs.stereo
     wizard.show_step(STEREO)
