@@ -169,6 +169,11 @@ class StepPage(QWidget):
         self.solved_with = self.inputs
         self.solve()
 
+    def show_if_changed(self) -> None:
+        """Show no result of inputs that were changed while it was solved."""
+        if self.inputs != self.solved_with:
+            self.show_known()
+
     def _follow(self) -> None:
         """Show no longer a result or a failure of other inputs."""
         if (now := self.project.inputs_of(self.step)) != self.inputs:
