@@ -159,11 +159,12 @@ _BOXES = (
     "QPlainTextEdit",
     "QRadioButton",
     "QTableView",
+    "QTreeView",
     "Card",
     "VerdictCard",
 )
 """Widgets whose edges must be visible in the dark theme, too."""
-_ITEMS = "QListWidget", "QTableView"
+_ITEMS = "QListWidget", "QTableView", "QTreeView"
 """Of these, those whose selection looks the same with the focus and without it."""
 
 

@@ -39,6 +39,14 @@ LIMIT_ARCMIN = 5.0
 LARGEST_SHIFT_M = 0.015
 LARGEST_MOVE_M = 0.001
 """Largest accepted shift of the depth camera, beyond twice its standard deviation."""
+_DIRECTIONS = (
+    ("to the left", "to the right"),
+    ("upwards", "downwards"),
+    ("backwards", "forwards"),
+)
+"""Against and along each of H's axes: x right, y down, z forward, as the wearer looks."""
+_SHOWN_MM = 0.05
+"""Smaller shifts are 0.0 mm."""
 _LEAST_SPREAD = 1.2
 _EXPLAINED = 0.5
 _SAME_TURN = 0.35
@@ -105,9 +113,14 @@ class CameraMove:
     @property
     def words(self) -> str:
         """The move in words."""
-        x_mm, y_mm, z_mm = 1e3 * self.shift_m
+        mm = 1e3 * self.shift_m
+        parts = ", ".join(
+            f"{abs(one):.1f} mm {words[int(one > 0)]}"
+            for one, words in zip(mm, _DIRECTIONS, strict=True)
+            if abs(one) >= _SHOWN_MM
+        )
         return (
-            f"shifted by {x_mm:.1f} {y_mm:.1f} {z_mm:.1f} mm (± {1e3 * self.sigma_m:.1f} mm) and "
+            f"shifted by {parts or '0.0 mm'} (± {1e3 * self.sigma_m:.1f} mm) and "
             f"turned by {np.degrees(np.linalg.norm(self.turn_rad)):.2f}° (± "
             f"{np.degrees(self.sigma_rad):.2f}°)"
         )

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFontMetrics, QResizeEvent
+from PySide6.QtCore import QRect, Qt, Signal
+from PySide6.QtGui import QFontMetrics, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
@@ -76,6 +76,8 @@ class NumberTable(QTableWidget):
         self.setTabKeyNavigation(False)
         self.setWordWrap(False)
         self.setShowGrid(False)
+        self.setAlternatingRowColors(True)
+        self.setVerticalHeader(_Labels(self))
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.horizontalHeader().setSectionsClickable(False)
@@ -177,6 +179,18 @@ class NumberTable(QTableWidget):
             for item in (self.verticalHeaderItem(number), *items):
                 if item is not None:  # resized while the contents are replaced
                     item.setToolTip(tooltip)
+
+
+class _Labels(QHeaderView):
+    """Labels of rows, striped like the rows: a number may be far from its label."""
+
+    def __init__(self, table: NumberTable) -> None:
+        super().__init__(Qt.Orientation.Vertical, table)
+
+    def paintSection(self, painter: QPainter, rect: QRect, row: int) -> None:
+        if row % 2:
+            painter.fillRect(rect, self.palette().alternateBase())
+        super().paintSection(painter, rect, row)
 
 
 def rows_as_text(columns: Sequence[str], rows: Sequence[Row]) -> str:

@@ -6,7 +6,14 @@ import pytest
 
 from handcal.display import eye_projection, view_of_eye
 from handcal.geometry import invert, rigid
-from handcal.rig.accept import EyeAcceptance, accept_eye, camera_move, likely_cause, problem
+from handcal.rig.accept import (
+    CameraMove,
+    EyeAcceptance,
+    accept_eye,
+    camera_move,
+    likely_cause,
+    problem,
+)
 from handcal.rig.display import DisplayHomography
 from handcal.rig.example import example_rig
 from handcal.rig.viewpoint import TrackedView
@@ -91,6 +98,17 @@ def test_a_shift_of_the_depth_camera_is_found_by_tracked_boards() -> None:
     found = camera_move(replace(RIG, T_H_D=T_H_D), views, DEPTH_CAMERA)
     np.testing.assert_allclose(found.shift_m, shift_m, atol=0.0006)
     assert "the depth camera is shifted by" in likely_cause({}, (), found).words
+
+
+def test_a_shift_is_said_with_its_directions() -> None:
+    move = CameraMove(np.array([-0.01, 0.0, 0.002]), np.zeros(3), 0.0001, 0.0001)
+    words = "shifted by 10.0 mm to the left, 2.0 mm forwards (± 0.1 mm)"
+    assert move.words.startswith(words)
+    assert f"the depth camera is {words}" in move.problem
+    move = CameraMove(np.array([0.001, -0.003, -0.002]), np.zeros(3), 0.0001, 0.0001)
+    assert "1.0 mm to the right, 3.0 mm upwards, 2.0 mm backwards" in move.words
+    move = CameraMove(np.zeros(3), np.zeros(3), 0.0001, 0.0001)
+    assert move.words.startswith("shifted by 0.0 mm (± 0.1 mm)")
 
 
 def test_without_tracked_boards_a_small_rotation_may_be_a_shift() -> None:

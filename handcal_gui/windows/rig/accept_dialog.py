@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QDialog, QGridLayout, QLabel, QWidget
 
 from handcal.errors import HandcalError
@@ -73,8 +74,9 @@ class AcceptDialog(QDialog):
         self._page: Path | None = None
         self._counts = {eye: QLabel() for eye in EYES}
         self._found = FindingLine("accepted")
+        self._drawing = Drawing("docs/pictures/setup-accept.svg")
+        self._drawing.setMinimumHeight(10 * SPACING_PX)
         self._table = NumberTable("drawn-against-seen", tr("Drawn and seen corners"))
-        self._table.hide()
         self._bar = JobBar()
         self._run = main_button("runAcceptance", tr("Accept"))
         self._open = button("openPage", tr("Open &page"))
@@ -85,6 +87,7 @@ class AcceptDialog(QDialog):
         self._bar.failed.connect(
             lambda why: self._found.show_finding(Finding("", Health.BROKEN, why))
         )
+        self._bar.cancelled.connect(self._show_state)
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
         self._refresh()
@@ -108,6 +111,7 @@ class AcceptDialog(QDialog):
             write_rig(settings.rig, rig)
             return run_acceptance(settings, progress)
 
+        self._found.clear()
         self._bar.run(tr("Looking for grid and board"), work, self._show)
 
     def done(self, result: int) -> None:
@@ -154,7 +158,17 @@ class AcceptDialog(QDialog):
                 self._found.show_finding(Finding("", Health.BROKEN, str(error)))
                 return
             folders = {tr("Viewpoint camera"): self._folder / eye / "grid"}
-        dialog = TakeDialog(folders, board, choose, project.realsense, self, project.inputs.sources)
+        count = self._count(eye, "grid" if what == "grid" else "viewpoint")
+        dialog = TakeDialog(
+            folders,
+            board,
+            choose,
+            project.realsense,
+            self,
+            project.inputs.sources,
+            1 if what == "grid" else FEWEST_VIEWS,
+            count * [()],
+        )
         dialog.remembered.connect(project.remember_sources)
         dialog.finished.connect(self._show_state)
         dialog.finished.connect(self._refresh)
@@ -163,6 +177,12 @@ class AcceptDialog(QDialog):
     def _show_state(self) -> None:
         advice = self._need or tr("press Accept")
         self._found.show_finding(Finding("", Health.LIMITED, tr("not accepted yet"), advice))
+        self._show_numbers(False)
+
+    def _show_numbers(self, is_done: bool) -> None:
+        """Show the numbers, or before there are any the drawing: both have no room."""
+        self._table.setVisible(is_done)
+        self._drawing.setVisible(not is_done)
 
     def _grid_board(self, eye: Eye) -> Board:
         screen = screen_of(self._project.rig, eye)
@@ -177,7 +197,7 @@ class AcceptDialog(QDialog):
             for depth_m, *numbers in view_rows(one)
         ]
         self._table.show_rows(_COLUMNS, rows)
-        self._table.show()
+        self._show_numbers(True)
         if found.cause.words:
             text = tr("the rig fails: {}").format(found.cause.words)
             if found.cause.again:
@@ -224,12 +244,10 @@ class AcceptDialog(QDialog):
                 images.addWidget(take, row, column)
             images.addWidget(self._counts[eye], row, 3)
         images.setColumnStretch(3, 1)
-        drawing = Drawing("docs/pictures/setup-accept.svg")
-        drawing.setMinimumHeight(10 * SPACING_PX)
         foot = action_strip(self._run, self._close, self._open, bar=self._bar)
         vbox(
             paragraph("how", _HOW),
-            (drawing, 1),
+            (self._drawing, 1),
             images,
             self._found,
             (self._table, 1),
@@ -238,4 +256,5 @@ class AcceptDialog(QDialog):
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,
         )
-        self.resize(self.sizeHint() + QSize(0, 10 * SPACING_PX))
+        screen = QGuiApplication.primaryScreen().availableSize()
+        self.resize(self.sizeHint().boundedTo(screen - QSize(0, 6 * SPACING_PX)))

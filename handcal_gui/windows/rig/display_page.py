@@ -213,6 +213,7 @@ class DisplayPage(StepPage):
         self.box.show_solved(display, self.project.add_part(self._eye, display, self.solved_with))
         self._grid.show_solved(display)
         self._board.show_solved(place)
+        self.show_if_changed()
 
     def _shown(self) -> Grid | None:
         """Return the grid for the display; if it does not fit, show why and return None."""
@@ -250,6 +251,7 @@ class DisplayPage(StepPage):
             self._grid,
             lambda: self.form.enter(grid_images=str(folder)),
             ALIKE,
+            asked=3,
         )
 
     def _take_board(self) -> None:
@@ -259,4 +261,5 @@ class DisplayPage(StepPage):
             self.project.inputs.board,
             self._board,
             lambda: self.form.enter(board_images=str(folder)),
+            asked=8,
         )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRect, QSize, Qt
-from PySide6.QtGui import QIcon, QPixmap
+from PySide6.QtGui import QIcon, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QHeaderView,
     QStyledItemDelegate,
@@ -18,8 +19,11 @@ from PySide6.QtWidgets import (
 from handcal.rig.report import RigFinding
 from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.translation import tr
+from handcal_gui.widgets.times import local_time
 
-_FOUND, _EXPECTED = 1, 2
+_ITEM, _FOUND, _EXPECTED = range(3)
+_TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(\+\d\d:\d\d|Z)?")
+"""ISO 8601."""
 
 
 class FindingList(QTreeWidget):
@@ -41,9 +45,9 @@ class FindingList(QTreeWidget):
         self.setIconSize(QSize(2 * SPACING_PX, 2 * SPACING_PX))
         self.setHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
         flat_header(self.header())
-        self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        for column in (_FOUND, _EXPECTED):
-            self.header().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.header().setSectionResizeMode(_FOUND, QHeaderView.ResizeMode.Stretch)
+        for column in (_ITEM, _FOUND, _EXPECTED):
             self.setItemDelegateForColumn(column, _Wrapped(self))
         self.header().setStretchLastSection(False)
         self.header().sectionResized.connect(self.scheduleDelayedItemsLayout)
@@ -63,7 +67,8 @@ class FindingList(QTreeWidget):
         blank.fill(Qt.GlobalColor.transparent)
         for one in self._findings:
             expected = "" if one.is_fine else one.expected
-            item = QTreeWidgetItem([one.what, one.found, expected])
+            found = _TIME.sub(lambda time: local_time(time[0]), one.found)
+            item = QTreeWidgetItem([one.what, found, expected])
             judged = (doubtful, tr("Doubtful")), (good, tr("Good"))
             sign, word = judged[one.is_fine] if one.is_judged else (QIcon(blank), "")
             if not one.is_known:
@@ -74,6 +79,22 @@ class FindingList(QTreeWidget):
             item.setData(0, Qt.ItemDataRole.AccessibleDescriptionRole, word)
             self.addTopLevelItem(item)
         self.setColumnHidden(_EXPECTED, all(one.is_fine for one in self._findings))
+        self._fit_columns()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Leave to what was found the width that the other columns do not need."""
+        super().resizeEvent(event)
+        self._fit_columns()
+
+    def _fit_columns(self) -> None:
+        doubtful = [one.expected for one in self._findings if not one.is_fine]
+        for column, texts in (_ITEM, [one.what for one in self._findings]), (_EXPECTED, doubtful):
+            longest_px = max(map(self.fontMetrics().horizontalAdvance, texts), default=0)
+            icon_px = self.iconSize().width() * (column == _ITEM)
+            needed_px = min(longest_px + icon_px + 2 * SPACING_PX, self.viewport().width() // 4)
+            self.header().resizeSection(
+                column, max(needed_px, self.header().sectionSizeHint(column))
+            )
 
 
 class _Wrapped(QStyledItemDelegate):

@@ -9,7 +9,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
 
-_LENSES: dict[LensChoice, str] = {
+LENSES: dict[LensChoice, str] = {
     "auto": tr("The one that fits best"),
     "none": tr("No distortion"),
     "radial": "k1, k2",
@@ -28,4 +28,4 @@ def intrinsics_field(name: str) -> PathField:
 
 def lens_field() -> QComboBox:
     """Return a choice of lens models."""
-    return choice("lens", tr("Lens"), _LENSES, tr("Distortion coefficients to solve for."))
+    return choice("lens", tr("Lens"), LENSES, tr("Distortion coefficients to solve for."))

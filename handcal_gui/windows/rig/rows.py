@@ -17,9 +17,11 @@ from handcal.types import EYES, Eye, Float64
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.number_table import Row
+from handcal_gui.windows.rig.lens_fields import LENSES
 
 COLUMNS = (tr("Value"), "± σ")
-_LENSES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+LENS_COLUMNS = (tr("Images left out, px"), tr("Edge, px"))
+_COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _INTRINSICS = {
     "fx": tr("Focal length fx"),
     "fy": tr("Focal length fy"),
@@ -61,7 +63,7 @@ def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
             5,
             tr("Distortion coefficient of OpenCV's model."),
         )
-        for name, value, sigma in zip(_LENSES, solved.distortion, sigmas[4:], strict=False)
+        for name, value, sigma in zip(_COEFFICIENTS, solved.distortion, sigmas[4:], strict=False)
     ]
     rows.append(
         Row(
@@ -71,6 +73,21 @@ def camera_rows(result: CameraCalibration) -> tuple[Row, ...]:
         )
     )
     return (_rms(result.rms_px), *rows)
+
+
+def lens_rows(result: CameraCalibration, camera: str = "") -> tuple[Row, ...]:
+    """Return the lens models compared; `camera` names the camera, if there are two."""
+    tooltip = tr(
+        "Images left out: RMS error on images that were not used to solve. Edge: standard "
+        "deviation of a pixel at the edge of the image. The one chosen is ticked."
+    )
+    rows = []
+    for one in result.compared:
+        label = f"{camera}: {LENSES[one.lens]}" if camera else LENSES[one.lens]
+        tick = " ✓" if one.lens == result.lens else ""
+        edge = f"± {one.edge_px:.2f}" if np.isfinite(one.edge_px) else UNKNOWN
+        rows.append(Row(f"{label}{tick}", (f"{one.held_out_px:.3f}", edge), tooltip))
+    return tuple(rows)
 
 
 def stereo_rows(result: StereoCalibration) -> tuple[Row, ...]:

@@ -5,9 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QIcon, QImage, QPixmap
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTreeWidget, QTreeWidgetItem, QWidget
+from PySide6.QtCore import (
+    QAbstractItemModel,
+    QEvent,
+    QModelIndex,
+    QPersistentModelIndex,
+    QRect,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QIcon, QImage, QPainter, QPalette, QPixmap
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 
 from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX, flat_header, follow_theme, icon, number_font
@@ -27,6 +44,11 @@ _COLUMNS = {
 _IMAGE, _CORNERS, _OFF, _TILT = range(4)
 _NAME, _PROBLEM = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
 _SMALL = QSize(6 * SPACING_PX, 4 * SPACING_PX)
+_SIGN = QSize(2 * SPACING_PX, 2 * SPACING_PX)
+_MARGIN_PX = SPACING_PX // 2
+_NARROW_PX = 40 * SPACING_PX
+"""Width of the list below which the thumbnails leave their room to the image beside it."""
+_WRAPS = Qt.TextFlag.TextWordWrap.value
 
 
 class ShotList(QTreeWidget):
@@ -48,7 +70,6 @@ class ShotList(QTreeWidget):
         self.setAccessibleName(name)
         self.setRootIsDecorated(False)
         self.setAlternatingRowColors(True)
-        self.setUniformRowHeights(True)
         self.setIconSize(_SMALL)
         self.setColumnCount(len(_COLUMNS))
         self.setHeaderLabels(list(_COLUMNS))
@@ -61,7 +82,9 @@ class ShotList(QTreeWidget):
         self.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.header().setSectionResizeMode(_IMAGE, QHeaderView.ResizeMode.Stretch)
         self.header().setStretchLastSection(False)
-        self.setMinimumSize(50 * SPACING_PX, 12 * SPACING_PX)
+        self.header().sectionResized.connect(self.scheduleDelayedItemsLayout)
+        self.setItemDelegate(_Rows(self))
+        self.setMinimumSize(34 * SPACING_PX, 12 * SPACING_PX)
         self.currentItemChanged.connect(self._choose)
         self.itemChanged.connect(self._on_item_changed)
         follow_theme(self, self._mark_all)
@@ -104,6 +127,28 @@ class ShotList(QTreeWidget):
             _note(item, item.data(_IMAGE, _PROBLEM) or note)
         self.blockSignals(False)
 
+    def sizeHint(self) -> QSize:
+        """Return the size at which there is room for thumbnails."""
+        return QSize(50 * SPACING_PX, super().sizeHint().height())
+
+    def drawRow(
+        self,
+        painter: QPainter,
+        option: QStyleOptionViewItem,
+        index: QModelIndex | QPersistentModelIndex,
+    ) -> None:
+        """Draw a row, and its note under all columns."""
+        super().drawRow(painter, option, index)
+        note_px, room = _note_px(self, index), self.visualRect(index)
+        if note_px:
+            room = QRect(0, room.bottom() + 1 - note_px, self.viewport().width(), note_px)
+            text = QPalette.ColorRole.Text
+            if index.row() == self.currentIndex().row():
+                painter.fillRect(room, self.palette().highlight())
+                text = QPalette.ColorRole.HighlightedText
+            painter.setPen(self.palette().color(text))
+            painter.drawText(room.adjusted(_MARGIN_PX, 0, -_MARGIN_PX, 0), _WRAPS, _note_of(index))
+
     def _choose(self, item: QTreeWidgetItem | None) -> None:
         self.chosen.emit(-1 if item is None else self.indexOfTopLevelItem(item))
 
@@ -118,6 +163,63 @@ class ShotList(QTreeWidget):
     def _items(self) -> list[QTreeWidgetItem]:
         items = (self.topLevelItem(row) for row in range(self.topLevelItemCount()))
         return [item for item in items if item is not None]
+
+
+class _Rows(QStyledItemDelegate):
+    """Leaves room for a note below a row's cells."""
+
+    def __init__(self, shown: ShotList) -> None:
+        super().__init__(shown)
+        self._list = shown
+
+    def initStyleOption(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
+        super().initStyleOption(option, index)
+        option.text = str(index.data()).partition("\n")[0]
+        if index.column() != _IMAGE:
+            option.decorationSize = _SIGN
+        elif self._list.width() < _NARROW_PX:
+            option.features &= ~QStyleOptionViewItem.ViewItemFeature.HasDecoration
+
+    def sizeHint(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> QSize:
+        return super().sizeHint(option, index) + QSize(0, _note_px(self._list, index))
+
+    def paint(
+        self,
+        painter: QPainter,
+        option: QStyleOptionViewItem,
+        index: QModelIndex | QPersistentModelIndex,
+    ) -> None:
+        super().paint(painter, self._above_note(option, index), index)
+
+    def editorEvent(
+        self,
+        event: QEvent,
+        model: QAbstractItemModel,
+        option: QStyleOptionViewItem,
+        index: QModelIndex | QPersistentModelIndex,
+    ) -> bool:
+        return super().editorEvent(event, model, self._above_note(option, index), index)
+
+    def _above_note(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> QStyleOptionViewItem:
+        option.rect = option.rect.adjusted(0, 0, 0, -_note_px(self._list, index))
+        return option
+
+
+def _note_of(index: QModelIndex | QPersistentModelIndex) -> str:
+    return str(index.sibling(index.row(), _IMAGE).data()).partition("\n")[2]
+
+
+def _note_px(shown: ShotList, index: QModelIndex | QPersistentModelIndex) -> int:
+    """Return the height of a row's note, wrapped at the width of the list; 0 without one."""
+    note, room = _note_of(index), QRect(0, 0, shown.viewport().width() - 2 * _MARGIN_PX, 9999)
+    height_px = shown.fontMetrics().boundingRect(room, _WRAPS, note).height()
+    return height_px + _MARGIN_PX if note else 0
 
 
 def _item(shot: Shot, is_dropped: bool) -> QTreeWidgetItem:

@@ -47,6 +47,7 @@ class ShotView(QWidget):
             (vbox(caption, (image, 1), spacing=SPACING_PX // 2), 1) for caption, image in parts
         ]
         vbox(*pairs, on=self, margins=0, spacing=SPACING_PX)
+        self.setMinimumWidth(30 * SPACING_PX)
         self.show_shot(None)
 
     def show_shot(self, shot: Shot | None) -> None:

@@ -39,7 +39,8 @@ class Shot:
     @property
     def problem(self) -> str:
         """Reason why the board was not found; empty if it was."""
-        return "; ".join(view.problem for view in self.views if view.problem)
+        problems = dict.fromkeys(view.problem for view in self.views if view.problem)
+        return "; ".join(problems)
 
 
 def look(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -11,7 +10,7 @@ from pathlib import Path
 from handcal.errors import HandcalError
 from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
-from handcal.rig.camera import CameraCalibration, CameraSettings, calibrate_camera, tilt
+from handcal.rig.camera import CameraSettings, calibrate_camera, tilt
 from handcal.rig.formats import camera_json, read_intrinsics
 from handcal.rig.lens import Camera, first_pose
 from handcal.rig.steps import (
@@ -35,7 +34,7 @@ from handcal_gui.windows.rig.project_folder import (
     ViewpointEntries,
     entered_path,
 )
-from handcal_gui.windows.rig.rows import camera_rows, display_rows, stereo_rows
+from handcal_gui.windows.rig.rows import camera_rows, display_rows, lens_rows, stereo_rows
 from handcal_gui.windows.rig.shots import Shot, excluding
 
 CAMERA_MISSING = tr("the viewpoint camera's intrinsics are missing: solve its step first")
@@ -54,8 +53,8 @@ class SolvedPart:
     worst: WorstView | None = None
     uncertainties: tuple[ProjectionUncertainty | None, ...] = ()
     """Of each camera of the step; None if it was not solved."""
-    lenses: str = ""
-    """The lens models compared, in words."""
+    lenses: tuple[Row, ...] = ()
+    """The lens models compared."""
     add_to: Callable[[Rig], Rig] | None = None
     """Returns a rig with this part added; None if it is bad or not part of a rig."""
 
@@ -83,12 +82,11 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
         _tilts([first for first, _ in pairs], result.depth),
         result.worst,
         tuple(None if one is None else one.uncertainty for one in result.solved),
-        "; ".join(
-            f"{which}: {_compared(one)}"
-            for which, one in zip(
-                (tr("Depth camera"), tr("headset camera")), result.solved, strict=True
-            )
-            if one is not None and one.compared
+        tuple(
+            row
+            for which, one in zip((tr("Depth"), tr("Headset")), result.solved, strict=True)
+            if one is not None
+            for row in lens_rows(one, which)
         ),
         None if result.verdict.name == "bad" else add_to,
     )
@@ -107,7 +105,7 @@ def solve_viewpoint(shots: Sequence[Shot], entries: ViewpointEntries, output: Pa
         _tilts(views, result.intrinsics),
         result.worst,
         (result.uncertainty,),
-        _compared(result) if result.compared else "",
+        lens_rows(result),
     )
 
 
@@ -137,17 +135,6 @@ def solve_display(
         add_to=None if result.verdict.name == "bad" else add_to,
     )
     return solved, of_pose
-
-
-def _compared(result: CameraCalibration) -> str:
-    """Return the lens models compared with their errors on images not used to solve them."""
-    edge, unknown = tr("± {:.2f} px at the edge"), tr("unknown at the edge")
-    listed = ", ".join(
-        f"of {one.lens} {one.held_out_px:.3f} px "
-        f"({edge.format(one.edge_px) if math.isfinite(one.edge_px) else unknown})"
-        for one in result.compared
-    )
-    return tr("lens model {}, by the errors on images left out: {}").format(result.lens, listed)
 
 
 def _tilts(views: Sequence[BoardImage], camera: Camera) -> dict[str, float]:

@@ -14,14 +14,14 @@ from handcal.rig_types import Origin
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import main_button, paragraph
+from handcal_gui.widgets.fields import main_button
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.times import local_time
-from handcal_gui.windows.rig.rows import COLUMNS
+from handcal_gui.windows.rig.rows import COLUMNS, LENS_COLUMNS
 from handcal_gui.windows.rig.solve import SolvedPart
 
 HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Health.BROKEN}
@@ -36,7 +36,7 @@ class SolveBox(QWidget):
         The Solve button, placed and connected by the page.
     bar : JobBar
     numbers : QWidget
-        The table and the lens models compared, placed by the page.
+        The tables of the numbers and of the lens models compared, placed by the page.
     table : NumberTable
     shown : Signal()
         Another result is shown, or none.
@@ -52,14 +52,19 @@ class SolveBox(QWidget):
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
         self._worst = FindingLine("worst")
-        self._lenses = paragraph("lenses")
+        self._lenses = NumberTable("lenses", tr("Lens models compared"))
         self.table = NumberTable("numbers", tr("Numbers"))
         self.numbers = QWidget()
-        vbox((self.table, 1), self._lenses, on=self.numbers, spacing=SPACING_PX)
+        hbox((self.table, 2), (self._lenses, 3), on=self.numbers, spacing=SPACING_PX)
         self._shown = Finding("", Health.LIMITED, tr("Not solved yet"))
         self._need = ""
         vbox(self._verdict, self._worst, on=self, margins=0, spacing=SPACING_PX // 2)
         self.show_origin(None)
+
+    @property
+    def failure(self) -> str:
+        """What is shown about a step that failed or is bad; empty otherwise."""
+        return self._shown.found if self._shown.health is Health.BROKEN else ""
 
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
         """Solve in a job and pass the result to `then`."""
@@ -73,15 +78,15 @@ class SolveBox(QWidget):
 
     def show_origin(self, origin: Origin | None, outdated: str = "") -> None:
         """Show an earlier result, or that it is outdated; None if there is none."""
-        self._clear()
         if origin is None or outdated:
             text = outdated or tr("Not solved yet")
             self.show_finding(Finding("", Health.LIMITED, text))
-            return
-        text = tr("Solved {}: {}; {}; RMS {:.3f} px").format(
-            local_time(origin.made), origin.verdict, origin.reason, origin.rms_px
-        )
-        self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
+        else:
+            text = tr("Solved {}: {}; {}; RMS {:.3f} px").format(
+                local_time(origin.made), origin.verdict, origin.reason, origin.rms_px
+            )
+            self.show_finding(Finding("", HEALTHS.get(origin.verdict, Health.LIMITED), text))
+        self._clear()
 
     def show_finding(self, finding: Finding) -> None:
         """Show a message about the result, followed by what is needed to solve."""
@@ -108,14 +113,14 @@ class SolveBox(QWidget):
                 solved.worst.name, solved.worst.rms_px, solved.worst.why
             )
             self._worst.show_finding(Finding("", Health.LIMITED, worst))
-        self._lenses.setText(f"{sentence(solved.lenses)}.")
+        self._lenses.show_rows(LENS_COLUMNS, solved.lenses)
         self._lenses.setVisible(bool(solved.lenses))
         self.table.show_rows(COLUMNS, solved.rows)
         self.shown.emit()
 
     def _show_failure(self, why: str) -> None:
-        self._clear()
         self.show_finding(Finding("", Health.BROKEN, why))
+        self._clear()
 
     def _clear(self) -> None:
         self._worst.hide()

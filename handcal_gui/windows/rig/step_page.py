@@ -135,8 +135,13 @@ class StepPage(QWidget):
         panel: ImagesPanel,
         then: Callable[[], object],
         choose: ChooseSettings | None = None,
+        asked: int = 20,
     ) -> None:
         """Take images with cameras, one folder for each, and then search them for the board."""
+        places = tuple(folders.values())
+        shots = [shot for shot in panel.shots if tuple(f.parent for f in shot.files) == places]
+        found = [tuple(view.found for view in shot.views if view.found) for shot in shots]
+        earlier = [views for views in found if len(views) == len(places)]
 
         def end() -> None:
             panel.forget()
@@ -144,7 +149,16 @@ class StepPage(QWidget):
             self.enter()
 
         project, choose = self.project, choose or ChooseSettings()
-        dialog = TakeDialog(folders, board, choose, project.realsense, self, project.inputs.sources)
+        dialog = TakeDialog(
+            folders,
+            board,
+            choose,
+            project.realsense,
+            self,
+            project.inputs.sources,
+            asked,
+            earlier,
+        )
         dialog.remembered.connect(project.remember_sources)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.finished.connect(end)
@@ -154,6 +168,11 @@ class StepPage(QWidget):
         self._refresh()  # a file may have been written since
         self.solved_with = self.inputs
         self.solve()
+
+    def show_if_changed(self) -> None:
+        """Show no result of inputs that were changed while it was solved."""
+        if self.inputs != self.solved_with:
+            self.show_known()
 
     def _follow(self) -> None:
         """Show no longer a result or a failure of other inputs."""

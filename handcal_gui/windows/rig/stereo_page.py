@@ -100,6 +100,7 @@ class StereoPage(StepPage):
     def _show_solved(self, solved: SolvedPart) -> None:
         self.box.show_solved(solved, self.project.add_part("T_H_D", solved, self.solved_with))
         self.panel.show_solved(solved)
+        self.show_if_changed()
 
     def _take(self) -> None:
         path = self.project.folder.path

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QDialog, QWidget
+from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.take_board import are_kept, keep_imager, keep_images, see_board
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.progress import Progress
-from handcal.rig.board import Board
+from handcal.rig.board import Board, BoardView
 from handcal.rig.choose import ChooseSettings, ViewSelector
-from handcal.rig.views import BoardImage, board_image
+from handcal.rig.views import BoardImage, board_image, coverage
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
@@ -28,6 +28,7 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
+from handcal_gui.windows.rig.coverage_map import CoverageMap
 
 _TAKEN = tr("this has been taken already")
 
@@ -46,6 +47,10 @@ class TakeDialog(QDialog):
     realsense : RealSenseSettings
     sources : mapping of str to str
         Source last chosen for each camera, by its name.
+    asked : int
+        Number of images, or pairs, with the board that the step asks for.
+    earlier : sequence of tuple of BoardView
+        The board in earlier images, by camera; empty tuples of images that were not searched.
     open_source : callable
         Like `open_view_source`.
     list_cameras : callable
@@ -67,6 +72,8 @@ class TakeDialog(QDialog):
         realsense: RealSenseSettings,
         parent: QWidget | None = None,
         sources: Mapping[str, str] = MappingProxyType({}),
+        asked: int = 20,
+        earlier: Sequence[tuple[BoardView, ...]] = (),
         open_source: Callable[..., ViewpointCamera] = open_view_source,
         list_cameras: Callable[[], list[int]] = list_viewpoints,
     ) -> None:
@@ -76,6 +83,9 @@ class TakeDialog(QDialog):
         self._folders, self._board, self._choose = dict(folders), board, choose
         self._selector, self._kept = self._new_selector(), 0
         self._is_searching = False
+        self._asked, self._seen = asked, list(earlier)
+        self._count = with_name(QLabel(), "takenCount")
+        self._maps = tuple(CoverageMap(title) for title in folders)
         self._cameras = LiveCameras(
             tuple(folders),
             realsense,
@@ -118,6 +128,7 @@ class TakeDialog(QDialog):
         self._bar.failed.connect(self._show_failure)
         self._lay_out()
         self._refresh()
+        self._show_coverage()
         self._bar.run(
             tr("Looking for cameras"), lambda *_: list_cameras(), self._cameras.add_cameras
         )
@@ -170,19 +181,23 @@ class TakeDialog(QDialog):
         self._search.stop()
         self._is_searching = False
 
-    def _keep_if_new(self, images: Images) -> str:
-        """Save images if useful, otherwise return why not; runs in the job's thread."""
+    def _keep_if_new(self, images: Images) -> tuple[str, Sequence[BoardView | None]]:
+        """Save images if useful; return why not, and what they show. Runs in the job's thread."""
         folders = tuple(self._folders.values())
         if self._cameras.are_stored and are_kept(images, folders):
-            return _TAKEN
-        why_not = self._selector.consider(see_board(images, self._board))
+            return _TAKEN, ()
+        seen = see_board(images, self._board)
+        why_not = self._selector.consider(seen)
         if not why_not:
             keep_images(images, folders)
-        return why_not
+        return why_not, seen
 
-    def _on_searched(self, _images: Images, why_not: str) -> None:
+    def _on_searched(self, _images: Images, answer: tuple[str, Sequence[BoardView | None]]) -> None:
+        why_not, seen = answer
         self._is_searching = False
-        self._kept += not why_not
+        if not why_not:
+            self._kept += 1
+            self._add(seen)
         if self._selector.is_done:
             self._by_itself.setChecked(False)
             finding = Finding(
@@ -216,7 +231,20 @@ class TakeDialog(QDialog):
         else:
             counts = tr(" and ").join(str(len(view.found.ids)) for view in views if view.found)
             found = Finding("", Health.GOOD, tr("{}: {} corners").format(views[0].name, counts))
+            self._add([view.found for view in views])
         self._found.show_finding(found)
+
+    def _add(self, seen: Sequence[BoardView | None]) -> None:
+        self._seen.append(tuple(one for one in seen if one is not None))
+        self._show_coverage()
+
+    def _show_coverage(self) -> None:
+        """Show how many images of those asked for there are, and what they cover."""
+        self._count.setText(tr("{} of {} usable images").format(len(self._seen), self._asked))
+        searched = [seen for seen in self._seen if seen]
+        for camera, shown in enumerate(self._maps):
+            found = [seen[camera] for seen in searched]
+            shown.show_coverage(coverage(found) if found else None)
 
     def _refresh(self) -> None:
         is_shown = self.shown_images is not None
@@ -225,12 +253,13 @@ class TakeDialog(QDialog):
         self._mains.setCurrentIndex(int(is_shown))
 
     def _lay_out(self) -> None:
+        told = vbox(self._count, self._found, 1, spacing=SPACING_PX)
         others = self._close, self._by_itself
         foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
         vbox(
             self._task,
             (self._cameras, 1),
-            self._found,
+            hbox((told, 1), *self._maps, spacing=2 * SPACING_PX),
             foot,
             on=self,
             margins=2 * SPACING_PX,

@@ -93,6 +93,7 @@ class ViewpointPage(StepPage):
         self.project.camera_solved()
         self.box.show_solved(solved, kept)
         self.panel.show_solved(solved)
+        self.show_if_changed()
 
     def _take(self) -> None:
         folder = self.project.folder.path / "viewpoint"

@@ -30,6 +30,7 @@ from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.result_page import ResultPage
 from handcal_gui.windows.rig.solve_box import SolveBox
 from handcal_gui.windows.rig.step_inputs import STEP_TITLES, Step
+from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.stereo_page import StereoPage
 from handcal_gui.windows.rig.viewpoint_page import ViewpointPage
 
@@ -147,6 +148,8 @@ class RigWizard(QDialog):
         self._back.clicked.connect(lambda: self.show_step(self.step - 1))
         self._next.clicked.connect(lambda: self.show_step(self.step + 1))
         self._close.clicked.connect(self.reject)
+        for box in self.findChildren(SolveBox):
+            box.shown.connect(self._refresh)
         self.project.rig_changed.connect(self._refresh)
         self.project.inputs_changed.connect(self._refresh)
         self.project.failed.connect(self._banner.show_message)
@@ -204,8 +207,10 @@ class RigWizard(QDialog):
     def _refresh(self) -> None:
         """Mark each step with its state."""
         for row, title in enumerate(_STEPS):
-            verdict = self._verdict(title)
+            page, verdict = self._pages[row], self._verdict(title)
             name, role = _SIGNS.get(verdict, _DOUBTFUL if verdict else _UNDONE)
+            if verdict != UNREADABLE and isinstance(page, StepPage) and page.box.failure:
+                verdict, (name, role) = page.box.failure, _SIGNS["bad"]
             sign = icon(name, getattr(colors(), role))
             chosen = icon(name, self.palette().highlightedText().color().name())
             sign.addPixmap(chosen.pixmap(2 * SPACING_PX), QIcon.Mode.Selected)

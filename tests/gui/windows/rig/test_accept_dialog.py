@@ -129,10 +129,20 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     (folder / "left" / "grid.png").rename(folder / "left" / "grid" / "grid-001.png")
     dialog = AcceptDialog(project)
     qtbot.addWidget(dialog)
-    part(dialog, QPushButton, "runAcceptance").click()
+    dialog.show()
     found = part(dialog, QLabel, "acceptedFound")
+    assert "Press Accept" in found.text()
+    part(dialog, QPushButton, "runAcceptance").click()
+    assert found.text() == "", "it is pressed"
+    part(dialog, QPushButton, "cancel").click()
+    qtbot.waitUntil(lambda: "Press Accept" in found.text(), timeout=30_000)
+    part(dialog, QPushButton, "runAcceptance").click()
     qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
     table = part(dialog, QTableWidget, "drawn-against-seen")
+    QApplication.processEvents()
+    assert not part(dialog, Drawing, "drawing").isVisible(), "the numbers need its room"
+    rows_px = table.viewport().height() / table.rowHeight(0)
+    assert rows_px >= 5
     sign = part(dialog, QLabel, "acceptedHealth")
     assert sign.accessibleName() == "Note", "the right display was not looked at"
     assert "right not looked at" in found.text()

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QLabel,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -21,12 +23,16 @@ from pytestqt.qtbot import QtBot
 from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import WorstView
+from handcal_gui.theme import use_theme
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.coverage_map import CoverageMap
 from handcal_gui.windows.rig.images_panel import ImagesPanel
+from handcal_gui.windows.rig.shot_list import ShotList
+from handcal_gui.windows.rig.shot_view import ShotView
 from handcal_gui.windows.rig.solve import SolvedPart
 from handcal_gui.windows.rig.uncertainty_map import UncertaintyMap
+from tests.gui.helpers import child, height_px
 
 PAGES = "setup-stereo", "setup-viewpoint", "setup-display", "setup-board"
 
@@ -107,6 +113,54 @@ def test_captions_are_whole_and_not_over_small_images(qtbot: QtBot, full: Images
         assert not image.caption
         assert caption.height() >= caption.heightForWidth(caption.width())
         assert not caption.geometry().intersects(image.geometry())
+
+
+def test_in_a_small_window_the_image_is_wide_and_notes_are_whole(
+    qtbot: QtBot, full: ImagesPanel
+) -> None:
+    full.resize(735, 290)  # as in a window of 960x540
+    QApplication.processEvents()
+    view, shots = child(full, ShotView), child(full, ShotList)
+    assert view.width() > 230 > 0.7 * shots.width()
+    plain, noted = (shots.visualItemRect(item(full, row)).height() for row in (7, 8))
+    note = item(full, 8).text(0).partition("\n")[2]
+    assert note
+    assert noted >= plain + height_px(shots, note, shots.viewport().width() - 8)
+    # It is drawn over all columns, and of its height nothing is left to the cells.
+    shots.setCurrentItem(item(full, 0))
+    row = shots.visualItemRect(item(full, 8))
+    low = row.adjusted(0, plain, 0, 0)
+    image = shots.viewport().grab(low).toImage()
+    inked = {
+        x
+        for x in range(image.width())
+        for y in range(image.height())
+        if image.pixelColor(x, y).lightness() < 128
+    }
+    assert max(inked) > shots.columnWidth(0), "it was cut at its column"
+
+
+def test_a_box_without_tick_is_seen_in_the_dark(qtbot: QtBot, full: ImagesPanel) -> None:
+    use_theme("dark")
+    try:
+        shots = child(full, ShotList)
+        item(full, 3).setCheckState(0, Qt.CheckState.Unchecked)
+        QApplication.processEvents()
+        row = shots.visualItemRect(item(full, 3))
+        image = shots.viewport().grab(QRect(0, row.y(), 20, row.height())).toImage()
+        lights = {image.pixelColor(x, row.height() // 2).lightness() for x in range(20)}
+        assert max(lights) - min(lights) > 60
+    finally:
+        use_theme("light")
+
+
+def test_the_sign_of_a_problem_is_as_large_as_elsewhere(qtbot: QtBot, full: ImagesPanel) -> None:
+    shots = child(full, ShotList)
+    option = QStyleOptionViewItem()
+    delegate = shots.itemDelegate()
+    assert isinstance(delegate, QStyledItemDelegate)
+    delegate.initStyleOption(option, shots.model().index(8, 1))
+    assert option.decorationSize == QSize(16, 16)
 
 
 def test_a_dropped_pair_no_longer_counts(qtbot: QtBot, full: ImagesPanel) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QTabWidget, QTreeWidget
 from pytestqt.qtbot import QtBot
 
@@ -125,6 +126,23 @@ def test_images_added_later_make_a_step_outdated(
     assert text in child(wizard, QLabel, "verdictFound").text()
     wizard.show_step(RESULT)
     assert text in marks(wizard)[VIEWPOINT]
+
+
+@pytest.mark.parametrize("is_solving", [False, True])
+def test_an_image_unticked_makes_the_result_one_of_other_images(
+    qtbot: QtBot, wizard: RigWizard, is_solving: bool
+) -> None:
+    wizard.show_step(STEREO)
+    wait(qtbot, wizard)
+    shots = child(wizard, QTreeWidget, "shots")
+    child(wizard, QPushButton, "solve").click()
+    if not is_solving:
+        wait(qtbot, wizard)
+    shots.topLevelItem(1).setCheckState(0, Qt.CheckState.Unchecked)
+    wait(qtbot, wizard)
+    text = "olved with other inputs (excluded images): solve it again"
+    assert child(wizard, QLabel, "verdictFound").text() == f"S{text}."
+    assert marks(wizard)[STEREO] == f"s{text}"
 
 
 def test_saving_mixed_inputs_warns(

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
     QLabel,
     QLineEdit,
+    QListWidget,
     QPushButton,
     QScrollArea,
     QSpinBox,
@@ -28,6 +30,7 @@ from handcal.rig.example import example_rig
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Origin
+from handcal_gui.theme import colors, icon
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.path_field import PathField
@@ -105,6 +108,24 @@ def test_what_cannot_be_solved_is_reported(qtbot: QtBot, wizard: RigWizard) -> N
     assert "intrinsics are missing" in solve(qtbot, wizard, LEFT)
     assert "intrinsics are missing" in solve(qtbot, wizard, RIGHT)
     assert not wizard.project.rig.origins
+
+
+def test_a_failed_step_is_crossed_in_the_rail(qtbot: QtBot, wizard: RigWizard) -> None:
+    def sign() -> QImage:
+        rail: QListWidget = child(wizard, QListWidget, "rigRail")
+        return rail.item(STEREO).icon().pixmap(16).toImage()
+
+    undone, entries = sign(), wizard.project.inputs.stereo
+    wizard.show_step(STEREO)
+    page = wizard.page
+    assert isinstance(page, StepPage)
+    page.form.enter(headset_images=entries.depth_images)
+    solve(qtbot, wizard, STEREO)
+    assert "images are the same" in marks(wizard)[STEREO]
+    wizard.show_step(BOARDS)
+    assert sign() == icon("cross", colors().red).pixmap(16).toImage()
+    page.form.enter(headset_images=entries.headset_images)
+    assert sign() == undone, "it failed with other inputs"
 
 
 def test_what_is_wrong_with_images_is_named(

@@ -78,8 +78,12 @@ def test_the_viewpoint_camera_is_kept_in_a_file(photographs: Any, tmp_path: Path
     compared = solve_viewpoint(
         shots_of(photographs, "viewpoint"), replace(entries, lens="auto"), output
     )
-    assert "by the errors on images left out: of none " in compared.lenses
-    assert "radial" in compared.lenses
+    labels = [row.label for row in compared.lenses]
+    assert labels[0] == "No distortion"
+    assert labels[-1] == "Fisheye"
+    (chosen,) = (row for row in compared.lenses if row.label.endswith(" ✓"))
+    assert float(chosen.cells[0]) == pytest.approx(0.075, abs=0.02)
+    assert chosen.cells[1].startswith("± 0.")
 
 
 def test_too_few_images_are_told(photographs: Any, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,14 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QCheckBox, QComboBox, QLabel, QPushButton
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QLabel,
+    QPushButton,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.playback import PlaybackSettings
@@ -21,9 +29,13 @@ from handcal.rig.choose import ChooseSettings
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.windows.rig.coverage_map import CoverageMap
 from handcal_gui.windows.rig.shots import read_color
+from handcal_gui.windows.rig.step_page import StepPage
 from handcal_gui.windows.rig.take_dialog import TakeDialog
+from handcal_gui.windows.rig.wizard import RigWizard
 from tests.gui.helpers import child
+from tests.gui.windows.rig.wizard_steps import STEREO, wait
 
 REALSENSE_SETTINGS = RealSenseSettings(serial="42")
 
@@ -94,6 +106,55 @@ def test_both_cameras_images_are_taken(
     np.testing.assert_array_equal(depth, cameras["0"].image)
     dialog.accept()
     assert not any(camera.is_open for camera in cameras.values())
+
+
+def test_what_is_taken_is_counted_and_what_it_covers_is_shown_at_once(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any]
+) -> None:
+    def count() -> str:
+        return child(dialog, QLabel, "takenCount").text()
+
+    maps = dialog.findChildren(CoverageMap)
+    assert [one.caption for one in maps] == ["Depth camera: –", "Headset camera: –"]
+    assert count() == "0 of 20 usable images"
+    start(qtbot, dialog)
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: "corners" in said(dialog))
+    assert count() == "1 of 20 usable images"
+    covered = [one.caption for one in maps]
+    assert all(caption.endswith(" %") for caption in covered)
+    cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
+    qtbot.waitUntil(lambda: dialog.shown_images is not None and dialog.shown_images[1].max() == 90)
+    button(dialog, "takeImage").click()
+    qtbot.waitUntil(lambda: "Take another" in said(dialog))
+    assert count() == "1 of 20 usable images", "the headset camera's shows no board"
+    assert [one.caption for one in maps] == covered
+    dialog.resize(960, 500)  # as on a screen of 960x540
+    QApplication.processEvents()
+    assert dialog.height() == 500
+    foot_px = button(dialog, "takeImage").mapTo(dialog, QPoint()).y()
+    for one in maps:
+        assert one.isVisible()
+        assert dialog.rect().contains(one.geometry())
+        assert one.geometry().bottom() < foot_px
+
+
+def test_earlier_images_count(qtbot: QtBot, wizard: RigWizard, photographs: Any) -> None:
+    for place in ("depth", "headset"):
+        shutil.copytree(photographs.folder / place, wizard.project.folder.path / place)
+    wizard.show_step(STEREO)
+    page = wizard.page
+    assert isinstance(page, StepPage)
+    folders = {
+        f"{name}_images": str(wizard.project.folder.path / name) for name in ("depth", "headset")
+    }
+    page.form.enter(**folders)
+    wait(qtbot, wizard)
+    page.panels[0].take_requested.emit()
+    taking = child(wizard, TakeDialog)
+    assert child(taking, QLabel, "takenCount").text() == "8 of 20 usable images"
+    assert "–" not in taking.findChildren(CoverageMap)[1].caption
+    taking.reject()
 
 
 def test_what_has_been_taken_is_not_taken_again(
@@ -170,6 +231,7 @@ def test_images_are_taken_by_themselves_until_they_are_enough(
     start(qtbot, dialog)
     by_itself.click()
     qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
+    assert child(dialog, QLabel, "takenCount").text() == "2 of 20 usable images"
     assert not by_itself.isChecked()
     for folder in ("depth", "headset"):
         names = [path.name for path in sorted((tmp_path / folder).iterdir())]
