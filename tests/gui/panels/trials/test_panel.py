@@ -1,12 +1,11 @@
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -14,7 +13,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
     QPushButton,
-    QTabWidget,
     QToolButton,
     QWidget,
 )
@@ -26,37 +24,12 @@ from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
-from handcal.types import Eye
 from handcal_gui.panels.trials.panel import TrialsPanel
-from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.record_table import RecordTable
-from tests.gui.helpers import button, child, show, text
-
-
-@pytest.fixture(autouse=True)
-def presses_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let each press come two seconds after the one before."""
-    times_s = itertools.count(0.0, 2.0)
-    monkeypatch.setattr("handcal_gui.panels.trials.panel.monotonic", lambda: next(times_s))
-
-
-@pytest.fixture
-def panel(qtbot: QtBot) -> TrialsPanel:
-    return show(qtbot, TrialsPanel(), 430, 450)
-
-
-@pytest.fixture
-def tried(record: SessionRecord, rig: Rig) -> SessionRecord:
-    """Return a session with trials 1 (left, 0.4 m) and 3 (left, 0.6 m); 2 is deleted."""
-    trials: list[tuple[Eye, float]] = [("left", 0.4), ("right", 0.5), ("left", 0.6)]
-    with Session(record.path) as session:
-        for eye, depth_m in trials:
-            session.save_trial(make_trial(rig.eyes[eye], eye, depth_m, np.zeros(3), [1e-3, 0, 0]))
-        session.delete("trial", 2)
-    return Session.open(record.path)
+from tests.gui.helpers import button, child, text
 
 
 def test_a_low_panel_shows_four_trials(panel: TrialsPanel, record: SessionRecord, rig: Rig) -> None:
@@ -312,58 +285,6 @@ def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -
     assert "0.5 m" not in statistics.as_text()
 
 
-def test_plot_table_and_text_have_one_statistic(
-    panel: TrialsPanel, tried: SessionRecord, rig: Rig
-) -> None:
-    with Session(tried.path) as session:
-        session.save_trial(make_trial(rig.eyes["right"], "right", 0.4, np.zeros(3), [3e-3, 0, 0]))
-    tried = Session.open(tried.path)
-    panel.show_record(tried)
-    plot = child(panel, TrialPlot)
-    means = {number: trial.error_arcmin.mean() for number, trial in tried.trials.items()}
-    drawn = {line.name(): line.getData() for line in plot.item.listDataItems()}
-    _, errors = drawn["Left eye"]
-    np.testing.assert_allclose(errors[~np.isnan(errors)], [means[1], means[3]])
-    at_m, marks = (values.reshape(-1, 3)[:, :2] for values in drawn["Mean ± SD"])
-    np.testing.assert_allclose(at_m.mean(axis=1), (0.4, 0.4, 0.6, 0.6))
-    near = [means[1], means[4]]
-    sd = np.std(near, ddof=1)
-    np.testing.assert_allclose(marks[0], np.mean(near))
-    np.testing.assert_allclose(marks[1], [np.mean(near) - sd, np.mean(near) + sd])
-    np.testing.assert_allclose(marks[2:], means[3])  # one trial has no spread
-    row = child(panel, NumberTable).as_text().split("0.4 m\t")[1].splitlines()[0].split("\t")
-    assert row[:3] == ["2", f"{np.mean(near):.1f}", f"{sd:.1f}"]
-    [ticks] = plot.item.getAxis("bottom")._tickLevels
-    assert [name for _, name in ticks] == ["0.4 (n = 2)", "0.5 (n = 0)", "0.6 (n = 1)"]
-
-
-def test_the_plot_shows_whole_marks_and_bars(
-    panel: TrialsPanel, record: SessionRecord, rig: Rig
-) -> None:
-    with Session(record.path) as session:
-        shifts_m: dict[Eye, float] = {"left": 5e-3, "right": 0.0}
-        for eye, shift_m in shifts_m.items():
-            trial = make_trial(rig.eyes[eye], eye, 0.4, np.zeros(3), [shift_m, 0, 0])
-            session.save_trial(trial)
-    panel.resize(384, 300)
-    panel.show_record(Session.open(record.path))
-    child(panel, QTabWidget).setCurrentIndex(2)
-    QApplication.processEvents()
-    plot = child(panel, TrialPlot).item
-    drawn = {line.name(): line for line in plot.listDataItems()}
-    _, up = drawn["Mean ± SD"].getData()
-    _, (bottom, top) = plot.vb.viewRange()
-    assert bottom < np.nanmin(up) < 0.0 < np.nanmax(up) < top, "the bar of one SD"
-    shown = plot.vb.mapRectToScene(plot.vb.boundingRect())
-    for name in ("Left eye", "Right eye"):
-        line = drawn[name]
-        at_m, errors = (values[~np.isnan(values)] for values in line.getData())
-        spot = plot.vb.mapViewToScene(QPointF(at_m[0], errors[0]))
-        half_px = line.opts["symbolSize"] / 2
-        mark = QRectF(spot.x() - half_px, spot.y() - half_px, 2 * half_px, 2 * half_px)
-        assert shown.contains(mark), name
-
-
 def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: SessionRecord) -> None:
     with Session(tried.path) as session:
         session.delete("alignment", 1)
@@ -384,24 +305,6 @@ def test_a_finished_session_is_only_looked_at(panel: TrialsPanel, tried: Session
     panel.show_record(tried)
     assert not button(panel, QToolButton, "Record trial").isEnabled()
     assert text(panel, "undoText") == ""
-
-
-def test_the_legend_of_a_low_plot_is_above_it_and_whole(
-    panel: TrialsPanel, tried: SessionRecord
-) -> None:
-    panel.resize(384, 300)
-    panel.show_record(tried)
-    child(panel, QTabWidget).setCurrentIndex(2)
-    QApplication.processEvents()
-    plot = child(panel, TrialPlot).item
-    legend = plot.legend.mapRectToScene(plot.legend.boundingRect())
-    assert [label.text for _, label in plot.legend.items] == [
-        "Mean ± SD",
-        "Left eye",
-        "Right eye",
-    ]
-    assert plot.scene().sceneRect().contains(legend)
-    assert not legend.intersects(plot.vb.mapRectToScene(plot.vb.boundingRect()))
 
 
 def test_a_trial_is_of_the_calibrated_shift_not_the_solved_one(panel: TrialsPanel) -> None:
