@@ -1453,15 +1453,47 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Not every eye has been verified. Finish as it is, or verify an eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted yet. Raise the hand and hold it still, then add an alignment.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Not accepted yet: verify {} again. Another alignment would change little.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Verified; the result is not used for every eye. Finish, or verify again.</source>
+        <source>Finish a&amp;s it is</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The headset draws with a different φ from this result&apos;s: an earlier or a fine-tuned one.</source>
+        <source>a fine-tuned one</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the offline calibration&apos;s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>an earlier one</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Press G to return.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Reset φ in Fine-tune to return.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset draws with a different φ from this result&apos;s: {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verified; the result is not used for every eye. Finish, or verify again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1525,15 +1557,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Not accepted yet: add an alignment, or verify an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The wearer has verified the result. Finish, or verify an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Not every eye has been verified. Finish, or verify an eye again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1709,6 +1733,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Not accepted. Go back to add an alignment, or finish as it is; all is saved.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solve the problem below, then finish the session.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1741,7 +1769,15 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Add &amp;right eye</source>
+        <source>Align &amp;left eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Align &amp;right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted yet: align {} again, or finish as it is.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1749,23 +1785,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Keep a&amp;s it is</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>&amp;Skip</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Add &amp;left eye</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Not accepted yet: align {} again, or keep the result as it is.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Add {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2018,6 +2038,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>The wearer compares two drawings. Record the answer in Trials, or stop comparing.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer compares two drawings. Record the answer here, or stop comparing.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials are recorded with the panels in sight: press F11, then T</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2611,6 +2639,10 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Rejected, {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The new key must then be entered in the headset.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2712,6 +2744,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>Cance&amp;l</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Waiting for you</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3091,7 +3127,7 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The wearer holds the hand up, and looks at the first drawing and at the second. An answer can be given once both have been shown.</source>
+        <source>The wearer holds the hand up, and looks at both drawings. Then the answer can be recorded.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3309,7 +3345,7 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The preferences could not be read and were reset; the old file was kept as {}: {}</source>
+        <source>The preferences could not be read and were reset: check the start page and Preferences (Ctrl+,) before you start. The old file is {}; the log beside it says what was wrong.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4676,6 +4712,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>This folder does not exist. Calibrate a wearer, which creates it, or choose another session folder on the start page.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>No session matches. Search for something else, or choose All sessions.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4692,15 +4732,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} sound, every file read.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>{} is running in this window. Finish it first.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>{} is open in another program. Close it there, then try again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>✓ {} sound, every file read.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4852,6 +4892,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Close this window to choose the file under Camera intrinsics.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Take captures</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4884,15 +4928,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>choose the camera, and press Show</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Looking for cameras</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>press Take once the image shows this</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4912,6 +4948,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>close this window to choose the files of the cube and the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>not taken: {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4925,6 +4965,10 @@ one turns out.</source>
     </message>
     <message>
         <source>All captures have been taken.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Choose the camera, and press Show.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4980,6 +5024,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Check the entries, then start at the lower right.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Change the entries for another study.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} is running</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4997,10 +5049,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Cancelled; {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{} Check the entries, then start at the lower right.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5028,7 +5076,27 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Figure or numbers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;View large</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Fill the screen</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Terms and methods</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Escape goes back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Click to fill the screen</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5041,6 +5109,14 @@ one turns out.</source>
     </message>
     <message>
         <source>Folder with report, figures and raw numbers as CSV</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Figure or &amp;numbers</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>There is no room for: {}. View large, or open the report.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5213,6 +5289,14 @@ one turns out.</source>
     </message>
     <message>
         <source>{} ({:g} mm of φ)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Looking for the cube</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Storing the trial</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6030,6 +6114,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Images left out, px</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Edge, px</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Focal length fx</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6079,6 +6171,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Angle of a pixel at the image centre.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Images left out: RMS error on images that were not used to solve. Edge: standard deviation of a pixel at the edge of the image. The one chosen is ticked.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6178,22 +6274,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>headset camera</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>± {:.2f} px at the edge</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>unknown at the edge</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>lens model {}, by the errors on images left out: {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>the viewpoint camera&apos;s intrinsics are missing: solve its step first</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6207,6 +6287,10 @@ one turns out.</source>
     </message>
     <message>
         <source>&amp;Solve</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Lens models compared</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6327,6 +6411,10 @@ one turns out.</source>
     </message>
     <message>
         <source>take another</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} of {} usable images</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6612,10 +6700,6 @@ width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>handcal hit an unexpected error ({}); the session is kept: resume it</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>No program opened it; the folder is at
 {}</source>
         <translation type="unfinished"></translation>
@@ -6627,6 +6711,18 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>&amp;Copy path</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>nothing was recorded: start again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the session is kept: resume it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>handcal hit an unexpected error ({}); {}</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
