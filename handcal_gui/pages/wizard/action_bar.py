@@ -21,6 +21,7 @@ from handcal_gui.keys import add_action, native
 from handcal_gui.pages.wizard.view import ButtonSpec, WizardView
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import main_button, with_name
 from handcal_gui.widgets.key_cap import KeyCap
 
@@ -54,7 +55,6 @@ class ActionBar(QWidget):
         super().__init__(parent)
         self.setObjectName("actionBar")
         self._view: WizardView | None = None
-        self._is_quiet = False
         self._is_repeat = False
         self._released = (0, 0)  # key, and time in ms
         self._main = main_button("wizardMain")
@@ -63,6 +63,7 @@ class ActionBar(QWidget):
             tr("{}, or {} from a text field").format(native(_KEY), native(_TEXT_KEY))
         )
         self._key = KeyCap("wizardMainKey", _KEY, _TEXT_KEY)
+        self._why_quiet = with_name(ElidedLabel(), "wizardMainQuiet")
         self._others = [with_name(QPushButton(), f"wizardOther{i}") for i in range(_MOST_OTHERS)]
         self._arming = QTimer(self, interval=_ARMING_MS, singleShot=True)
         self._lay_out()
@@ -78,14 +79,15 @@ class ActionBar(QWidget):
         assert isinstance(app, QApplication)
         app.focusChanged.connect(self._show_key)
 
-    def show_view(self, view: WizardView | None, *, is_quiet: bool = False) -> None:
+    def show_view(self, view: WizardView | None, *, why_quiet: str = "") -> None:
         """Show the buttons of a view; if it is None, no button can be pressed.
 
-        A main button that nobody needs to press is quiet: it has no accent colour.
+        A main button that nobody here needs to press is quiet: it has no accent colour, and the
+        reason beside it.
         """
         before, self._view = self._view, view
-        if is_quiet != self._is_quiet:
-            self._is_quiet = is_quiet
+        if why_quiet != self._why_quiet.text():
+            self._why_quiet.setText(why_quiet)
             self._color_main()
         self._main.setEnabled(view is not None and view.main.is_enabled)
         if view is not None:
@@ -131,7 +133,8 @@ class ActionBar(QWidget):
         for button in self._others:
             button.hide()
             layout.addWidget(button)
-        layout.addStretch(1)
+        self._why_quiet.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        layout.addWidget(self._why_quiet, 1)
         layout.addWidget(self._key, 0, Qt.AlignmentFlag.AlignVCenter)
         layout.addWidget(self._main)
         self.setFixedHeight(7 * SPACING_PX)
@@ -174,7 +177,7 @@ class ActionBar(QWidget):
 
     def _color_main(self) -> None:
         # Without a palette of its own, the button has the accent colour of its class.
-        self._main.setPalette(QApplication.palette() if self._is_quiet else QPalette())
+        self._main.setPalette(QApplication.palette() if self._why_quiet.text() else QPalette())
 
 
 class BottomStrip(QStatusBar):

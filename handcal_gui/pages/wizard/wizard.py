@@ -356,9 +356,12 @@ class WizardPanel(QWidget):
         )
         for action in self._go_back:
             action.setEnabled(view.step is not Step.CONNECT)
-        runs_itself = view.runs_after_s is not None and not self._automatic.is_held
-        # The technician confirms only where the wearer cannot.
-        self.bar.show_view(view, is_quiet=runs_itself or view.main.action in WEARERS)
+        why_quiet = ""
+        if view.main.action in WEARERS:
+            why_quiet = tr("The wearer confirms in the headset, or you:")
+        elif view.runs_after_s is not None and not self._automatic.is_held:
+            why_quiet = tr("Runs by itself, or:")
+        self.bar.show_view(view, why_quiet=why_quiet)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:
             self._plan.clearFocus()  # otherwise Qt would pass the focus on

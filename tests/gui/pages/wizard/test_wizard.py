@@ -23,6 +23,7 @@ from handcal_gui.theme import use_theme
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.result_rows import EYE_NAMES
+from tests.gui.helpers import text
 from tests.gui.views import NUDGED, VERIFIED, all_views, planned_snapshot
 
 Maker = Callable[..., Snapshot]
@@ -79,12 +80,14 @@ def test_a_disabled_main_button_asks_for_nothing(
         panel.press_main()
 
 
-def test_the_main_button_has_its_colour_only_where_a_press_is_needed(
+def test_the_main_button_has_its_colour_only_where_a_press_is_needed_and_the_bar_says_why(
     panel: WizardPanel, snapshot: Maker
 ) -> None:
     def is_colored() -> bool:
         shade = child(panel, "wizardMain").palette().button().color()
-        return shade != QApplication.palette().button().color()
+        is_quiet = shade == QApplication.palette().button().color()
+        assert bool(text(panel.bar, "wizardMainQuiet")) == is_quiet
+        return not is_quiet
 
     try:
         for theme in ("light", "dark"):
@@ -95,10 +98,13 @@ def test_the_main_button_has_its_colour_only_where_a_press_is_needed(
             panel.hold(False)
             assert not is_colored()  # solved by itself
             panel.hold(True)
-            panel.show_snapshot(snapshot(State.ALIGN))
-            assert not is_colored()  # the wearer confirms
-            panel.show_snapshot(snapshot(State.VERIFY, procedure={"verifying": NUDGED}))
-            assert not is_colored()
+            for asked in (
+                snapshot(State.ALIGN),
+                snapshot(State.VERIFY, procedure={"verifying": NUDGED}),
+            ):
+                panel.show_snapshot(asked)
+                assert not is_colored()
+                assert "wearer confirms" in text(panel.bar, "wizardMainQuiet")
     finally:
         use_theme("system")
 
