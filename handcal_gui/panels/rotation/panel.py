@@ -27,6 +27,8 @@ _HISTORY_PERIOD_S = 0.2
 """Interval of redrawing the history."""
 _HISTORY_LIMITS = 2.0
 """End of the history's scale in multiples of the limit, as for the dial."""
+_PLOT_PX = 56
+"""Least height of the history, most of it for the curve: it and the limit must be told apart."""
 _STRAIGHT_RAD = np.radians(2.0)
 """Rotations below this need no correction: hardly more than the guard's own error."""
 _SHAPE_M = 0.0015
@@ -52,10 +54,11 @@ class RotationPanel(QWidget):
         self._hand = TurningHand()
         self._advice = _text_label("rotation-advice", scale=1.2)
         self._advice.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._refusals = _text_label("rotation-refusals")
+        self._refusals = _text_label("rotation-refusals", least_lines=1)
         self._plot = Plot(
             "rotation-history", tr("Rotation history"), tr("Last {:g} s").format(_HISTORY_S), ""
         )
+        self._plot.setMinimumHeight(_PLOT_PX)
         self._plot.item.setXRange(-_HISTORY_S, 0.0, padding=0.0)
         self._plot.item.getAxis("bottom").setStyle(showValues=False, tickLength=0)
         self._limit_line = self._plot.add_line("red", dashed=True)
@@ -174,13 +177,13 @@ class RotationPanel(QWidget):
         )
 
 
-def _text_label(name: str, scale: float = 1.0) -> QLabel:
-    """Return a label with the height of at least two lines."""
+def _text_label(name: str, scale: float = 1.0, least_lines: int = 2) -> QLabel:
+    """Return a label with the height of at least two lines, or of another number."""
     label = QLabel()
     label.setObjectName(name)
     label.setTextFormat(Qt.TextFormat.PlainText)
     label.setWordWrap(True)
     label.setAlignment(Qt.AlignmentFlag.AlignTop)
     scale_font(label, scale)
-    label.setMinimumHeight(2 * label.fontMetrics().lineSpacing() + 2)
+    label.setMinimumHeight(least_lines * label.fontMetrics().lineSpacing() + 2)
     return label

@@ -212,6 +212,18 @@ def test_nothing_overlaps_in_a_low_dock(
     assert dial.height() >= dial.minimumHeight()
 
 
+def test_curve_and_limit_are_apart_in_a_window_of_1280x720(
+    panel: RotationPanel, snapshot: Make
+) -> None:
+    panel.resize(360, 208)  # its size there
+    panel.show()
+    panel.show_snapshot(snapshot())
+    QApplication.processEvents()
+    history = child(panel, Plot, "rotation-history")
+    assert history.isVisible()
+    assert history.item.vb.height() >= 26, "half of it between no rotation and the limit"
+
+
 def test_it_fits_a_small_dock(panel: RotationPanel) -> None:
     smallest = panel.minimumSizeHint()
     assert smallest.width() <= 300
