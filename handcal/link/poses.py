@@ -72,8 +72,9 @@ class PoseBuffer:
             limit_ns = _MAX_SLOW_GAP_NS
         if gap_ns > limit_ns:
             raise PoseError(
-                f"the headset's poses have a gap of {gap_ns / 1e6:.0f} ms at this time; "
-                f"at most {limit_ns / 1e6:.0f} ms can be interpolated at this speed of the head"
+                f"the headset sent no pose for {gap_ns / 1e6:.0f} ms, more than the "
+                f"{limit_ns / 1e6:.0f} ms allowed at this speed of the head; close other "
+                "programs on it"
             )
         return interpolate_pose(before, after, (t_headset_ns - times[index - 1]) / gap_ns)
 

@@ -33,7 +33,7 @@ def test_refusals_say_why() -> None:
         poses.add(t_ms * MS, pose(t_ms))
     with pytest.raises(PoseError, match="100 ms before"):
         poses.at(0)
-    with pytest.raises(PoseError, match="gap of 90 ms"):
+    with pytest.raises(PoseError, match="no pose for 90 ms"):
         poses.at(150 * MS)
     with pytest.raises(PosePendingError, match="not arrived"):
         poses.at(201 * MS)
@@ -60,7 +60,7 @@ def test_longer_gaps_are_interpolated_where_the_head_is_slow(
     if is_known:
         assert poses.at(gap_ms * MS // 2)[0, 3] == pytest.approx(moved_m / 2)
     else:
-        with pytest.raises(PoseError, match=f"gap of {gap_ms} ms"):
+        with pytest.raises(PoseError, match=f"no pose for {gap_ms} ms"):
             poses.at(gap_ms * MS // 2)
 
 
