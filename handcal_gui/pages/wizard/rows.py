@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import (
     QApplication,
     QBoxLayout,
@@ -49,6 +50,10 @@ class StepRail(QWidget):
             if step in view.unearned:
                 mark, color = "– ", colors().warning
             label.setText(f"{mark}{step.label}")
+            # Shares as wide as their texts at their widest: gaps are alike, and no step moves.
+            font = label.font()
+            font.setBold(True)
+            self._row.setStretch(i, QFontMetrics(font).horizontalAdvance(f"▸ {step.label}"))
             if step is present:
                 label.setText(f"▸ {step.label}")
                 # A change of the theme reaches this widget's own palette only later.

@@ -1,0 +1,27 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+from PySide6.QtWidgets import QApplication, QLabel
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.pages.wizard.rows import StepRail
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
+from tests.gui.helpers import show
+
+
+def test_the_steps_stand_apart_and_none_of_them_moves(qtbot: QtBot) -> None:
+    rail = show(qtbot, StepRail(), 480, 20)
+    places = set()
+    for step in Step:
+        rail.show_step(WizardView(step, "", (), ButtonSpec(Action.NEXT, "Next")))
+        QApplication.processEvents()
+        labels = rail.findChildren(QLabel)
+        places.add(tuple(label.geometry().center().x() for label in labels))
+        halves_px = [label.fontMetrics().horizontalAdvance(label.text()) / 2 for label in labels]
+        ends = list(
+            zip([label.geometry().center().x() for label in labels], halves_px, strict=True)
+        )
+        gaps_px = [after - half - (at + own) for (at, own), (after, half) in pairwise(ends)]
+        assert min(gaps_px) >= 12
+    assert len(places) == 1
