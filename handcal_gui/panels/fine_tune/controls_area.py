@@ -12,7 +12,7 @@ from handcal_gui.widgets.layouts import fit_soon, vbox
 
 _KEYS = tr(
     "Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). "
-    "Click here first; E changes the eye."
+    "E changes the eye."
 )
 
 

@@ -55,7 +55,7 @@ def test_shows_what_the_headset_renders_with(
     for eye in EYES:
         solved_mm = 1e3 * results.eyes[eye].shift_m
         np.testing.assert_allclose(fields_mm(panel, eye), solved_mm, atol=0.005)
-    assert status(panel) == "In the headset"
+    assert status(panel) == "In the headset. Keys: ← → ↑ ↓, PgUp, PgDn, E"
     assert field(panel, "left", 1).isEnabled()
 
 
@@ -163,7 +163,7 @@ def test_the_panel_says_that_a_click_gives_it_the_arrow_keys(
     other.setFocus()
     qtbot.waitUntil(other.hasFocus)
     show()
-    assert status(panel) == "Click here to use the arrow keys"
+    assert status(panel) == "Click here to use the keys ← → ↑ ↓, PgUp, PgDn"
     show(State.ALIGN)
     assert "Click here" not in status(panel)
     panel.activateWindow()
