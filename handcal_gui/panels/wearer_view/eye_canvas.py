@@ -117,7 +117,7 @@ class EyeCanvas(QWidget):
             ground.setAlphaF(0.75)
             painter.fillRect(self.rect(), ground)
             painter.setPen(self.palette().windowText().color())
-            within = self.rect().adjusted(SPACING_PX, SPACING_PX, -SPACING_PX, -SPACING_PX)
+            within = self._place().adjusted(SPACING_PX, SPACING_PX, -SPACING_PX, -SPACING_PX)
             flags = Qt.AlignmentFlag.AlignCenter.value | Qt.TextFlag.TextWordWrap.value
             painter.drawText(within, flags, self._message)
         elif self._view is not None:
@@ -161,6 +161,13 @@ class EyeCanvas(QWidget):
                 pen.setDashPattern([4.0 * width_px, 3.0 * width_px - 1.0])
             painter.setPen(pen)
             _draw_wide(painter, line, round(width_px))
+
+    def _place(self) -> QRectF:
+        """Return the part of the widget that the display takes; all of it without a view."""
+        place = QRectF(self.rect())
+        if self._view is None:
+            return place
+        return self._to_widget().mapRect(_display(self._view)).intersected(place)
 
     def _to_widget(self) -> QTransform:
         """Return the transform that fits the crop into the widget, close to the title above."""

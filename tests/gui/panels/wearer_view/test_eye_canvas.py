@@ -59,6 +59,18 @@ def test_message_stands_alone(canvas: EyeCanvas) -> None:
     assert not _has(canvas, colors().live)
 
 
+def test_a_message_lies_on_the_picture_not_below_it(canvas: EyeCanvas) -> None:
+    canvas.resize(300, 700)
+    image = np.full((int(DISPLAY.height_px), int(DISPLAY.width_px), 3), 200, np.uint8)
+    canvas.show_view(_view(image=image), " ")
+    canvas.show_whole(True)
+    empty = _pixels(canvas).astype(int)
+    canvas.show_view(_view(image=image), "Hand cut by the image border")
+    rows = np.flatnonzero((_pixels(canvas) != empty).any(axis=(1, 2)))
+    picture_px = 300 * DISPLAY.height_px / DISPLAY.width_px
+    assert (rows[0] + rows[-1]) / 2 == pytest.approx(picture_px / 2, abs=10)
+
+
 def test_two_displays_show_the_same_rows_at_one_scale(qtbot: QtBot) -> None:
     canvases = [EyeCanvas(f"{side} eye") for side in ("Left", "Right")]
     for canvas, off_m in zip(canvases, ([0.0, 0.0, 0.0], [0.03, 0.05, 0.2]), strict=True):
