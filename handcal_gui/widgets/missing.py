@@ -8,17 +8,13 @@ from handcal_gui.widgets.sentence import sentence
 
 
 def missing_text(snapshot: Snapshot) -> str:
-    """Return in short what is missing and why; empty if the hand is there.
+    """Return why no image or no hand is shown; empty if the hand is there.
 
-    The banner describes problems of the camera in full; the wizard and the camera panel describe
-    why no hand is found.
+    The banner describes problems of the camera in full.
     """
     if snapshot.camera.problem:
         return tr("No image")
-    seen = snapshot.observation
-    if seen is None or not seen.problem:
-        return ""
-    return tr("No hand") if seen.cloud is None else sentence(seen.problem)
+    return sentence(snapshot.observation.problem) if snapshot.observation else ""
 
 
 def missing_view_text(snapshot: Snapshot) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from itertools import product
 
 import numpy as np
@@ -15,18 +15,16 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from handcal.station.wearer_view import EyeView
 from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, colors
-from handcal_gui.widgets.legend import role_color
+from handcal_gui.widgets.legend import DOTS_APART, HALO_PX, draw_dots, role_color
 from handcal_gui.widgets.paint_turns import update_in_turn
 
 LINES = {
     "hand": ("text", (1.0, Qt.PenStyle.SolidLine)),
     "drawn": ("live", (2.0, Qt.PenStyle.DashLine)),
     "cursor": ("cursor", (3.0, Qt.PenStyle.SolidLine)),
-    "offline": ("muted", (1.0, Qt.PenStyle.DotLine)),
+    "offline": ("muted", (3.0, Qt.PenStyle.DotLine)),
 }
 """Colour of each kind of outline, and width in pixels and style of its line."""
-_HALO_PX = 2.0
-"""Added to the width of a line for that of its ground over an image."""
 _FEW_POINTS = 120
 """Outlines of so few points, such as a target, are drawn as they are."""
 _SMOOTHED_POINTS = 5
@@ -117,7 +115,7 @@ class EyeCanvas(QWidget):
             ground.setAlphaF(0.75)
             painter.fillRect(self.rect(), ground)
             painter.setPen(self.palette().windowText().color())
-            within = self.rect().adjusted(SPACING_PX, SPACING_PX, -SPACING_PX, -SPACING_PX)
+            within = self._place().adjusted(SPACING_PX, SPACING_PX, -SPACING_PX, -SPACING_PX)
             flags = Qt.AlignmentFlag.AlignCenter.value | Qt.TextFlag.TextWordWrap.value
             painter.drawText(within, flags, self._message)
         elif self._view is not None:
@@ -133,8 +131,7 @@ class EyeCanvas(QWidget):
 
     def _paint_outlines(self, painter: QPainter, view: EyeView) -> None:
         """Draw the outlines, with halos that keep them visible over any world."""
-        outlines = [("offline", view.offline.outline_px)] if self._is_offline_shown else []
-        outlines += [
+        outlines = [
             ("hand", view.hand_px),
             ("hand", view.target_px),
             ("cursor", view.cursor_px),
@@ -149,9 +146,17 @@ class EyeCanvas(QWidget):
             for what, px in outlines
             if len(px)
         ]
-        if not self._image.isNull():
+        has_image = not self._image.isNull()
+        if self._is_offline_shown and len(offline_px := view.offline.outline_px):
+            role, (width_px, _) = LINES["offline"]
+            halo = colors().canvas if has_image else ""
+            offset_px = np.array([to_widget.dx(), to_widget.dy()])
+            line_px = to_widget.m11() * simplified(offline_px, spacing_px)
+            places = _evenly(line_px + offset_px, DOTS_APART * width_px)
+            draw_dots(painter, places, role_color(role, self), width_px, halo)
+        if has_image:
             for what, line in lines:
-                painter.setPen(_pen(colors().canvas, LINES[what][1][0] + _HALO_PX))
+                painter.setPen(_pen(colors().canvas, LINES[what][1][0] + HALO_PX))
                 painter.drawPolyline(line)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for what, line in lines:
@@ -161,6 +166,13 @@ class EyeCanvas(QWidget):
                 pen.setDashPattern([4.0 * width_px, 3.0 * width_px - 1.0])
             painter.setPen(pen)
             _draw_wide(painter, line, round(width_px))
+
+    def _place(self) -> QRectF:
+        """Return the part of the widget that the display takes; all of it without a view."""
+        place = QRectF(self.rect())
+        if self._view is None:
+            return place
+        return self._to_widget().mapRect(_display(self._view)).intersected(place)
 
     def _to_widget(self) -> QTransform:
         """Return the transform that fits the crop into the widget, close to the title above."""
@@ -257,6 +269,15 @@ def simplified(outline_px: Float64, spacing_px: float) -> Float64:
 def _closed(outline_px: Float64) -> QPolygonF:
     line: QPolygonF = arrayToQPolygonF(*np.vstack([outline_px, outline_px[:1]]).T)
     return line
+
+
+def _evenly(outline_px: Float64, apart_px: float) -> Iterator[tuple[int, int]]:
+    """Return pixels along a closed outline, at equal distances."""
+    x, y = outline_px.T
+    path = np.append(x + 1j * y, x[0] + 1j * y[0])
+    ends_px = np.append(0.0, np.abs(np.diff(path)).cumsum())
+    places = np.interp(np.arange(0.0, ends_px[-1], apart_px), ends_px, path)
+    return zip(places.real.astype(int).tolist(), places.imag.astype(int).tolist(), strict=True)
 
 
 def _draw_wide(painter: QPainter, line: QPolygonF, width_px: int) -> None:

@@ -59,6 +59,18 @@ def test_message_stands_alone(canvas: EyeCanvas) -> None:
     assert not _has(canvas, colors().live)
 
 
+def test_a_message_lies_on_the_picture_not_below_it(canvas: EyeCanvas) -> None:
+    canvas.resize(300, 700)
+    image = np.full((int(DISPLAY.height_px), int(DISPLAY.width_px), 3), 200, np.uint8)
+    canvas.show_view(_view(image=image), " ")
+    canvas.show_whole(True)
+    empty = _pixels(canvas).astype(int)
+    canvas.show_view(_view(image=image), "Hand cut by the image border")
+    rows = np.flatnonzero((_pixels(canvas) != empty).any(axis=(1, 2)))
+    picture_px = 300 * DISPLAY.height_px / DISPLAY.width_px
+    assert (rows[0] + rows[-1]) / 2 == pytest.approx(picture_px / 2, abs=10)
+
+
 def test_two_displays_show_the_same_rows_at_one_scale(qtbot: QtBot) -> None:
     canvases = [EyeCanvas(f"{side} eye") for side in ("Left", "Right")]
     for canvas, off_m in zip(canvases, ([0.0, 0.0, 0.0], [0.03, 0.05, 0.2]), strict=True):
@@ -192,3 +204,17 @@ def test_the_cursor_keeps_its_colour_over_an_image(canvas: EyeCanvas) -> None:
     long_px = SIZE[0] / canvas.crop_px.width() * np.linalg.norm(sides_px, axis=1).sum()
     is_cursor = np.abs(_pixels(canvas).astype(int) - rgb(colors().cursor)).max(axis=2) < 10
     assert is_cursor.sum() > 1.5 * long_px
+
+
+def test_the_outline_before_is_dots_with_halos_of_their_own(canvas: EyeCanvas) -> None:
+    """A halo along the whole line made it a band with specks."""
+    world = np.full((DISPLAY.height_px // 2, DISPLAY.width_px // 2, 3), (0, 0, 255), np.uint8)
+    canvas.show_view(_view(drawn_shift_m=np.array([0.01, 0.0, 0.0]), image=world))
+    without = _pixels(canvas).astype(int)
+    canvas.show_offline(True)
+    pixels = _pixels(canvas).astype(int)
+    is_new = (pixels != without).any(axis=2).astype(np.uint8)
+    dots, _ = cv2.connectedComponents(is_new)
+    assert dots > 20
+    is_dot = np.abs(pixels - rgb(colors().muted)).max(axis=2) < 20
+    assert is_dot.sum() > 4 * 20
