@@ -20,7 +20,7 @@ _LINE_PX, _POINTS_PX = (22, 14), (14, 14)
 """Sizes of samples."""
 HALO_PX = 2.0
 """Added to the width of a line for that of its ground over an image."""
-DOTS_APART = 3.0
+DOTS_APART = 7 / 3
 """Distance from dot to dot, in widths of the line: their halos do not touch."""
 _ON_IMAGE = "#87918c"
 """Ground of samples of what is drawn over an image: no world is lighter or darker on average."""

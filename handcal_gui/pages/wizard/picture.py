@@ -69,7 +69,8 @@ class GuidePicture(QWidget):
         eyes = hbox(*columns, margins=0, spacing=SPACING_PX)
         # From the left, so that no entry moves when another is added.
         legend = hbox(*self._legend.values(), 1, margins=0, spacing=2 * SPACING_PX)
-        vbox((eyes, 1), legend, on=self._both, margins=0, spacing=0)
+        # Above: below, it would be far from pictures that are less high than their place.
+        vbox(legend, (eyes, 1), on=self._both, margins=0, spacing=0)
         self._layout = vbox((self._both, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
         self._views = views
         self._stack = QStackedLayout(self)

@@ -125,9 +125,9 @@ class EyeCanvas(QWidget):
         painter.save()
         painter.setTransform(self._to_widget(), combine=True)
         painter.drawImage(_display(view), self._image)
-        painter.setPen(_pen(colors().muted, 1.0))
-        painter.drawRect(_display(view))
         painter.restore()
+        painter.setPen(_pen(colors().muted, 1.0))
+        painter.drawRect(self._place().adjusted(0.5, 0.5, -0.5, -0.5))
 
     def _paint_outlines(self, painter: QPainter, view: EyeView) -> None:
         """Draw the outlines, with halos that keep them visible over any world."""
@@ -193,9 +193,8 @@ class EyeCanvas(QWidget):
             return
         display = _display(self._view)
         view = self._view
-        outlines_px = np.vstack(
-            [view.hand_px, view.drawn.outline_px, view.target_px, view.drawn_target_px]
-        )
+        drawn_px = (view.drawn.outline_px, view.cursor_px, view.drawn_target_px)
+        outlines_px = np.vstack([view.hand_px, *drawn_px, view.target_px])
         hand = _bounds(outlines_px).intersected(display) if len(outlines_px) else QRectF()
         if self._is_whole or hand.isEmpty():
             self._crop = display

@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QPoint
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtPrintSupport import QPrinter
 from PySide6.QtWidgets import QApplication, QToolButton
@@ -135,6 +136,10 @@ def test_the_key_shows_the_style_of_each_line(qtbot: QtBot, snapshot: Maker) -> 
         row = [image.pixelColor(x, image.height() // 2).lightness() for x in range(width_px)]
         middle = (min(row) + max(row)) / 2
         strokes[what] = sum(a > middle >= b for a, b in pairwise([255, *row]))
+        eyes = [one for one in picture.findChildren(EyeCanvas) if one.isVisible()]
+        top = eyes[0].mapTo(picture, QPoint(0, 0)).y()
+        bottom = entry.mapTo(picture, QPoint(0, entry.height())).y()
+        assert 0 <= top - bottom <= 30, "the key stands by the pictures, whatever their height"
     assert strokes["hand"] <= 1 < strokes["drawn"] < strokes["offline"]
 
 

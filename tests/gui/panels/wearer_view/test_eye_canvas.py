@@ -1,7 +1,9 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QRectF
+from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QImage
 from pytestqt.qtbot import QtBot
 
@@ -109,6 +111,20 @@ def test_crop_holds_the_hand_and_stays_while_it_does(canvas: EyeCanvas) -> None:
     assert canvas.crop_px != crop
     canvas.show_view(_view(0.3 * RING_M + [0.0, 0.0, 0.35]))
     assert canvas.crop_px.width() < 0.5 * crop.width()
+
+
+def test_a_cropped_picture_is_framed_on_all_sides_and_shows_the_cursor_too(
+    canvas: EyeCanvas,
+) -> None:
+    view = _view()
+    canvas.show_view(replace(view, cursor_px=view.hand_px + 40.0))
+    assert canvas.crop_px.contains(QPointF(*(view.hand_px.max(axis=0) + 40.0)))
+    assert canvas.crop_px != canvas.display_px
+    place = canvas._place().toRect()
+    pixels = _pixels(canvas)[place.top() : place.bottom() + 1, place.left() : place.right() + 1]
+    is_frame = np.abs(pixels.astype(int) - rgb(colors().muted)).max(axis=2) < 10
+    for side in (is_frame[0], is_frame[-1], is_frame[:, 0], is_frame[:, -1]):
+        assert side.all()
 
 
 def test_whole_display_is_shown_on_demand(canvas: EyeCanvas) -> None:
