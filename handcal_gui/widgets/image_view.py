@@ -16,6 +16,9 @@ from handcal_gui.theme import SPACING_PX
 
 Image: TypeAlias = UInt8 | UInt16
 
+_BESIDE_PX = 100
+"""Least width of a caption beside an image."""
+
 
 class ImageView(QWidget):
     """Shows an image with its aspect ratio, an overlay, a message and a caption.
@@ -26,6 +29,9 @@ class ImageView(QWidget):
         For screen readers.
     colorize : callable or None
         Converts another kind of image to RGB, at its displayed size.
+    has_caption_beside : bool
+        True if the caption is to the right of the image where it has room there, and the image
+        then at the left, with and without a caption; otherwise the caption covers it.
     parent : QWidget or None
     """
 
@@ -33,6 +39,7 @@ class ImageView(QWidget):
         self,
         name: str,
         colorize: Callable[[UInt16], UInt8] | None = None,
+        has_caption_beside: bool = False,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -46,6 +53,8 @@ class ImageView(QWidget):
         self._image: Image | None = None
         self._scaled: QImage | None = None
         self._message = self._caption = ""
+        self._has_caption_beside = has_caption_beside
+        self._beside_px = 0  # the room beside the image, for the caption
 
     @property
     def has_image(self) -> bool:
@@ -92,8 +101,10 @@ class ImageView(QWidget):
         if self._message:
             ground.setAlphaF(0.6)
             painter.fillRect(self.rect(), ground)
-        self._write(painter, self._message, Qt.AlignmentFlag.AlignVCenter)
-        self._write(painter, self._caption, Qt.AlignmentFlag.AlignBottom)
+        self._write(painter, self._message, Qt.AlignmentFlag.AlignVCenter, self.rect())
+        left_px = self.width() - self._beside_px if self._beside_px else 0
+        room = self.rect().adjusted(left_px, 0, 0, 0)
+        self._write(painter, self._caption, Qt.AlignmentFlag.AlignBottom, room)
 
     def _paint_image(self, painter: QPainter, image: Image) -> None:
         height, width = image.shape[:2]
@@ -104,9 +115,11 @@ class ImageView(QWidget):
             self._scaled = self._scale(image, size)
             self._scaled.setDevicePixelRatio(ratio)
         place = QRectF(QPointF(), QSizeF(*size) / ratio)
+        free_px = int(self.width() - place.width())
+        self._beside_px = free_px if self._has_caption_beside and free_px >= _BESIDE_PX else 0
         # Whole device pixels, so that Qt does not resample the image.
         place.moveTo(
-            int((ratio * self.width() - size[0]) / 2) / ratio,
+            0 if self._beside_px else int((ratio * self.width() - size[0]) / 2) / ratio,
             int((ratio * self.height() - size[1]) / 2) / ratio,
         )
         painter.drawImage(place.topLeft(), self._scaled)
@@ -126,12 +139,12 @@ class ImageView(QWidget):
             return _qimage(self._colorize(np.asarray(nearest, np.uint16)))
         return _qimage(shrink(np.asarray(image, np.uint8), size))
 
-    def _write(self, painter: QPainter, text: str, where: Qt.AlignmentFlag) -> None:
+    def _write(self, painter: QPainter, text: str, where: Qt.AlignmentFlag, room: QRect) -> None:
         """Write a text, if any, on a box that keeps it readable over any image."""
         if not text:
             return
         margin = SPACING_PX // 2
-        within = self.rect().adjusted(2 * margin, 2 * margin, -2 * margin, -2 * margin)
+        within = room.adjusted(2 * margin, 2 * margin, -2 * margin, -2 * margin)
         flags = Qt.TextFlag.TextWordWrap.value | Qt.AlignmentFlag.AlignHCenter.value | where.value
         box: QRect = painter.boundingRect(within, flags, text)
         background = self.palette().window().color()

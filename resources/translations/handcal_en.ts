@@ -2033,6 +2033,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The wearer confirms in the headset, or you:</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Runs by itself, or:</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Draw with the offline calibration</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2343,10 +2351,6 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). Click here first; E changes the eye.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Confirm the alignment, solve and apply it first.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2375,19 +2379,11 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>In the headset</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Not acknowledged by the headset; see Link</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Fine-tuning starts with a session.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Click here to use the arrow keys</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2436,6 +2432,14 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>The calibrated φ is the one with which the headset draws after the calibration: the solved φ, or 0 for an eye that keeps the offline calibration. A trial records its error.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In the headset. Keys: ← → ↑ ↓, PgUp, PgDn, E</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Click here to use the keys ← → ↑ ↓, PgUp, PgDn</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6723,6 +6727,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>handcal hit an unexpected error ({}); {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). E changes the eye.</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

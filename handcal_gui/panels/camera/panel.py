@@ -151,9 +151,13 @@ class _Pictures(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._color = ImageView(tr("Colour image"))
+        self._color = ImageView(tr("Colour image"), has_caption_beside=True)
         self._color.setObjectName("colour-image")
-        self._depth = ImageView(tr("Depth image"), lambda depth: self._depth_colors.colorize(depth))
+        self._depth = ImageView(
+            tr("Depth image"),
+            lambda depth: self._depth_colors.colorize(depth),
+            has_caption_beside=True,
+        )
         self._depth.setObjectName("depth-image")
         self._legend = DepthLegend()
         self._depth_side = QWidget()
