@@ -63,7 +63,7 @@ class SolveBox(QWidget):
 
     @property
     def failure(self) -> str:
-        """What is shown about a step that failed or is bad; empty otherwise."""
+        """The finding of a step that failed or is bad; empty otherwise."""
         return self._shown.found if self._shown.health is Health.BROKEN else ""
 
     def run(self, work: Callable[[], object], then: Callable[[Any], object]) -> None:
