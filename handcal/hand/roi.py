@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -16,7 +13,6 @@ from handcal.hand.view import Box
 from handcal.types import Float64, Frame, UInt8
 
 _SAME_OVERLAP = 0.3
-_SLOW_NS = 50_000_000  # frames so far apart do not leave a check to the next
 _NOT_SEEN = "no hand is seen in the colour image; raise the bare hand in front of the camera"
 
 
@@ -28,23 +24,10 @@ class Detector(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class _Check:
-    """A check of a track, begun with one frame and used with the next."""
-
-    track: Track
-    part: Box
-    cloud: CoarseCloud
-    found: Future[Detections]
-
-
 class RoiFinder:
     """Finds one hand and tracks it from frame to frame.
 
-    Between detections the box moves with the pixels in it at the hand's depth. The detector checks
-    a tracked hand in a thread, beside the other work for that frame; the next frame waits for the
-    answer, so that the boxes do not depend on the computer's speed. Where frames are far apart, or
-    the last check saw no hand, the same frame waits for it.
+    Between detections the box moves with the pixels in it at the hand's depth.
 
     Parameters
     ----------
@@ -75,68 +58,38 @@ class RoiFinder:
         self._seen_ns: int | None = None
         self._looked_ns: int | None = None
         self._chosen_ns = 0
-        self._check: _Check | None = None
 
     def find(self, frame: Frame) -> Box | None:
         """Return the hand's box in the depth image; None if no hand is seen, or without colour."""
         if frame.color is None:
             return None
         now_ns = frame.t_camera_ns
-        check, self._check = self._check, None
         if self._seen_ns is None or now_ns < self._seen_ns:
-            self._track = self._looked_ns = check = None  # a recording has started or restarted
+            self._track = self._looked_ns = None  # a recording has started or restarted
             self._seen_ns = now_ns
         half_frame_ns, self._seen_ns = (now_ns - self._seen_ns) / 2, now_ns
         cloud = CoarseCloud(frame, self._gate_m)
         self._track = self._track and cloud.follow(self._track)
-        if check is not None and self._track is not None:
-            self._use(check, frame.color, cloud, now_ns)
         wait_s = self._settings.search_s
         if self._track is not None and not self._misses:
             wait_s = self._settings.check_s
         if self._looked_ns is None or now_ns - self._looked_ns >= wait_s * 1e9 - half_frame_ns:
             self._looked_ns = now_ns
-            if self._track is None:
-                self._search(frame.color, cloud, now_ns)
-            else:
-                check = self._begin_check(self._track, frame.color, cloud)
-                if self._misses or half_frame_ns > _SLOW_NS / 2:
-                    self._use(check, frame.color, cloud, now_ns)
-                else:
-                    self._check = check
+            self._look(frame.color, cloud, now_ns)
         return None if self._track is None else cloud.clip(self._track.box)
 
-    def _begin_check(self, track: Track, color: UInt8, cloud: CoarseCloud) -> _Check:
-        part = cloud.surroundings(track, self._settings.check_margin)
-        found: Future[Detections] = Future()
-
-        def detect() -> None:
-            try:
-                found.set_result(self._detect(color, part, self._settings.check_pixels))
-            except Exception as error:
-                found.set_exception(error)
-
-        threading.Thread(target=detect, name="handcal detector").start()
-        return _Check(track, part, cloud, found)
-
-    def _use(self, check: _Check, color: UInt8, cloud: CoarseCloud, now_ns: int) -> None:
-        """Confirm the track, or drop it, by a check of the frame before."""
-        hands = self._hands(check.found.result(), check.part, check.cloud)
-        seen = _same(hands, check.track)
-        confirmed = seen and cloud.follow(seen)
+    def _look(self, color: UInt8, cloud: CoarseCloud, now_ns: int) -> None:
+        """Run the detector to confirm the track, drop it, or start one."""
+        confirmed = self._track and self._confirm(self._track, color, cloud)
         if confirmed is not None:
             self._track, self._misses = confirmed, 0
             is_due = now_ns - self._chosen_ns >= self._settings.choose_s * 1e9
-            if is_due and cloud.may_precede(confirmed, self._wanted):
-                self._search(color, cloud, now_ns)
-            return
-        self._misses += 1
-        if self._misses >= self._settings.misses:
-            self._search(color, cloud, now_ns)
-
-    def _search(self, color: UInt8, cloud: CoarseCloud, now_ns: int) -> None:
-        """Start a track; without another hand, one confirmed just now stays."""
-        confirmed = None if self._misses else self._track
+            if not (is_due and cloud.may_precede(confirmed, self._wanted)):
+                return
+        elif self._track is not None:
+            self._misses += 1
+            if self._misses < self._settings.misses:
+                return
         self._misses = 0
         self._chosen_ns = now_ns
         self._track = self._choose(color, cloud) or confirmed
@@ -148,8 +101,7 @@ class RoiFinder:
         """
         height, width = color.shape[:2]
         self.problem = _NOT_SEEN
-        whole = 0, 0, width, height
-        hands = self._hands(self._detect(color, whole), whole, cloud)
+        hands = self._hands(color, (0, 0, width, height), None, cloud)
         least = self._settings.sure_min * max((hand.score for hand in hands), default=0.0)
         sure = sorted((hand for hand in hands if hand.score >= least), key=self._order)
         confirmed = (self._confirm(hand, color, cloud) for hand in sure)
@@ -158,17 +110,15 @@ class RoiFinder:
     def _confirm(self, track: Track, color: UInt8, cloud: CoarseCloud) -> Track | None:
         """Return the track as updated by the detector; None if it sees no hand there."""
         part = cloud.surroundings(track, self._settings.check_margin)
-        found = self._detect(color, part, self._settings.check_pixels)
-        return _same(self._hands(found, part, cloud), track)
+        hands = self._hands(color, part, self._settings.check_pixels, cloud)
+        return next((hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP), None)
 
-    def _detect(self, color: UInt8, part: Box, pixels: int | None = None) -> Detections:
-        """Run the detector on a part of the image."""
+    def _hands(
+        self, color: UInt8, part: Box, pixels: int | None, cloud: CoarseCloud
+    ) -> list[Track]:
+        """Return the plausible hands detected in a part of the image."""
         x0, y0, x1, y1 = part
-        return self._detector.detect(color[y0:y1, x0:x1], pixels)
-
-    def _hands(self, found: Detections, part: Box, cloud: CoarseCloud) -> list[Track]:
-        """Return the plausible ones of the hands detected in a part of the image."""
-        x0, y0, _, _ = part
+        found = self._detector.detect(color[y0:y1, x0:x1], pixels)
         boxes = found.boxes_px + np.array([x0, y0, x0, y0])
         hands: list[Track] = []
         for box, score in zip(boxes, found.scores, strict=True):
@@ -212,11 +162,6 @@ def _on_one_hand(track: Track, other: Track) -> bool:
         inside_box(center(track.box)[None], other.box).any()
         or inside_box(center(other.box)[None], track.box).any()
     )
-
-
-def _same(hands: list[Track], track: Track) -> Track | None:
-    """Return the surest of the hands that is a track's hand; None if none is."""
-    return next((hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP), None)
 
 
 def _overlap(track: Track, other: Track) -> float:

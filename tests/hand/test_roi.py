@@ -1,5 +1,3 @@
-import threading
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -50,18 +48,8 @@ def frame(index: int, *things: tuple[Box, float], camera_x_px: int = 0) -> Frame
     return Frame(index, index * FRAME_NS, 0, depth, 0.001, CAMERA, color, CAMERA)
 
 
-class WaitingFinder(RoiFinder):
-    """Returns once a check has ended, so that tests can change what the detector sees next."""
-
-    def find(self, frame: Frame) -> Box | None:
-        box = super().find(frame)
-        if self._check is not None:
-            self._check.found.exception()
-        return box
-
-
 def finder(eyes: Eyes, wanted: Roi = "detector") -> RoiFinder:
-    return WaitingFinder(eyes, SegmentSettings(roi=wanted))
+    return RoiFinder(eyes, SegmentSettings(roi=wanted))
 
 
 def overlap(box: Box | None, other: Box) -> float:
@@ -186,50 +174,6 @@ def test_the_detector_looks_seldom_and_nearby_at_a_hand_that_is_followed() -> No
         assert roi.find(frame(index, (moved_by(NEAR, 4 * index), 0.5))) is not None
     assert eyes.looks <= 14
     assert eyes.wide_looks == 1
-
-
-@dataclass
-class SlowEyes(Eyes):
-    """A detector that is still at work on a check until it may end."""
-
-    may_end: threading.Event = field(default_factory=threading.Event)
-
-    def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
-        found = super().detect(color, pixels)
-        if self.looks > 2:  # after the search
-            assert self.may_end.wait(10.0)
-        return found
-
-
-def test_a_frame_does_not_wait_for_the_check_of_a_followed_hand_but_the_next_does() -> None:
-    eyes = SlowEyes()
-    roi = RoiFinder(eyes, SegmentSettings())
-    index = 0
-    while roi._check is None:
-        assert roi.find(frame(index, (moved_by(NEAR, 4 * index), 0.5))) is not None
-        index += 1
-    with ThreadPoolExecutor(1) as pool:
-        box = pool.submit(roi.find, frame(index, (moved_by(NEAR, 4 * index), 0.5)))
-        with pytest.raises(TimeoutError):
-            box.result(0.1)
-        eyes.may_end.set()
-        assert overlap(box.result(), moved_by(NEAR, 4 * index)) > 0.9
-
-
-def test_a_check_that_fails_is_reported_with_the_next_frame() -> None:
-    class Broken(Eyes):
-        def detect(self, color: UInt8, pixels: int | None = None) -> Detections:
-            if self.looks == 2:
-                raise RuntimeError("no memory")
-            return super().detect(color, pixels)
-
-    roi = finder(Broken())
-    index = 0
-    while roi._check is None:
-        roi.find(frame(index, (NEAR, 0.5)))
-        index += 1
-    with pytest.raises(RuntimeError, match="no memory"):
-        roi.find(frame(index, (NEAR, 0.5)))
 
 
 RATES_HZ = pytest.mark.parametrize("rate_hz", [6, 7, 9, 12, 15, 18, 30, 45, 60, 90])
