@@ -109,6 +109,7 @@ def _connect_fine_tuning(panels: Panels, submit: Submit) -> None:
 
 def _connect_trials(panels: Panels, submit: Submit) -> None:
     trials, compare = panels.trials, tr("compare")
+    trials.fine_tuned_m = panels.fine_tune.shift_m
     trials.eye_changed.connect(panels.fine_tune.choose_eye)
     # A φ shown only for comparison is not the one that the trial is about.
     trials.trial_requested.connect(panels.fine_tune.settle)

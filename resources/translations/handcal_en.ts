@@ -1437,6 +1437,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Keep the hand up, and make the next cursor, for {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Make cursor</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1462,10 +1466,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Not accepted yet: verify {} again. Another alignment would change little.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Finish a&amp;s it is</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1558,6 +1558,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>The wearer has verified the result. Finish, or verify an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Finish as i&amp;t is</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1725,15 +1729,15 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The session is finished, its result not accepted: calibrate this wearer again, or continue with the next.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Everything is already saved. The session finishes by itself; Hold keeps it open.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Everything is already saved. Finish the session when you are done.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Not accepted. Go back to add an alignment, or finish as it is; all is saved.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1818,6 +1822,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Next wearer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted. Go back to measure more, or finish as it is; all is saved.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -15,6 +15,7 @@ from handcal_gui.pages.wizard.preconditions import (
     hand_still,
     is_placed,
     is_steady,
+    is_unsolved,
     needs_look,
 )
 from handcal_gui.pages.wizard.step_views import (
@@ -93,9 +94,11 @@ class PlannedWizard(Wizard):
 
     def step(self, snapshot: Snapshot) -> Step:
         """Return the step of the guide that the plan's next step belongs to."""
+        procedure = snapshot.procedure
+        if self._free is Step.SAVE and is_unsolved(snapshot):
+            self._free = _FOLLOWS
         if self._free is not _FOLLOWS:
             return self._free
-        procedure = snapshot.procedure
         step = _STATES.get(procedure.state)
         if step is None and procedure.next_step is not None:
             step = _STEPS.get(procedure.next_step.name)
@@ -138,7 +141,7 @@ class PlannedWizard(Wizard):
             return self._wait(step, snapshot)
         if procedure.state is State.APPLYING:
             return self._wait(step, snapshot)
-        if procedure.state in (State.ALIGNED, State.SOLVED):
+        if procedure.state in (State.ALIGNED, State.SOLVED) or planned.name is StepName.SOLVE:
             return self._solved(step, snapshot)
         match planned.name:
             case StepName.CURSOR:
@@ -151,9 +154,6 @@ class PlannedWizard(Wizard):
         return self._raise(snapshot)
 
     def _raise(self, snapshot: Snapshot) -> WizardView:
-        others: tuple[ButtonSpec, ...] = (ButtonSpec(Action.BACK, tr("&Back")),)
-        if snapshot.procedure.results is None and snapshot.procedure.alignments:
-            others += (ButtonSpec(Action.SOLVE, tr("Keep the alignments &so far")),)
         text = tr(
             "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
         ).format(distance(snapshot))
@@ -162,7 +162,7 @@ class PlannedWizard(Wizard):
             LOOK if needs_look(snapshot) else text,
             (hand_found(snapshot), hand_still(snapshot)),
             ButtonSpec(Action.TAKE_STEP, _WAITS_FOR_HAND, False),
-            others,
+            (ButtonSpec(Action.BACK, tr("&Back")),),
         )
 
     def _cursor(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
@@ -170,6 +170,8 @@ class PlannedWizard(Wizard):
         text = tr("Hold the hand still: it becomes the cursor for {}.").format(names)
         if snapshot.procedure.alignments:
             text = tr("Keep the hand up: the next cursor, for {}, follows at once.").format(names)
+            if self.is_held:
+                text = tr("Keep the hand up, and make the next cursor, for {}.").format(names)
         return WizardView(
             Step.MAKE_CURSOR,
             text,
@@ -180,6 +182,8 @@ class PlannedWizard(Wizard):
 
     def _solved(self, step: Step, snapshot: Snapshot) -> WizardView:
         text = tr("Solve for the positions of the eyes; the hand stays up.")
+        if snapshot.procedure.state not in (State.ALIGNED, State.SOLVED):
+            text = tr("The alignments have changed. Solve again.")
         main = self._take_step(tr("Solve"), tr("Solving…"), True)
         results = snapshot.procedure.results
         if snapshot.procedure.state is State.SOLVED and results is not None:
@@ -271,7 +275,7 @@ class PlannedWizard(Wizard):
             text,
             (hand_found(snapshot), hand_still(snapshot), *preconditions),
             main,
-            (*others, ButtonSpec(Action.NEXT, tr("Finish a&s it is"))),
+            (*others, ButtonSpec(Action.NEXT, tr("Finish as i&t is"))),
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:

@@ -20,6 +20,11 @@ def hand_still(snapshot: Snapshot) -> Precondition:
     return Precondition(tr("Hand held still"), is_steady(snapshot))
 
 
+def is_unsolved(snapshot: Snapshot) -> bool:
+    """Return whether a running session has no result, or none of its present alignments."""
+    return snapshot.procedure.results is None and not snapshot.record.is_finished
+
+
 def needs_look(snapshot: Snapshot) -> bool:
     """Return whether the wearer must turn the head before a hand can be placed in time."""
     return snapshot.observation is not None and snapshot.observation.needs_delay

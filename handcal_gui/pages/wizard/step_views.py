@@ -262,9 +262,17 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
     is_verified = is_settled and len(snapshot.record.verified_now) == len(judged)
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
     if snapshot.record.is_finished:
+        ended = tr(
+            "The session is complete. Take the headset off, or continue with the next wearer."
+        )
+        if judged and not is_settled:
+            ended = tr(
+                "The session is finished, its result not accepted: calibrate this wearer again, or "
+                "continue with the next."
+            )
         return WizardView(
             Step.SAVE,
-            tr("The session is complete. Take the headset off, or continue with the next wearer."),
+            ended,
             preconditions,
             ButtonSpec(Action.NEXT_WEARER, tr("Next wearer")),
             others,
@@ -275,7 +283,7 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
     if is_held or not judged:
         finish = tr("Everything is already saved. Finish the session when you are done.")
     if judged and not is_settled:
-        finish = tr("Not accepted. Go back to add an alignment, or finish as it is; all is saved.")
+        finish = tr("Not accepted. Go back to measure more, or finish as it is; all is saved.")
     if snapshot.problem:
         finish = tr("Solve the problem below, then finish the session.")
     return WizardView(

@@ -15,6 +15,7 @@ from handcal_gui.pages.wizard.preconditions import (
     hand_still,
     is_placed,
     is_steady,
+    is_unsolved,
     needs_look,
 )
 from handcal_gui.pages.wizard.step_views import (
@@ -101,6 +102,8 @@ class Wizard:
                 self._free = Step.VERIFY
                 return Step.SOLVE
             case State.APPLIED:
+                if self._free is Step.SAVE and is_unsolved(snapshot):
+                    self._free = Step.VERIFY
                 if self._free is Step.VERIFY:
                     self._repeat = None
             case State.SHOW_HAND:
@@ -248,7 +251,7 @@ class Wizard:
                 tr("Not accepted yet: align {} again, or finish as it is.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *others),
+                (ButtonSpec(Action.NEXT, tr("Finish as i&t is")), *others),
                 runs_after_s=ADVICE_S if few else None,
             )
         if not is_usable:
@@ -257,7 +260,7 @@ class Wizard:
                 tr("Do not use this result. Follow the advice below, then add alignments."),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add alignment")),
-                (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *each),
+                (ButtonSpec(Action.NEXT, tr("Finish as i&t is")), *each),
             )
         if not self._skipped:
             return WizardView(

@@ -154,7 +154,9 @@ class WizardPanel(QWidget):
         if snapshot.comparing is not None:
             main = replace(view.main, is_enabled=False)
             said = _COMPARING[self._is_station]
-            view = replace(view, sentence=said, main=main, others=(), note="", runs_after_s=None)
+            view = replace(
+                view, sentence=said, main=main, others=(), note="", fact="", runs_after_s=None
+            )
         self.comparison.show_comparison(
             snapshot.comparing, has_seen_both=snapshot.has_compared_both, can_begin=False, count=0
         )

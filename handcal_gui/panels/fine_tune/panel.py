@@ -121,6 +121,13 @@ class FineTunePanel(QWidget):
         self._begin(_OFFLINE)
         self._refresh()
 
+    def shift_m(self) -> Shifts:
+        """Return φ of each eye, (3,), metres, as set here, and in the headset a little later.
+
+        It is empty until it is known.
+        """
+        return {} if self._obstacle == _NO_SESSION else self._history.present
+
     def choose_eye(self, eye: Eye) -> None:
         """Let the keys move this eye."""
         self._editors[eye].chosen.setChecked(True)

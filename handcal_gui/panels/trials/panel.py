@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
 from time import monotonic
 
@@ -19,7 +20,7 @@ from handcal.session.comparison import read_comparisons
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
-from handcal.types import EYES, Eye
+from handcal.types import EYES, Eye, Float64
 from handcal_gui.keys import add_action
 from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.panels.trials.trial_plot import TrialPlot
@@ -81,6 +82,8 @@ class TrialsPanel(QWidget):
         any more.
     delete_requested, restore_requested : Signal(str, int)
         "trial", and its number.
+    fine_tuned_m : callable
+        Returns φ of each eye as set by hand, which the headset may not have yet; empty if unknown.
     """
 
     trial_requested = Signal(str, float)
@@ -101,6 +104,7 @@ class TrialsPanel(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._snapshot: Snapshot | None = None
         self._record: SessionRecord | None = None
+        self.fine_tuned_m: Callable[[], Mapping[Eye, Float64]] = dict
         self._is_read_only = self._is_doubtful = self._is_finished = False
         self._eyes, self._depth = QComboBox(), QComboBox()
         self._shows_target = QCheckBox(tr("Show the tar&get in the headset"))
@@ -166,6 +170,9 @@ class TrialsPanel(QWidget):
         if chosen is not None:
             return chosen
         trials = tuple(self._record.trials.values()) if self._record else ()
+        results = self._snapshot.procedure.results if self._snapshot else None
+        if results is not None and len(results.eyes) == 1:
+            return next(iter(results.eyes))
         return "right" if trials and trials[-1].eye == "left" else "left"
 
     def _obstacle(self) -> str:
@@ -175,6 +182,8 @@ class TrialsPanel(QWidget):
         if self._snapshot is None:
             return tr("Trials are recorded while a session runs.")
         procedure, eye = self._snapshot.procedure, self._next_eye()
+        if procedure.state is State.VERIFY:
+            return tr("An eye is being verified; confirm or skip that first.")
         if procedure.state is not State.APPLIED or procedure.results is None:
             return tr("Solve and apply the alignments first.")
         if self._snapshot.comparing is not None:  # the drawing may be without the calibration
@@ -190,7 +199,13 @@ class TrialsPanel(QWidget):
             return False
         eye = self._next_eye()
         calibrated_m = procedure.results.rendered_shift_m[eye]
-        return bool(np.allclose(procedure.applied_shift_m[eye], calibrated_m, rtol=0.0, atol=1e-6))
+        return bool(np.allclose(self._shift_m(eye), calibrated_m, rtol=0.0, atol=1e-6))
+
+    def _shift_m(self, eye: Eye) -> Float64:
+        """Return φ as set by hand, also while the headset does not have it yet."""
+        assert self._snapshot is not None
+        tuned_m = self.fine_tuned_m() or self._snapshot.procedure.applied_shift_m
+        return tuned_m[eye]
 
     def _is_untouched(self) -> bool:
         """Return whether the next trial would repeat the last one of its eye and distance."""
@@ -203,9 +218,8 @@ class TrialsPanel(QWidget):
             for trial in self._record.trials.values()
             if trial.eye == eye and trial.target_depth_m == depth_m
         ]
-        applied_m = procedure.applied_shift_m[eye]
         return bool(before) and bool(
-            np.allclose(applied_m, before[-1].adjusted_shift_m, rtol=0.0, atol=1e-6)
+            np.allclose(self._shift_m(eye), before[-1].adjusted_shift_m, rtol=0.0, atol=1e-6)
         )
 
     def _doubt(self) -> str:

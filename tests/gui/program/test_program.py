@@ -166,8 +166,9 @@ def test_fine_tuning_streams_is_recorded_and_judged_by_trials(
     (trial,) = live.snapshot.record.trials.values()
     t_C0_V_m = live.snapshot.record.rig.eyes["left"].t_C0_V_m
     np.testing.assert_allclose(target.corners_V_m + t_C0_V_m, trial.corners_E_m)
-    # It would be the right eye's turn, which has not been aligned.
-    live.wait(lambda: studio.headset.shown.target is None)
+    # It would be the right eye's turn, which has not been aligned: the left one has another.
+    assert studio.headset.shown.target is not None
+    assert window.panels.trials.record_action.isEnabled()
     np.testing.assert_allclose(trial.adjusted_shift_m - trial.calibrated_shift_m, [step_m, 0, 0])
     assert trial.eye == "left"
     assert trial.error_px.min() > 0.0

@@ -236,11 +236,33 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
         wizard = begun(snapshot)
 
 
-def test_changed_alignments_can_be_solved_again(snapshot: Maker) -> None:
-    view = begun(snapshot).view(planned_snapshot(snapshot, StepName.RAISE, results=None))
-    assert Action.SOLVE in [one.action for one in view.others]
-
-
 def test_every_other_action_is_the_engine_s(snapshot: Maker) -> None:
     with pytest.raises(ValueError, match="engine"):
         begun(snapshot).move(Action.TAKE_STEP, planned_snapshot(snapshot, StepName.CURSOR))
+
+
+@pytest.mark.parametrize("state", [State.SHOW_HAND, State.APPLIED])
+def test_alignments_without_a_result_are_solved_again_also_from_save(
+    snapshot: Maker, state: State
+) -> None:
+    wizard = begun(snapshot)
+    done = planned_snapshot(snapshot, StepName.DONE, verifications=VERIFIED)
+    wizard.move(Action.NEXT, done)
+    assert wizard.step(done) is Step.SAVE
+    changed = planned_snapshot(snapshot, StepName.SOLVE, results=None)
+    changed = replace(changed, procedure=replace(changed.procedure, state=state))
+    assert wizard.step(changed) is Step.SOLVE
+    assert not wizard.holds_plan, "the station solves by itself"
+    wizard.is_held = True
+    view = wizard.view(changed)
+    assert view.sentence == "The alignments have changed. Solve again."
+    assert (view.main.action, view.main.label) == (Action.TAKE_STEP, "Solve")
+    assert view.main.is_enabled
+
+
+def test_a_held_plan_does_not_say_that_the_next_cursor_follows(snapshot: Maker) -> None:
+    wizard = begun(snapshot)
+    cursor = planned_snapshot(snapshot, StepName.CURSOR)
+    assert wizard.view(cursor).sentence.endswith("follows at once.")
+    wizard.is_held = True
+    assert wizard.view(cursor).sentence.startswith("Keep the hand up, and make the next cursor")

@@ -208,6 +208,11 @@ def test_only_what_a_person_need_not_decide_runs_by_itself(
     assert wizard.view(replace(accepted, problem="the disk is full")).runs_after_s is None
     assert wizard.view(many).runs_after_s is None, "it is not accepted"
     assert wizard.view(many).sentence.startswith("Not accepted. Go back")
+    finished = replace(many, record=replace(many.record, is_finished=True))
+    assert "not accepted" in wizard.view(finished).sentence
+    unsolved = replace(many, procedure=replace(many.procedure, results=None))
+    view = wizard.view(unsolved)
+    assert (view.step, view.main.action) == (Step.VERIFY, Action.SOLVE)
 
 
 def test_each_solved_eye_is_verified_before_anything_is_said_to_fit(snapshot: Maker) -> None:

@@ -24,6 +24,7 @@ from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
+from handcal.types import Eye, EyeShift
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.key_cap import KeyCap
@@ -74,6 +75,7 @@ def test_needs_the_eye_to_be_solved(
 ) -> None:
     one = replace(results, eyes={"right": results.eyes["right"]})
     panel.show_snapshot(snapshot(State.APPLIED, procedure={"results": one}))
+    choose(panel, "Eye", "Left eye")
     assert text(panel, "message") == "The left eye has not been aligned."
     choose(panel, "Eye", "Right eye")
     assert button(panel, QToolButton, "Record trial").isEnabled()
@@ -131,6 +133,28 @@ def test_a_trial_of_nothing_must_be_asked_for_twice(
     panel.show_snapshot(tuned(snapshot))
     panel.record_action.trigger()
     assert len(asked) == 2
+
+
+def test_a_shift_set_just_now_counts_before_the_headset_has_it(
+    qtbot: QtBot, panel: TrialsPanel, snapshot: Callable[..., Snapshot]
+) -> None:
+    panel.show_snapshot(snapshot(State.APPLIED))
+    panel.fine_tuned_m = lambda: tuned(snapshot).procedure.applied_shift_m
+    with qtbot.waitSignal(panel.trial_requested), qtbot.assertNotEmitted(panel.doubted):
+        panel.record_action.trigger()
+
+
+def test_the_turn_stays_with_the_only_solved_eye(
+    panel: TrialsPanel, tried: SessionRecord, snapshot: Callable[..., Snapshot]
+) -> None:
+    assert list(tried.trials.values())[-1].eye == "left"
+    seen = snapshot(State.APPLIED, record=tried)
+    assert seen.procedure.results is not None
+    only: dict[Eye, EyeShift] = {"left": seen.procedure.results.eyes["left"]}
+    results = replace(seen.procedure.results, eyes=only)
+    panel.show_snapshot(replace(seen, procedure=replace(seen.procedure, results=results)))
+    assert panel.record_action.isEnabled()
+    assert "left eye" in text(panel, "message")
 
 
 def test_a_double_click_or_a_held_key_is_one_press(
