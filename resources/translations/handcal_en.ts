@@ -1469,6 +1469,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Finish a&amp;s it is</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>a fine-tuned one</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1558,10 +1562,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>The wearer has verified the result. Finish, or verify an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Finish as i&amp;t is</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

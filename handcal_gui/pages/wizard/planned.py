@@ -275,7 +275,7 @@ class PlannedWizard(Wizard):
             text,
             (hand_found(snapshot), hand_still(snapshot), *preconditions),
             main,
-            (*others, ButtonSpec(Action.NEXT, tr("Finish as i&t is"))),
+            (*others, ButtonSpec(Action.NEXT, tr("Finish a&s it is"))),
         )
 
     def _saved(self, snapshot: Snapshot) -> WizardView:

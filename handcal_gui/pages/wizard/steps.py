@@ -251,7 +251,7 @@ class Wizard:
                 tr("Not accepted yet: align {} again, or finish as it is.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
-                (ButtonSpec(Action.NEXT, tr("Finish as i&t is")), *others),
+                (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *others),
                 runs_after_s=ADVICE_S if few else None,
             )
         if not is_usable:
@@ -260,7 +260,7 @@ class Wizard:
                 tr("Do not use this result. Follow the advice below, then add alignments."),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Add alignment")),
-                (ButtonSpec(Action.NEXT, tr("Finish as i&t is")), *each),
+                (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *each),
             )
         if not self._skipped:
             return WizardView(

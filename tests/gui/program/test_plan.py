@@ -81,7 +81,7 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
         lambda: bool((technician.snapshot.procedure.applied_shift_m["left"] == solved_m).all())
     )
     technician.wait(lambda: technician.can(Action.VERIFY_LEFT))
-    button(program.window, QPushButton, "Finish as i&t is").click()
+    button(program.window, QPushButton, "Finish a&s it is").click()
     technician.press_space_for(Action.FINISH)
     technician.wait(lambda: technician.can(Action.NEXT_WEARER))
     path = technician.snapshot.session_path
