@@ -115,5 +115,14 @@ def test_each_step_of_a_held_plan_is_taken_by_a_press(technician: Technician, st
     technician.child(QPushButton, "wizardOther1").click()  # skip
     technician.wait(lambda: technician.can(Action.ANOTHER))
     assert technician.record.facts.verified == {}
+    session = technician.program.window.panels.session
+    session.delete_requested.emit("alignment", 1)
+    technician.wait(lambda: not technician.snapshot.procedure.alignments)
+    session.restore_requested.emit("alignment", 1)
+    technician.wait(lambda: technician.can(Action.TAKE_STEP))  # not waiting for a hand for good
+    for state in (State.SOLVED, State.APPLIED):
+        technician.press_space_for(Action.TAKE_STEP)
+        technician.wait_for_state(state)
+    technician.wait(lambda: technician.can(Action.ANOTHER))
     button(technician.program.window, QPushButton, "Verify l&eft eye").click()
     technician.wait_for_state(State.VERIFY)
