@@ -186,9 +186,12 @@ class CloudView(QWidget):
         points_px[:, :2] += np.divide(size, 2.0)
         background = rgb(colors().canvas)
         point_px = np.clip(_POINT_MM * self._orbit.px_per_mm, _LEAST_POINT_PX, _MOST_POINT_PX)
-        is_outlier = (self._colors == rgb(OUTLIER)).all(axis=1)
-        seen = points_px[~is_outlier], self._colors[~is_outlier]
-        image = splat(*seen, background, size, round(ratio * point_px))
+        seen, shades = points_px, self._colors
+        # Channel by channel, a tenth of the time; a live cloud, painted for every frame, has none.
+        red, green, blue = (shades[:, i] == shade for i, shade in enumerate(rgb(OUTLIER)))
+        if (is_outlier := red & green & blue).any():
+            seen, shades = seen[~is_outlier], shades[~is_outlier]
+        image = splat(seen, shades, background, size, round(ratio * point_px))
         painter.drawImage(QRectF(self.rect()), image)
         painter.setPen(QPen(QColor(OUTLIER), 1))
         draw_crosses(painter, points_px[is_outlier, :2] / ratio, point_px)
