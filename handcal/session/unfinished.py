@@ -8,6 +8,7 @@ from pathlib import Path
 from handcal.errors import FileError
 from handcal.io.lock import FileLock
 from handcal.session.journal import find_journals, read_journal
+from handcal.session.record import SessionRecord
 from handcal.session.session import Session
 from handcal.session.state import ASIDE, VERIFYING, SessionEvent
 
@@ -33,6 +34,28 @@ class UnfinishedSession:
     """Reason why it cannot be resumed, such as another program; empty if it can."""
     is_repaired: bool = False
     """True if a repaired copy of this damaged session is in the same folder."""
+
+    @property
+    def is_worth_resuming(self) -> bool:
+        """True if it holds an alignment, a trial or a verification, be it one only begun."""
+        return bool(self.alignments or self.trials or self.verified or self.is_verifying)
+
+
+def summarize(
+    record: SessionRecord, started: str = "", *, has_copy: bool = False
+) -> UnfinishedSession:
+    """Return what an unfinished session holds; `has_copy`: a repaired copy is beside it."""
+    return UnfinishedSession(
+        record.path,
+        started,
+        record.wearer,
+        len(record.alignments),
+        len(record.trials),
+        len(record.facts.verified),
+        any(event.name == VERIFYING for event in record.events),
+        len(record.damaged),
+        is_repaired=bool(record.damaged) and has_copy,
+    )
 
 
 def unfinished_and_repaired(parent: Path) -> tuple[list[UnfinishedSession], set[Path]]:
@@ -75,14 +98,4 @@ def _inspect(
         record = Session.open(path)
     except FileError as error:
         return UnfinishedSession(path, started, problem=str(error))
-    return UnfinishedSession(
-        path,
-        started,
-        record.wearer,
-        len(record.alignments),
-        len(record.trials),
-        len(record.facts.verified),
-        VERIFYING in names,
-        len(record.damaged),
-        is_repaired=bool(record.damaged) and has_copy,
-    )
+    return summarize(record, started, has_copy=has_copy)

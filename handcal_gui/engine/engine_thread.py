@@ -14,8 +14,7 @@ from PySide6.QtCore import QObject, Signal
 
 from handcal.bridge.bridges import BridgeSettings, open_bridges
 from handcal.errors import HandcalError
-from handcal.session.record import SessionRecord
-from handcal.session.state import VERIFYING
+from handcal.session.unfinished import summarize
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.engine.worker import Worker
@@ -133,7 +132,8 @@ class EngineThread(Worker):
         except Exception as error:
             _LOG.exception("the engine failed unexpectedly")
             advice = tr("nothing was recorded: start again")
-            if (snapshot := self._newest[0]) is not None and _can_resume(snapshot.record):
+            snapshot, _ = self._newest
+            if snapshot is not None and summarize(snapshot.record).is_worth_resuming:
                 advice = tr("the session is kept: resume it")
             why = tr("handcal hit an unexpected error ({}); {}").format(_describe(error), advice)
         self._emit_later(self.ended.emit, why)
@@ -163,12 +163,6 @@ class EngineThread(Worker):
                 _LOG.exception("a command failed unexpectedly: %s", name)
                 self._emit_later(self.failed.emit, name, _describe(error))
             self._done += 1
-
-
-def _can_resume(record: SessionRecord) -> bool:
-    """Return whether the start page offers to resume a session."""
-    held = record.alignments or record.trials or record.facts.verified
-    return bool(held) or any(event.name == VERIFYING for event in record.events)
 
 
 def _give_back_memory() -> None:

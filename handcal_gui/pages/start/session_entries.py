@@ -67,8 +67,7 @@ def find_sessions(folder: Path, recent: Sequence[Path]) -> KnownSessions:
         unfinished=tuple(
             _unfinished(session)
             for session in unfinished
-            if not session.is_repaired
-            and (session.problem or any(_counts(session)) or session.is_verifying)
+            if not session.is_repaired and (session.problem or session.is_worth_resuming)
         ),
         recent=tuple(islice((entry for entry in offered if entry is not None), MOST_RECENT)),
     )

@@ -173,6 +173,7 @@ def test_an_engine_that_breaks_down_closes_the_station_and_says_so(
 ) -> None:
     station = FakeStation()
     nothing = {"alignments": {}, "trials": {}, "facts": SessionFacts(), "events": ()}
+    nothing |= {"path": Path("session"), "wearer": "", "damaged": ()}
     station.record = SimpleNamespace(**{**nothing, **held})
     station.breaks_at = 5
     engine = EngineThread(lambda: cast(Station, station))
