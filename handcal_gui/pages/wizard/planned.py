@@ -20,6 +20,7 @@ from handcal_gui.pages.wizard.preconditions import (
 )
 from handcal_gui.pages.wizard.step_views import (
     LOOK,
+    SETTLED,
     UNUSABLE,
     align_view,
     connect_view,
@@ -231,7 +232,7 @@ class PlannedWizard(Wizard):
 
     def _done(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         procedure, preconditions = snapshot.procedure, eyes_accepted(snapshot)
-        if any(one.verdict not in ("accept", "keep") for one in preconditions) or not preconditions:
+        if any(one.verdict not in SETTLED for one in preconditions) or not preconditions:
             view = self._not_accepted(preconditions, snapshot)
             return view if preconditions else replace(view, sentence=f"{sentence(planned.text)}.")
         text = tr("Not every eye has been verified. Finish as it is, or verify an eye.")

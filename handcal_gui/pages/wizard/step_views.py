@@ -36,6 +36,8 @@ SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
 """Waiting times of automatic steps: for the hand, and to read a text or advice."""
 LOOK = tr("Keep the hand up, and look slowly to the left and to the right.")
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
+SETTLED: frozenset[VerdictName] = frozenset({"accept", "keep"})
+"""Verdicts after which a session can be finished without anything left to decide."""
 _LEAST_LOOK_NS = 1_500_000_000
 """Time from a drawing to its confirmation: a second press of a key confirms nothing unseen."""
 _GATE_MARGIN_M = 0.05
@@ -258,7 +260,7 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
     )
     others = (ButtonSpec(Action.EXPORT, tr("E&xport…")), ButtonSpec(Action.BACK, tr("&Back")))
     judged = preconditions[1:]
-    is_settled = bool(judged) and all(one.verdict in ("accept", "keep") for one in judged)
+    is_settled = bool(judged) and all(one.verdict in SETTLED for one in judged)
     is_verified = is_settled and len(snapshot.record.verified_now) == len(judged)
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
     if snapshot.record.is_finished:
