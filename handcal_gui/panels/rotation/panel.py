@@ -61,6 +61,7 @@ class RotationPanel(QWidget):
         self._plot.setMinimumHeight(_PLOT_PX)
         self._plot.item.setXRange(-_HISTORY_S, 0.0, padding=0.0)
         self._plot.item.getAxis("bottom").setStyle(showValues=False, tickLength=0)
+        self._plot.item.getAxis("left").setTicks([[]])  # until there is a limit
         self._limit_line = self._plot.add_line("red", dashed=True)
         self._angle_line = self._plot.add_line("live")
         self._limit_rad = 0.0

@@ -212,6 +212,15 @@ def test_nothing_overlaps_in_a_low_dock(
     assert dial.height() >= dial.minimumHeight()
 
 
+def test_the_history_has_no_numbers_before_there_is_a_limit(
+    panel: RotationPanel, snapshot: Make
+) -> None:
+    axis = child(panel, Plot, "rotation-history").item.getAxis("left")
+    assert axis._tickLevels == [[]], "pyqtgraph's own would overlap"
+    panel.show_snapshot(snapshot())
+    assert len(axis._tickLevels[0]) == 1
+
+
 def test_curve_and_limit_are_apart_in_a_window_of_1280x720(
     panel: RotationPanel, snapshot: Make
 ) -> None:
