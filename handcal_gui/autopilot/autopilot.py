@@ -31,8 +31,8 @@ class Autopilot(QObject):
     live : CalibrationController
     wizard_panel : WizardPanel
     look : callable, optional
-        Called with every view before its button is pressed, and while the wearer aligns; may
-        block, or pause the autopilot.
+        Called with every view that lasts, before its button is pressed; may block, or pause the
+        autopilot.
 
     Attributes
     ----------
@@ -81,15 +81,13 @@ class Autopilot(QObject):
         steps = snapshot.number - self._moved_at
         if now_s - self._moved_s > _PATIENCE_S and steps > _PATIENCE_STEPS:
             self._end(lambda: self.stuck.emit(self._complaint(view)))
-        elif now_s - self._since_s > _LOOK_S and (
-            view.main.is_enabled or view.main.action in WEARERS
-        ):
+        elif now_s - self._since_s > _LOOK_S:
             self._act(view)
 
     def _act(self, view: WizardView) -> None:
         self._since_s = time.monotonic()
         self._look(view)
-        if self._is_paused:
+        if self._is_paused or not (view.main.is_enabled or view.main.action in WEARERS):
             return
         if view.main.action is Action.NEXT_WEARER:
             self._end(self.finished.emit)
