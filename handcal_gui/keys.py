@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QAbstractSpinBox,
     QApplication,
     QComboBox,
@@ -87,6 +88,14 @@ def add_action(
         action.triggered.connect(lambda _checked=False: do())
     widget.addAction(action)
     return action
+
+
+def press(widget: QWidget | None) -> None:
+    """Press a button, or open a list."""
+    if isinstance(widget, QAbstractButton):
+        widget.click()
+    elif isinstance(widget, QComboBox) and not widget.isEditable():
+        widget.showPopup()
 
 
 class NoAltLetters(QObject):

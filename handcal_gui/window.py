@@ -20,7 +20,6 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
-    QComboBox,
     QDockWidget,
     QMainWindow,
     QStackedWidget,
@@ -41,6 +40,7 @@ from handcal_gui.docks import (
     share_room,
     widen_page,
 )
+from handcal_gui.keys import press
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.pages.wizard.action_bar import BottomStrip
 from handcal_gui.pages.wizard.wizard import WizardPanel
@@ -275,7 +275,7 @@ class MainWindow(QMainWindow):
             self.banner.clear()
         elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._page == "live":
             if not self._bar.is_repeat:
-                _press(QApplication.focusWidget())
+                press(QApplication.focusWidget())
         else:
             super().keyPressEvent(event)
 
@@ -389,11 +389,3 @@ class MainWindow(QMainWindow):
         for button in self.findChildren(QAbstractButton):
             if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
                 button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-
-
-def _press(widget: QWidget | None) -> None:
-    """Press a button, or open a list."""
-    if isinstance(widget, QAbstractButton):
-        widget.click()
-    elif isinstance(widget, QComboBox) and not widget.isEditable():
-        widget.showPopup()
