@@ -85,7 +85,8 @@ def _target(window: MainWindow, name: str) -> tuple[QAction | None, bool]:
         if own is None or not own.isEnabled():
             continue
         dock = _dock_of(own)
-        if dock.toggleViewAction().isEnabled() if dock else window.page == "live":
+        # The guide alone hides every panel, not what was deleted by one of its buttons.
+        if window.page == "live" or (dock is not None and dock.toggleViewAction().isEnabled()):
             return own, False
     return None, False
 

@@ -76,6 +76,8 @@ def test_a_deletion_is_chosen_in_the_table_and_undone_from_anywhere(
     with qtbot.waitSignal(session.restore_requested) as asked:
         press(window, "edit-undo")
     assert asked.args == ["alignment", 2]
+    window.use_arrangement("station")
+    assert offered(window) == {"edit-undo": "Undo: Session"}, "the guide discards alignments, too"
     window.show_page("start")
     assert offered(window) == {}
 

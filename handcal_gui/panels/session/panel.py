@@ -22,7 +22,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import paragraph, with_name
-from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.record_tabs import RecordTabs
@@ -218,10 +218,11 @@ class SessionPanel(QWidget):
         self._tabs.addTab(self._alignments, tr("Alignments"))
         self._tabs.addTab(self._trials, tr("Trials"))
         self._tabs.addTab(self._notes, tr("Notes"))
-        buttons = hbox(
-            (self._strip, 1), self._open_folder, self._inspect, self._export, spacing=SPACING_PX
-        )
-        vbox(form, (self._tabs, 1), buttons, on=self, margins=SPACING_PX, spacing=SPACING_PX)
+        keep_space(self._strip.button)
+        buttons = self._strip.button, (QWidget(), 1), self._open_folder, self._inspect, self._export
+        row = hbox(*buttons, spacing=SPACING_PX)
+        parts = form, (self._tabs, 1), self._strip, row
+        vbox(*parts, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 
 def _read_eye_distance(text: str) -> EyeDistance:

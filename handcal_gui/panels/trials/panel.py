@@ -277,7 +277,6 @@ class TrialsPanel(QWidget):
         found = deletions(self._record) if self._record and can_undo else []
         trials = [deletion for deletion in found if deletion.kind == "trial"]
         self._strip.show_deletions(trials)
-        self._strip.setVisible(bool(trials))  # the table needs its room
 
     def _ask(self) -> None:
         """Request a trial; one that may be a mistake must be requested twice."""
@@ -355,7 +354,7 @@ class TrialsPanel(QWidget):
             self._hint,  # below the buttons, which stay in place when it goes
             (tabs, 1),
             self._summary,
-            self._strip,
+            hbox((self._strip, 1), self._strip.button),
             on=self,
             margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
             spacing=SPACING_PX // 2,
