@@ -128,7 +128,8 @@ class MainWindow(QMainWindow):
             dock.dockLocationChanged.connect(self._titles_timer.start)
             dock.topLevelChanged.connect(self._own_layout)
         self._is_own, self._least_px = False, inf
-        self._share_soon = fit_soon(self._share_room, self)
+        self._was_small = False
+        self._share_soon = fit_soon(self._fit_panels, self)
         self._share_soon.setInterval(_SETTLED_MS)
         self._layouts: dict[Page, QByteArray] = {}
         self._page: Page = "start"
@@ -177,7 +178,7 @@ class MainWindow(QMainWindow):
         # to it, on the start page the space above the buttons.
         self._middle.insertWidget(int(page == "live"), self.banner)
         self._stack.setCurrentIndex(list(self._pages).index(page))
-        is_small = self._is_small()
+        is_small = self._was_small = self._is_small()
         self._guide.fill_window(self._arrangement == "station", is_small=is_small)
         self._restore_layout(page, is_small=is_small)
         for name, dock in self._docks.items():
@@ -344,6 +345,20 @@ class MainWindow(QMainWindow):
 
     def _own_layout(self) -> None:
         self._is_own = True
+
+    def _fit_panels(self) -> None:
+        """Share the window's new room, with the layout of its size unless the user has made one."""
+        if self._docks_of_page and not self._is_own and self._is_small() != self._was_small:
+            focus = QApplication.focusWidget()
+            closed = [one for one in self._docks.values() if not one.toggleViewAction().isChecked()]
+            self.reset_layout()
+            for dock in closed:
+                dock.close()
+            for dock in self._docks.values():
+                if focus is not None and dock.isAncestorOf(focus):
+                    dock.raise_()
+                    focus.setFocus()
+        self._share_room()
 
     def _share_room(self) -> None:
         """Divide the window as by default, or leave it, with a guide as wide as it needs to be."""

@@ -115,3 +115,18 @@ def test_a_layout_that_does_not_fit_is_left_out(window: MainWindow, text: str) -
     window.restore_layouts({"live": text})
     window.show_page("live")
     assert shown(window) == set(window.docks)
+
+
+def test_a_window_made_small_has_tabs_and_columns_again_once_it_is_large(
+    window: MainWindow,
+) -> None:
+    window.resize(1600, 1000)
+    window.show_page("live")
+    window.docks["link"].close()
+    window.docks["cloud"].widget().setFocus()
+    for size_px, is_small in (((960, 540), True), ((1600, 1000), False)):
+        window.resize(*size_px)
+        assert guide_px(window) >= 500
+        assert is_in_front(window, "cloud"), "it has the keyboard focus"
+        assert not window.docks["link"].toggleViewAction().isChecked(), "the user closed it"
+        assert bool(window.tabifiedDockWidgets(window.docks["camera"])) is is_small
