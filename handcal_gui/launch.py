@@ -16,7 +16,7 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QWidget
 
@@ -72,6 +72,7 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
     sys.excepthook = lambda *error: _report_error(program, *error)
     close_on_signals(program.window, program.end)
     if arguments.size:
+        program.window.setWindowState(Qt.WindowState.WindowNoState)  # it was maximized when closed
         program.window.resize(arguments.size)
         program.window.show()
     else:

@@ -38,7 +38,7 @@ _ORIGINS: Mapping[ShiftOrigin, str] = {
 }
 _VERDICTS: Mapping[VerdictName, str] = {
     "accept": "accepted",
-    "repeat": "must be aligned again",
+    "repeat": "not accepted yet",
     "keep": "offline calibration kept",
     "implausible": "implausible",
     "contradicted": "contradicted",

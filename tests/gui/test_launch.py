@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QComboBox, QWidget
 from pytestqt.qtbot import QtBot
@@ -86,6 +86,25 @@ def test_a_window_closed_before_the_event_loop_begins_ends_the_program(
     launch.launch(qapp, arguments, first)
     assert not entered
     assert arguments.preferences.exists()
+
+
+def test_a_size_is_that_of_the_window_although_it_was_maximized_when_closed(
+    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments.preferences.parent.mkdir(exist_ok=True)
+    program = Program(PreferencesFile(arguments.preferences))
+    program.window.showMaximized()
+    program.window.close()
+    arguments.size = QSize(1100, 650)
+    seen = []
+
+    def look() -> None:
+        window = next(one for one in qapp.topLevelWidgets() if isinstance(one, MainWindow))
+        seen.append((window.isMaximized(), window.size()))
+
+    monkeypatch.setattr(qapp, "exec", look)
+    launch.launch(qapp, arguments, first)
+    assert seen == [(False, arguments.size)]
 
 
 class _Windows(QObject):

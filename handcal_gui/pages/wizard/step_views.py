@@ -77,9 +77,12 @@ def connect_view(snapshot: Snapshot) -> WizardView:
             "The former result is used again ({}): the wearer verifies each eye first, and "
             "alignments follow only if they are needed."
         ).format(session_time(former))
+    text = tr("{} and wait until camera and headset are connected.").format(puts_on)
+    if is_ready:
+        text = tr("{}, then press {}.").format(puts_on, label)
     return WizardView(
         Step.CONNECT,
-        tr("{} and wait until camera and headset are connected.").format(puts_on),
+        text,
         preconditions,
         ButtonSpec(Action.NEXT, label, is_ready),
         fact=fact,

@@ -34,7 +34,7 @@ _COMPARING = {
     True: tr("The wearer compares two drawings. Record the answer here, or stop comparing."),
 }
 """Beside the panels, and in the station, which shows no trials."""
-_NO_TRIALS = tr("Trials are recorded with the panels in sight: press F11, then T")
+_NO_TRIALS = tr("Trials are recorded once φ is solved, beside the panels: press F11, then T")
 _RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
 _SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
 """Size of the ring and scales of texts, in a window with panels and in one without."""

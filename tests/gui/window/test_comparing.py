@@ -87,7 +87,7 @@ def test_in_the_station_the_key_of_trials_says_where_they_are_recorded(
     qtbot.waitActive(window)
     press(window, Qt.Key.Key_T)
     said = child(window, QLabel, "brief").text()
-    assert said == "Trials are recorded with the panels in sight: press F11, then T"
+    assert said == "Trials are recorded once φ is solved, beside the panels: press F11, then T"
     window.use_arrangement("panels")
     with qtbot.waitSignal(trials.doubted):  # φ was not moved since
         press(window, Qt.Key.Key_T)
