@@ -77,7 +77,7 @@ class Conditions:
             or (tr("{}; see Link").format(snapshot.problem) if snapshot.problem else "")
             or camera.problem
             or link_problem
-            or (_FEW_POSES if 0.0 < link.pose_rate_hz < _FEW_POSES_HZ else "")
+            or (_FEW_POSES if link.connected and link.pose_rate_hz < _FEW_POSES_HZ else "")
             or snapshot.contradiction
             or self._slow_text
         )

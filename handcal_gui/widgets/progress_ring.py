@@ -14,7 +14,7 @@ _STEPS = 60
 
 
 class ProgressRing(QWidget):
-    """Shows a count with its name, and fills with it or with the time until a step runs itself."""
+    """Shows a count with its name, and fills with it; within, the time until a step runs itself."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -22,13 +22,14 @@ class ProgressRing(QWidget):
         self.setAccessibleName(tr("Progress"))
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._text = self._unit = ""
-        self._part, self._counts = 0, True
+        self._part = 0
+        self._waited: int | None = None
         self.set_diameter(8 * SPACING_PX)
 
     @property
     def share(self) -> float | None:
-        """The share of the waiting time shown; None if the count is."""
-        return None if self._counts else self._part / _STEPS
+        """The share of the waiting time shown; None if no step runs itself."""
+        return None if self._waited is None else self._waited / _STEPS
 
     @property
     def text(self) -> str:
@@ -42,11 +43,12 @@ class ProgressRing(QWidget):
     def show_count(self, done: int, planned: int, unit: str, share: float | None = None) -> None:
         """Show a count, and the share from 0 to 1 of a step's waiting time, if there is one."""
         text = f"{done}/{planned}"
-        part = round(_STEPS * (done / planned if share is None else share))
-        shown = part, share is None, text, unit
-        if shown != (self._part, self._counts, self._text, self._unit):
-            self._part, self._counts, self._text, self._unit = shown
-            filled = "" if self._counts else f", {100 * part // _STEPS} %"
+        part = round(_STEPS * done / planned)
+        waited = None if share is None else round(_STEPS * share)
+        shown = part, waited, text, unit
+        if shown != (self._part, self._waited, self._text, self._unit):
+            self._part, self._waited, self._text, self._unit = shown
+            filled = "" if waited is None else f", {100 * waited // _STEPS} %"
             self.setAccessibleDescription(f"{text} {unit}{filled}")
             self.update()
 
@@ -60,16 +62,21 @@ class ProgressRing(QWidget):
         faint.setAlphaF(0.3)
         painter.setPen(QPen(faint, width))
         painter.drawEllipse(ring)
-        if self._part:
-            pen = QPen(QColor(colors().good if self._counts else colors().live), width)
-            pen.setCapStyle(Qt.PenCapStyle.FlatCap)
-            painter.setPen(pen)
-            painter.drawArc(ring, 90 * 16, -round(360 * 16 * self._part / _STEPS))
+        self._fill(painter, ring, self._part, colors().good, width)
+        inner = ring.adjusted(width * 0.8, width * 0.8, -width * 0.8, -width * 0.8)
+        self._fill(painter, inner, self._waited or 0, colors().live, width / 2)
         painter.setPen(self.palette().windowText().color())
         upper = ring.adjusted(0, 0, 0, -ring.height() / 4 if self._unit else 0)
         self._write(painter, upper, self._text, self.width() // 4)
-        lower = ring.adjusted(1.3 * width, ring.height() / 2.2, -1.3 * width, -ring.height() / 6)
+        lower = ring.adjusted(1.6 * width, ring.height() / 2.2, -1.6 * width, -ring.height() / 6)
         self._write(painter, lower, self._unit, self.width() // 6)
+
+    def _fill(self, painter: QPainter, ring: QRectF, part: int, color: str, width: float) -> None:
+        """Draw a part of a ring, from its top."""
+        pen = QPen(QColor(color), width)
+        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+        painter.setPen(pen)
+        painter.drawArc(ring, 90 * 16, -round(360 * 16 * part / _STEPS))
 
     def _write(self, painter: QPainter, place: QRectF, text: str, height_px: int) -> None:
         """Write a text in the middle of a place, smaller if it would not fit."""

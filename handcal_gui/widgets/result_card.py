@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
-from handcal.register.results import Results
+from handcal.register.results import USED, Results
 from handcal.types import EYES, Eye, VerdictName
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
@@ -28,6 +28,8 @@ class Bar:
     name: str
     arcmin: float | None
     """None if it was not verified."""
+    is_judged: bool = True
+    """False for an error that the target does not concern."""
 
     @property
     def text(self) -> str:
@@ -43,10 +45,8 @@ class EyeResult:
     verdict: VerdictName
     reason: str
     bars: tuple[Bar, ...]
-    another: str
-    """The effect of one more alignment."""
-    depth: str
-    """The error in depth without the calibration and with it."""
+    details: tuple[str, ...]
+    """Error in depth without the calibration and with it, and the effect of one more alignment."""
 
 
 def eye_results(results: Results) -> list[EyeResult]:
@@ -56,23 +56,21 @@ def eye_results(results: Results) -> list[EyeResult]:
         if eye not in results.eyes:
             continue
         benefit, verdict = results.benefits[eye], results.verdicts[eye]
-        unused = tr("This result, not used") if verdict.name == "keep" else ""
-        before = Bar(tr("Before, expected"), benefit.without_arcmin)
+        is_used = verdict.name in USED
+        before = Bar(tr("Before, expected"), benefit.without_arcmin, is_judged=False)
+        after_name = tr("After, expected") if is_used else tr("This result, not used")
         if eye in results.measured_arcmin:
             verified, left = results.measured_arcmin[eye]
-            bars = (
-                before,
-                Bar(tr("Verification found"), verified),
-                Bar(unused or tr("After, expected"), left),
-            )
+            after = Bar(after_name, left, is_used)
+            bars = before, Bar(tr("Verification found"), verified), after
         else:
-            after = Bar(unused or tr("After, expected"), benefit.after_arcmin)
+            after = Bar(after_name, benefit.after_arcmin, is_used)
             bars = before, after, Bar(tr("Verification"), None)
         another = tr("One more alignment: {:.1f}′ expected").format(
             results.expected_after_another_arcmin[eye]
         )
-        depth = tr("Depth error: {}").format(benefit.depth)
-        found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, another, depth))
+        details = (tr("Depth error: {}").format(benefit.depth), another) if is_used else ()
+        found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, details))
     return found
 
 
@@ -92,7 +90,7 @@ def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] 
     for one in eye_results(results):
         lines += ["", f"{EYE_NAMES[one.eye]}: {VERDICT_WORDS[one.verdict]}", one.reason]
         lines += [f"{bar.name}: {bar.text}" for bar in one.bars]
-        lines += [one.depth, one.another]
+        lines += one.details
     return "\n".join(lines)
 
 
@@ -166,7 +164,7 @@ class _Column(QWidget):
         word = tr("– Not solved") if result is None else VERDICT_WORDS[result.verdict]
         self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
         self._reason.setText(result.reason if result else "")
-        self.details.setText(f"{result.depth}\n{result.another}" if result else "")
+        self.details.setText("\n".join(result.details) if result else "")
         self._bars.show_bars(result, target_arcmin, scale_arcmin)
         self.refresh()
 
@@ -219,11 +217,10 @@ class _Bars(QWidget):
             painter.drawText(row, Qt.AlignmentFlag.AlignVCenter, bar.name)
             length = room * (bar.arcmin or 0.0) / self._scale
             if bar.arcmin is not None:
-                is_after = i > 0
-                shade = (good if bar.arcmin <= self._target else late) if is_after else None
+                shade = good if bar.arcmin <= self._target else late
                 painter.fillRect(
                     QRectF(name_px, top + line * 0.2, length, line * 0.6),
-                    shade or QColor(colors().muted),
+                    shade if bar.is_judged else QColor(colors().muted),
                 )
             is_known = bar.arcmin is not None
             side = Qt.AlignmentFlag.AlignRight if is_known else Qt.AlignmentFlag.AlignLeft

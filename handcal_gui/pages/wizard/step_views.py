@@ -48,6 +48,7 @@ _FOREARM_M = 0.45
 def connect_view(snapshot: Snapshot) -> WizardView:
     """Return the view while camera and headset are connected."""
     camera, link = snapshot.camera, snapshot.link
+    has_poses = link.connected and link.pose_rate_hz > 0
     preconditions = (
         Precondition(
             tr("No image from the camera")
@@ -58,9 +59,9 @@ def connect_view(snapshot: Snapshot) -> WizardView:
         Precondition(sentence(snapshot.link_problem) or tr("Headset connected"), link.connected),
         Precondition(
             tr("Headset pose: {:.0f} Hz").format(link.pose_rate_hz)
-            if link.pose_rate_hz
+            if has_poses
             else tr("No pose from the headset yet"),
-            link.pose_rate_hz > 0,
+            has_poses,
         ),
     )
     is_ready = _all_hold(preconditions)

@@ -126,7 +126,7 @@ class EyeCanvas(QWidget):
         painter.setTransform(self._to_widget(), combine=True)
         painter.drawImage(_display(view), self._image)
         painter.restore()
-        painter.setPen(_pen(colors().muted, 1.0))
+        painter.setPen(QColor(colors().muted))
         painter.drawRect(self._place().adjusted(0.5, 0.5, -0.5, -0.5))
 
     def _paint_outlines(self, painter: QPainter, view: EyeView) -> None:
@@ -146,6 +146,7 @@ class EyeCanvas(QWidget):
             for what, px in outlines
             if len(px)
         ]
+        scale = self.devicePixelRatio()
         has_image = not self._image.isNull()
         if self._is_offline_shown and len(offline_px := view.offline.outline_px):
             role, (width_px, _) = LINES["offline"]
@@ -156,16 +157,16 @@ class EyeCanvas(QWidget):
             draw_dots(painter, places, role_color(role, self), width_px, halo)
         if has_image:
             for what, line in lines:
-                painter.setPen(_pen(colors().canvas, LINES[what][1][0] + HALO_PX))
+                painter.setPen(_pen(colors().canvas, scale * (LINES[what][1][0] + HALO_PX)))
                 painter.drawPolyline(line)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for what, line in lines:
             role, (width_px, style) = LINES[what]
             pen = _pen(role_color(role, self), 1.0, style)
             if style is Qt.PenStyle.DashLine:
-                pen.setDashPattern([4.0 * width_px, 3.0 * width_px - 1.0])
+                pen.setDashPattern([scale * 4.0 * width_px, scale * 3.0 * width_px - 1.0])
             painter.setPen(pen)
-            _draw_wide(painter, line, round(width_px))
+            _draw_wide(painter, line, round(scale * width_px))
 
     def _place(self) -> QRectF:
         """Return the part of the widget that the display takes; all of it without a view."""
@@ -279,16 +280,20 @@ def _evenly(outline_px: Float64, apart_px: float) -> Iterator[tuple[int, int]]:
     return zip(places.real.astype(int).tolist(), places.imag.astype(int).tolist(), strict=True)
 
 
-def _draw_wide(painter: QPainter, line: QPolygonF, width_px: int) -> None:
-    """Draw a line as thin ones side by side: Qt is many times slower at smooth wide lines."""
+def _draw_wide(painter: QPainter, line: QPolygonF, width: int) -> None:
+    """Draw a line, its width in the screen's pixels, as thin ones side by side.
+
+    Qt is many times slower at smooth wide lines.
+    """
     px = 1.0 / painter.device().devicePixelRatio()
-    offsets = [px * (k - 0.5 * (width_px - 1)) for k in range(width_px)]
+    offsets = [px * (k - 0.5 * (width - 1)) for k in range(width)]
     for right, down in product(offsets, offsets):
         painter.drawPolyline(line.translated(right, down))
 
 
-def _pen(color: QColor | str, width_px: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
-    pen = QPen(QColor(color), width_px, style, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.BevelJoin)
+def _pen(color: QColor | str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
+    """Return a pen that is as wide in the screen's pixels."""
+    pen = QPen(QColor(color), width, style, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.BevelJoin)
     pen.setCosmetic(True)
     return pen
 

@@ -220,7 +220,7 @@ def _draw_edges(corners_px: Float64 | None, painter: QPainter) -> None:
     """Draw the cube's edges as measured, in pixels of the colour image."""
     if corners_px is None:
         return
-    pen = QPen(QColor(colors().live), 2.0)
+    pen = QPen(QColor(colors().live), 2.0 * painter.device().devicePixelRatio())
     pen.setCosmetic(True)
     painter.setPen(pen)
     corners = [QPointF(x, y) for x, y in corners_px.tolist()]

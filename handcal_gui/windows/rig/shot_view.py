@@ -105,7 +105,7 @@ def _draw_corners(found: BoardView, painter: QPainter) -> None:
     """Draw a cross at every corner, and a circle around the board's first."""
     arm_px = _ARM * found.size[0]
     for width, color in ((4.0, "#ffffff"), (2.0, colors().red)):
-        pen = QPen(QColor(color), width)
+        pen = QPen(QColor(color), width * painter.device().devicePixelRatio())
         pen.setCosmetic(True)
         painter.setPen(pen)
         for x, y in found.pixels.tolist():

@@ -2,11 +2,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
-from handcal.types import Verdict
+from handcal.types import Verdict, VerdictName
+from handcal_gui.theme import colors
 from handcal_gui.widgets.result_card import ResultCard, eye_results, result_text
 from tests.gui.helpers import show, text
 
@@ -21,7 +24,7 @@ def test_expected_and_measured_are_told_apart(results: Results) -> None:
         ("Verification", None),
     ]
     assert left.bars[-1].text == "not verified"
-    assert f"{results.expected_after_another_arcmin['left']:.1f}′" in left.another
+    assert f"{results.expected_after_another_arcmin['left']:.1f}′" in left.details[1]
 
 
 def test_the_text_has_every_number_with_its_unit(results: Results) -> None:
@@ -69,8 +72,20 @@ def test_all_texts_grow_with_the_card(qtbot: QtBot, results: Results) -> None:
     assert sizes == {font.pointSizeF()}
 
 
-def test_a_result_that_is_not_used_is_named_so(results: Results) -> None:
-    kept = dict(results.verdicts) | {"right": Verdict("keep", "as told")}
-    left, right = eye_results(replace(results, verdicts=kept))
+@pytest.mark.parametrize("name", ["keep", "implausible", "contradicted"])
+def test_a_result_that_is_not_used_is_named_so_and_not_praised(
+    qtbot: QtBot, results: Results, name: VerdictName
+) -> None:
+    refused = dict(results.verdicts) | {"right": Verdict(name, "as told")}
+    results = replace(results, verdicts=refused)
+    left, right = eye_results(results)
     assert "This result, not used" not in [bar.name for bar in left.bars]
+    assert left.details
     assert right.bars[1].name == "This result, not used"
+    assert not right.details
+    card = show(qtbot, ResultCard(), 600, 240)
+    good = QColor(colors().good)
+    card.show_results(results, 50.0)
+    picture = card.grab().toImage()
+    shades = {picture.pixelColor(x, y) == good for x in range(320, 600) for y in range(240)}
+    assert shades == {False}, "the right eye's half"

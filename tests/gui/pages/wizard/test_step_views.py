@@ -28,6 +28,7 @@ from tests.gui.views import NUDGED, Maker, actions, judged
         ({"camera": {"problem": "no camera is connected; plug one in"}}, "No image"),
         ({"link": {"connected": False}, "link_problem": "no headset is connected"}, "No headset"),
         ({"link": {"pose_rate_hz": 0.0}}, "No pose"),
+        ({"link": {"pose_rate_hz": 59.0, "connected": False}}, "No pose"),
     ],
 )
 def test_connect_waits_for_camera_headset_and_poses(
