@@ -1693,6 +1693,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}, then press {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Last refused: {}.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1981,6 +1985,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Trials are recorded once φ is solved, beside the panels: press F11, then T</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Move the outline left</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2058,10 +2066,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>The wearer compares two drawings. Record the answer here, or stop comparing.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Trials are recorded with the panels in sight: press F11, then T</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
