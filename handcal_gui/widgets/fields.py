@@ -10,6 +10,7 @@ from typing import TypeVar, cast
 from PySide6.QtCore import QEvent, QLocale, QObject, Qt
 from PySide6.QtGui import QAction, QHelpEvent, QValidator
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QAbstractSpinBox,
     QComboBox,
     QDoubleSpinBox,
@@ -188,18 +189,23 @@ def main_button(name: str, text: str = "") -> MainButton:
 
 
 def tool_button(action: QAction) -> QToolButton:
-    """Return an action's tool button, which stands out while checked, also in the dark theme."""
+    """Return an action's tool button, which stands out while checked."""
     made = QToolButton()
     if "&" in action.text():
         action.setIconText(action.text())  # Qt leaves the letter out of its own
     made.setDefaultAction(action)
     made.setAccessibleName(action.text().replace("&", ""))
+    stand_out_while_checked(made)
+    return made
+
+
+def stand_out_while_checked(widget: QAbstractButton) -> None:
+    """Give a button the accent colour while it is checked, also in the dark theme."""
     set_style(
-        made,
-        "QToolButton:checked { background: palette(highlight); color: palette(highlighted-text);"
+        widget,
+        "*:checked { background: palette(highlight); color: palette(highlighted-text);"
         " border: 1px solid palette(text); border-radius: 2px; }",
     )
-    return made
 
 
 def paragraph(name: str = "", text: str = "") -> QLabel:

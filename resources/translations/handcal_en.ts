@@ -1309,6 +1309,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Use the si&amp;mulator</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use a networ&amp;k headset</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Calibrate a rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1325,15 +1333,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Use the simulator</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Use the virtual headset</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Use a network headset</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1765,7 +1765,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Now repeat this with {}.</source>
+        <source>Next, align {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2961,6 +2961,10 @@ Each eye&apos;s position, its uncertainty and the verdict appear here after its 
     </message>
     <message>
         <source>? No hand</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>? Not placed</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

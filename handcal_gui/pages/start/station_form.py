@@ -176,11 +176,11 @@ def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, 
         return tr("Use the usual gate"), {"calibration": replace(calibration, segment=segment)}
     is_simulated, is_virtual = settings.source == "simulator", settings.headset == "virtual"
     if part == "camera" and is_broken:
-        return tr("Use the simulator"), {"source": "simulator", "headset": "virtual"}
+        return tr("Use the si&mulator"), {"source": "simulator", "headset": "virtual"}
     if part == "headset" and is_simulated and not is_virtual:
         return tr("Use the virtual headset"), {"headset": "virtual"}
     if part == "headset" and is_virtual and not is_simulated:
-        return tr("Use a network headset"), {"headset": "network"}
+        return tr("Use a networ&k headset"), {"headset": "network"}
     if part == "rig" and is_broken and settings.rig:
         return tr("Use the example"), {"rig": ""}
     return "", {}

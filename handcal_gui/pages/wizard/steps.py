@@ -216,7 +216,7 @@ class Wizard:
             eyes = eye_names(self.eyes(snapshot))
             return WizardView(
                 Step.VERIFY,
-                tr("Now repeat this with {}.").format(eyes),
+                tr("Next, align {}.").format(eyes),
                 preconditions,
                 ButtonSpec(Action.ANOTHER, tr("Align {}").format(eyes)),
                 (ButtonSpec(Action.NEXT, tr("Fini&sh with one eye")),),

@@ -92,7 +92,8 @@ class RotationPanel(QWidget):
 
     def _show_observation(self, observation: Observation) -> None:
         if observation.rotation_rad is None:
-            self._show_nothing(tr("? No hand"), sentence(observation.problem) or _NO_HAND)
+            missing = tr("? No hand") if observation.cloud is None else tr("? Not placed")
+            self._show_nothing(missing, sentence(observation.problem) or _NO_HAND)
             return
         angle_rad = float(np.linalg.norm(observation.rotation_rad))
         has_changed = observation.has_changed or (observation.shape_change_m or 0.0) > _SHAPE_M

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 from handcal.session.comparison import Answer, Place
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, one_of, paragraph
+from handcal_gui.widgets.fields import button, one_of, paragraph, stand_out_while_checked
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 
@@ -62,6 +62,7 @@ class ComparisonRow(QWidget):
         self._end.clicked.connect(self.ended)
         for place, one in self._show.items():
             one.setCheckable(True)
+            stand_out_while_checked(one)
             one.clicked.connect(lambda _=False, place=place: self._ask(place))
         for answer, one in self._answers.items():
             one.clicked.connect(lambda _=False, answer=answer: self.answered.emit(answer))

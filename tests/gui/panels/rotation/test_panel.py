@@ -109,11 +109,14 @@ def test_it_says_which_way_to_turn_and_how_far(panel: RotationPanel, snapshot: M
 
 def test_a_lost_hand_is_reported_and_leaves_a_gap(panel: RotationPanel, snapshot: Make) -> None:
     panel.show_snapshot(turned(snapshot, (0, 0, 12), 1.0))
-    lost = {"hand": None, "rotation_rad": None, "problem": "no hand; raise it"}
+    lost = {"hand": None, "rotation_rad": None, "problem": "the headset sends no poses"}
+    panel.show_snapshot(snapshot(observation=lost, t_host_ns=2_000_000_000))
+    assert word(panel) == "? Not placed", "the camera sees the hand"
+    lost |= {"cloud": None, "problem": "no hand; raise it"}
     panel.show_snapshot(snapshot(observation=lost, t_host_ns=2_000_000_000))
     assert word(panel) == "? No hand"
     assert text(panel, "advice") == "No hand; raise it"
-    assert np.isnan(history(panel)[1]).tolist() == [False, True]
+    assert np.isnan(history(panel)[1]).tolist() == [False, True, True]
 
 
 def test_without_a_new_frame_nothing_changes(panel: RotationPanel, snapshot: Make) -> None:
