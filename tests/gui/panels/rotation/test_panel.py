@@ -116,7 +116,7 @@ def test_a_lost_hand_is_reported_and_leaves_a_gap(panel: RotationPanel, snapshot
     panel.show_snapshot(snapshot(observation=lost, t_host_ns=2_000_000_000))
     assert word(panel) == "? No hand"
     assert text(panel, "advice") == "No hand; raise it"
-    assert np.isnan(history(panel)[1]).tolist() == [False, True, True]
+    assert np.isnan(history(panel)[1]).tolist() == [False, True]
 
 
 def test_without_a_new_frame_nothing_changes(panel: RotationPanel, snapshot: Make) -> None:
