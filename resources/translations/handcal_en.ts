@@ -1733,6 +1733,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Do not use this result. Finish, follow the advice below, and calibrate again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The session is finished, its result not accepted: calibrate this wearer again, or continue with the next.</source>
         <translation type="unfinished"></translation>
     </message>

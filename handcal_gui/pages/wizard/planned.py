@@ -26,6 +26,7 @@ from handcal_gui.pages.wizard.step_views import (
     connect_view,
     distance,
     eye_names,
+    falsified_view,
     kept_fact,
     save_view,
     sending,
@@ -254,6 +255,8 @@ class PlannedWizard(Wizard):
         self, preconditions: tuple[Precondition, ...], snapshot: Snapshot
     ) -> WizardView:
         """Return the view of a plan that has ended without an accepted result."""
+        if falsified := falsified_view(preconditions):
+            return falsified
         procedure, can_do = snapshot.procedure, is_steady(snapshot)
         text = tr("Not accepted yet. Raise the hand and hold it still, then add an alignment.")
         main = ButtonSpec(Action.ANOTHER, tr("Add alignment"), can_do)

@@ -256,6 +256,19 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
     )
 
 
+def falsified_view(preconditions: tuple[Precondition, ...]) -> WizardView | None:
+    """Return the view of a result against which there is evidence, which no alignment removes."""
+    if not any(one.verdict == "contradicted" for one in preconditions):
+        return None
+    return WizardView(
+        Step.VERIFY,
+        tr("Do not use this result. Finish, follow the advice below, and calibrate again."),
+        preconditions,
+        ButtonSpec(Action.NEXT, tr("Finish")),
+        (ButtonSpec(Action.ANOTHER, tr("&Add alignment")),),
+    )
+
+
 def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
     """Return the view of a session to finish, which is held or finishes itself, or finished."""
     preconditions = (

@@ -29,6 +29,7 @@ from handcal_gui.pages.wizard.step_views import (
     connect_view,
     distance,
     eye_names,
+    falsified_view,
     kept_fact,
     save_view,
     solve_view,
@@ -254,6 +255,8 @@ class Wizard:
                 (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *others),
                 runs_after_s=ADVICE_S if few else None,
             )
+        if falsified := falsified_view(preconditions):
+            return falsified
         if not is_usable:
             return WizardView(
                 Step.VERIFY,

@@ -137,7 +137,8 @@ def test_the_wearer_keeps_the_hand_up(snapshot: Maker) -> None:
         ("keep", True, Action.NEXT, "Finish", "not used for every eye"),
         ("accept", False, Action.NEXT, "Finish as it is", "Not every eye has been verified"),
         ("repeat", True, Action.ANOTHER, "Add alignment", "Not accepted yet. Raise the hand"),
-        ("contradicted", True, Action.ANOTHER, "Add alignment", "Do not use"),
+        ("implausible", True, Action.ANOTHER, "Add alignment", "Do not use"),
+        ("contradicted", True, Action.NEXT, "Finish", "Do not use this result. Finish"),
     ],
 )
 def test_the_end_says_what_was_reached(
@@ -153,7 +154,8 @@ def test_the_end_says_what_was_reached(
     assert (view.main.action, view.main.label) == (action, label)
     (other,) = {Action.NEXT, Action.ANOTHER} - {action}
     others = [one.action for one in view.others]
-    assert sorted(others) == sorted([other, Action.VERIFY_LEFT, Action.VERIFY_RIGHT])
+    verify = [Action.VERIFY_LEFT, Action.VERIFY_RIGHT] if name != "contradicted" else []
+    assert sorted(others) == sorted([other, *verify])
     assert done.observation is not None
     lowered = replace(done, observation=replace(done.observation, is_steady=False))
     assert begun(snapshot).view(lowered).main.is_enabled == (action is Action.NEXT)

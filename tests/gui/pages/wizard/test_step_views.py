@@ -147,9 +147,15 @@ def test_of_a_result_that_must_not_be_used_the_offline_calibration_is_kept(
     assert none.main == ButtonSpec(Action.APPLY, "Keep offline")
 
 
-@pytest.mark.parametrize("name", ["implausible", "contradicted"])
-def test_of_one_eye_that_must_not_be_used_the_next_step_repeats(
-    snapshot: Maker, record: SessionRecord, name: VerdictName
+@pytest.mark.parametrize(
+    ("name", "main"),
+    [
+        ("implausible", ButtonSpec(Action.ANOTHER, "Add alignment")),
+        ("contradicted", ButtonSpec(Action.NEXT, "Finish")),
+    ],
+)
+def test_after_one_eye_that_must_not_be_used_the_next_step_repeats_or_ends(
+    snapshot: Maker, record: SessionRecord, name: VerdictName, main: ButtonSpec
 ) -> None:
     left = replace(next(iter(record.alignments.values())), eyes=("left",))
     one = replace(record, alignments={1: left})
@@ -157,7 +163,7 @@ def test_of_one_eye_that_must_not_be_used_the_next_step_repeats(
     wizard.view(judged(snapshot, name, name, State.SOLVED, record=one))
     view = wizard.view(judged(snapshot, name, name, State.APPLIED, record=one))
     assert view.sentence.startswith("Do not use this result.")
-    assert view.main == ButtonSpec(Action.ANOTHER, "Add alignment")
+    assert view.main == main
     assert view.runs_after_s is None
     assert "offline calibration for both eyes" in view.fact
 

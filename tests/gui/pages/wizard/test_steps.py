@@ -177,9 +177,12 @@ def test_the_advice_for_the_worst_eye_comes_first(snapshot: Maker) -> None:
 def test_a_result_that_must_not_be_used_does_not_fit_either(snapshot: Maker) -> None:
     wizard = Wizard("both")
     wizard.view(snapshot(State.SOLVED))
-    view = wizard.view(judged(snapshot, "contradicted", "accept", State.APPLIED))
+    view = wizard.view(judged(snapshot, "implausible", "accept", State.APPLIED))
     assert view.sentence.startswith("Do not use this result.")
     assert view.main.action is Action.ANOTHER
+    view = wizard.view(judged(snapshot, "contradicted", "accept", State.APPLIED))
+    assert view.sentence.startswith("Do not use this result.")
+    assert view.main.action is Action.NEXT, "no alignment removes the evidence"
 
 
 def test_only_what_a_person_need_not_decide_runs_by_itself(
