@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.register.results import USED, Results
-from handcal.types import EYES, Eye, VerdictName
+from handcal.types import EYES, Eye, VerdictName, phi_text
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph
@@ -89,6 +89,7 @@ def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] 
     lines.append(tr("Target: {:.1f}′").format(target_arcmin))
     for one in eye_results(results):
         lines += ["", f"{EYE_NAMES[one.eye]}: {VERDICT_WORDS[one.verdict]}", one.reason]
+        lines.append(tr("Solved: {}").format(phi_text(results.eyes[one.eye])))
         lines += [f"{bar.name}: {bar.text}" for bar in one.bars]
         lines += one.details
     return "\n".join(lines)

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
-from handcal.types import Verdict, VerdictName
+from handcal.types import Verdict, VerdictName, phi_text
 from handcal_gui.theme import colors
 from handcal_gui.widgets.result_card import ResultCard, eye_results, result_text
 from tests.gui.helpers import show, text
@@ -33,6 +33,7 @@ def test_the_text_has_every_number_with_its_unit(results: Results) -> None:
     for eye in ("left", "right"):
         assert f"After, expected: {results.benefits[eye].after_arcmin:.1f}′" in lines
         assert f"Depth error: {results.benefits[eye].depth}" in lines
+        assert f"Solved: {phi_text(results.eyes[eye])}" in lines
     assert lines.count("Verification: not verified") == 2
 
 
