@@ -261,14 +261,16 @@ class PlannedWizard(Wizard):
         text = tr("Not accepted yet. Raise the hand and hold it still, then add an alignment.")
         main = ButtonSpec(Action.ANOTHER, tr("Add alignment"), can_do)
         others = [_VERIFY_AGAIN[eye] for eye in self.usable_eyes]
-        advice = procedure.results.advice if procedure.results is not None else {}
-        again = tuple(eye for eye, one in advice.items() if one.verify)
+        again: list[Eye] = []
+        if (results := procedure.results) is not None:
+            again = [eye for eye, one in results.advice.items() if one.verify]
+            again.sort(key=lambda eye: -results.benefits[eye].after_arcmin)  # the worse one first
         if any(one.verdict in UNUSABLE for one in preconditions):
             text = tr("Do not use this result. Follow the advice below, then add alignments.")
         elif again and all(eye in procedure.verifications for eye in self.usable_eyes):
             text = tr(
                 "Not accepted yet: verify {} again. Another alignment would change little."
-            ).format(eye_names(again))
+            ).format(eye_names(sorted(again)))
             first = _VERIFY_AGAIN[again[0]]
             others.remove(first)
             others.insert(0, ButtonSpec(Action.ANOTHER, tr("&Add alignment")))

@@ -194,6 +194,17 @@ def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
     assert (view.main.action, view.main.label) == (Action.VERIFY_RIGHT, "Verify the right eye")
     others = [one.action for one in view.others]
     assert others == [Action.ANOTHER, Action.VERIFY_LEFT, Action.NEXT]
+    worse = replace(results.benefits["right"], after_arcmin=20.0)
+    results = replace(
+        results,
+        verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")),
+        advice=dict.fromkeys(EYES, again),
+        benefits=dict(results.benefits) | {"right": worse},
+    )
+    both = replace(done, procedure=replace(done.procedure, results=results))
+    view = begun(snapshot).view(both)
+    assert "verify both eyes again" in view.sentence
+    assert view.main.action is Action.VERIFY_RIGHT, "the one with the larger error first"
 
 
 def test_one_usable_eye_is_the_only_one_offered(snapshot: Maker) -> None:
