@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
@@ -81,9 +82,21 @@ def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
     choose(window, "Ada")
     assert not plot.isHidden()
     assert text(window, "trendTitle").startswith("Ada: 2 calibrations, and the error")
-    measured, expected = plot._measured["left"].getData(), plot._expected["left"].getData()
-    assert list(measured[1][:1]) == [4.0]
-    assert list(expected[1]) == [9.0, 8.0]
+    verified, unverified = plot._verified["left"].getData(), plot._unverified["left"].getData()
+    np.testing.assert_equal(verified[1], [4.0, np.nan])
+    np.testing.assert_equal(unverified[1], [np.nan, 8.0])  # each calibration has one symbol
+
+
+def test_trials_over_the_target_are_marked(tmp_path: Path) -> None:
+    def trials(arcmin: float, target_arcmin: float | None) -> str:
+        entry = LibraryEntry(
+            tmp_path, (0, 0), trials=2, trials_arcmin=arcmin, target_arcmin=target_arcmin
+        )
+        return make_row(entry).texts[7]
+
+    assert trials(10.4, 8.0) == "⚠ 10.4, over 8 (n = 2)"
+    assert trials(7.9, 8.0) == "7.9 (n = 2)"
+    assert trials(10.4, None) == "10.4 (n = 2)"  # of an older version
 
 
 def test_buttons_fit_the_choice(window: LibraryWindow) -> None:
