@@ -137,17 +137,17 @@ COLUMNS = (
     ),
     _Column(tr("Verdict"), tr("Of the newest results"), _verdicts, _verdicts),
     _Column(
-        tr("Found ′"),
+        tr("Found ′\nleft / right"),
         tr(
-            "Error that the wearer's verification found, and corrected, left / right, in "
-            "arcminutes;\n– was not verified"
+            "Error of the calibration that the wearer's verification found, and corrected, "
+            "left / right,\nin arcminutes; – was not verified"
         ),
         _errors("found"),
         lambda e: _known_first(worst_arcmin(e, "found")),
         is_number=True,
     ),
     _Column(
-        tr("Expected ′"),
+        tr("Expected ′\nleft / right"),
         tr("Error that is left, as expected from all that is known, left / right, in arcminutes"),
         _errors("expected"),
         lambda e: _known_first(worst_arcmin(e, "expected")),
@@ -328,5 +328,6 @@ def _is_of(entry: LibraryEntry, kind: Filter) -> bool:
 
 
 def _alignment(column: _Column) -> Qt.AlignmentFlag:
-    side = Qt.AlignmentFlag.AlignRight if column.is_number else Qt.AlignmentFlag.AlignLeft
+    # Right-aligned, a number ran into the text of the next column.
+    side = Qt.AlignmentFlag.AlignHCenter if column.is_number else Qt.AlignmentFlag.AlignLeft
     return side | Qt.AlignmentFlag.AlignVCenter
