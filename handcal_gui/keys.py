@@ -36,7 +36,7 @@ _NOT_ACTIONS = {
         (tr("Alt+underlined letter"), tr("Press its button, or go to its field")),
         (tr("F4"), tr("Open the list, or choose the file or folder, of the field")),
         (tr("Shift+F4"), tr("Choose a folder for a field that takes files, too")),
-        (tr("Esc"), tr("Close the message")),
+        (tr("Esc"), tr("Close the message, or a dialog or window opened from here")),
         (tr("Tab"), tr("Move to the next button or field")),
     ),
     tr("Fine-tune"): (

@@ -72,6 +72,8 @@ class LibraryEntry:
     """Numbers of those that are not deleted."""
     trials_arcmin: float | None = None
     """Mean error of the trials, each trial counting once."""
+    target_arcmin: float | None = None
+    """Largest expected error that the lab accepts, as set in the session; None if unknown."""
     is_finished: bool = False
     is_repaired: bool = False
     """True for the sound parts of a session, copied by a repair."""
@@ -215,6 +217,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         alignments=len(state.alignments.active),
         trials=len(trials),
         trials_arcmin=_mean_arcmin(trials),
+        target_arcmin=_target_arcmin(state.settings),
         is_finished=state.is_finished,
         is_repaired=any(one.name == SessionEvent.REPAIRED for one in replayed.journal.events),
         damaged=len(replayed.damaged) + _damaged_files(path, state),
@@ -246,6 +249,14 @@ def _is_sound(file: Path, checksum: str) -> bool:
 
 def _mean_arcmin(trials: Sequence[Trial]) -> float | None:
     return float(np.mean([trial.error_arcmin.mean() for trial in trials])) if trials else None
+
+
+def _target_arcmin(settings: Mapping[str, Any] | None) -> float | None:
+    """Return the lab's target; None in sessions of older versions, whose settings are in a file."""
+    found: object = settings
+    for name in ("calibration", "solve", "verdict", "target_arcmin"):
+        found = found.get(name) if isinstance(found, dict) else None
+    return _number(found)
 
 
 def _rig_name(path: Path, state: SessionState) -> str:

@@ -21,6 +21,7 @@ from handcal_gui.widgets.fields import (
     choice,
     fill_row,
     label_for,
+    make_equally_wide,
     paragraph,
     whole_number,
     with_name,
@@ -33,9 +34,9 @@ _ABOUT = tr(
 )
 _AS_IT_IS = tr("Keep the camera's setting")
 _PROFILES: dict[Profile, str] = {
-    "auto": tr("Largest available"),
-    "1280x720": "1280 × 720 px",
-    "848x480": "848 × 480 px",
+    "auto": tr("Largest (1280 × 720 or 848 × 480 px, 30 Hz)"),
+    "1280x720": "1280 × 720 px, 30 Hz",
+    "848x480": "848 × 480 px, 30 Hz",
 }
 _PRESETS: dict[Preset | Literal[""], str] = {
     "": _AS_IT_IS,
@@ -65,7 +66,7 @@ class CameraSettingsDialog(QDialog):
             "profile",
             tr("Image size"),
             _PROFILES,
-            tr("Size of both depth and colour images, at 30 Hz."),
+            tr("Size and rate of both depth and colour images."),
         )
         self._preset = choice(
             "preset",
@@ -83,7 +84,7 @@ class CameraSettingsDialog(QDialog):
                 " µs",
                 tr("Of the depth image; a frame lasts 33,333 µs."),
             ),
-            tr("Automatic"),
+            tr("&Automatic"),
             8_500,
         )
         self._laser = _OwnNumber(
@@ -91,11 +92,11 @@ class CameraSettingsDialog(QDialog):
             _number(
                 "laser", 0, 360, 30, " mW", tr("Power of the projector; 0 mW switches it off.")
             ),
-            _AS_IT_IS,
+            tr("&Keep the camera's setting"),
             150,
         )
         self._whole = with_name(
-            QCheckBox(tr("For the &whole image")),
+            QCheckBox(tr("For the &whole image, not the hand once found")),
             "wholeImage",
             tr("Exposure of colour for the whole image"),
             tr("Measures the exposure of colour on the whole image, not on the hand once found."),
@@ -139,6 +140,7 @@ class CameraSettingsDialog(QDialog):
     def _lay_out(self) -> None:
         filters = QWidget()
         fill_row(filters, self._spatial, self._temporal, self._holes, grows=self._holes)
+        make_equally_wide((self._profile, self._preset))
         form = QFormLayout()
         form.setSpacing(SPACING_PX)
         for title, field in (
@@ -184,7 +186,10 @@ class _OwnNumber(QWidget):
         self._number, self._usual = number, usual
         number.setAccessibleName(label)
         self._left = with_name(
-            QCheckBox(left), f"{number.objectName()}Left", f"{label}: {left}", number.toolTip()
+            QCheckBox(left),
+            f"{number.objectName()}Left",
+            f"{label}: {left.replace('&', '')}",
+            number.toolTip(),
         )
         self._left.toggled.connect(number.setDisabled)
         self.setFocusProxy(self._left)  # the number may be disabled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
 
 from handcal.errors import LinkError
@@ -24,7 +24,7 @@ from handcal_gui.dialogs.paired_devices import PairedDevices
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX, number_font, scale_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import button, paragraph, with_name
+from handcal_gui.widgets.fields import button, make_equally_wide, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.qr_code import QrCode
@@ -36,6 +36,9 @@ _DELIVERIES = {
     Delivery.ACKED: tr("acknowledged by the headset"),
     Delivery.FAILED: tr("not acknowledged; try again"),
 }
+
+_SEEN: dict[Eye, str] = {"left": tr("The wearer &sees it"), "right": tr("The wearer sees &it")}
+"""Of each eye: the same text with another letter."""
 
 
 class ConnectDialog(QDialog):
@@ -199,13 +202,10 @@ class ConnectDialog(QDialog):
         self._squares[eye].show_sent(sent)
 
     def _lay_out(self) -> None:
-        left = vbox(
-            self._how,
-            (self._qr, 1),
-            hbox(self._code, 1, self._invite, spacing=SPACING_PX),
-            0,
-            spacing=SPACING_PX,
-        )
+        make_equally_wide(square.send for square in self._squares.values())
+        foot = hbox(self._code, 1, self._invite, spacing=SPACING_PX)
+        foot.setAlignment(self._invite, Qt.AlignmentFlag.AlignBottom)  # in one line with Close
+        left = vbox(self._how, (self._qr, 1), 0, foot, spacing=SPACING_PX)
         right = vbox(
             _heading(tr("Headset")),
             self._state,
@@ -231,12 +231,12 @@ class _Square(QWidget):
         self.send = button(f"square-{eye}", tr("Show to &{}").format(name.lower()))
         self._state = paragraph(f"squareState-{eye}")
         self._seen = with_name(
-            QCheckBox(tr("The wearer sees it")),
+            QCheckBox(_SEEN[eye]),
             f"squareSeen-{eye}",
             tr("{}: the wearer sees it").format(name),
             tr("Tick it when the wearer sees the square with this eye."),
         )
-        hbox(self.send, (self._state, 1), self._seen, on=self, margins=0, spacing=SPACING_PX)
+        hbox(self.send, self._seen, (self._state, 1), on=self, margins=0, spacing=SPACING_PX)
         self.forget()
 
     def forget(self) -> None:

@@ -16,7 +16,7 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import label_for, number, paragraph, with_name
+from handcal_gui.widgets.fields import fill_row, label_for, number, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
@@ -141,7 +141,7 @@ class ExportChoices(QWidget):
         """Show why the folder is refused, or else what is created in it."""
         self._is_refused = bool(problem)
         health = Health.BROKEN if problem else Health.GOOD
-        created = tr("The folder {} is created there.").format(self._name)
+        created = tr("The export will create the folder {} there.").format(self._name)
         self._found.show_finding(Finding("", health, problem or created))
         self._refresh()
 
@@ -165,25 +165,28 @@ class ExportChoices(QWidget):
     def _lay_out(self) -> None:
         formats = QGridLayout()
         formats.setHorizontalSpacing(2 * SPACING_PX)
-        formats.setVerticalSpacing(SPACING_PX)
+        formats.setVerticalSpacing(SPACING_PX // 2)  # all fits a screen 540 px high
         formats.setColumnStretch(1, 1)
         for kind, box in self._boxes.items():
             if kind == next(iter(TOOL_FORMATS)):
-                formats.addWidget(QLabel(tr("For one program each:")), formats.rowCount(), 0)
+                heading = QLabel(tr("For one program each:"))
+                heading.setContentsMargins(0, SPACING_PX, 0, 0)  # apart from the group above
+                formats.addWidget(heading, formats.rowCount(), 0)
             row = formats.rowCount()
             formats.addWidget(box, row, 0)
             formats.addWidget(QLabel(_PURPOSES[kind]), row, 1)
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
         form.setVerticalSpacing(SPACING_PX)
+        planes, far = QWidget(), label_for(self._far, tr("&Far plane"))
+        fill_row(planes, self._near, far, self._far, grows=self._far)
         for title, field in (
-            (tr("Ne&ar plane (OpenGL, Unity)"), self._near),
-            (tr("&Far plane (OpenGL, Unity)"), self._far),
+            (tr("Ne&ar plane (OpenGL, Unity)"), planes),
             (tr("Export &to"), self._folder),
         ):
             form.addRow(label_for(field, title), field)
         form.addRow(self._found)
-        vbox(self._task, formats, form, 1, on=self, margins=0, spacing=3 * SPACING_PX)
+        vbox(self._task, formats, form, 1, on=self, margins=0, spacing=2 * SPACING_PX)
 
 
 def _lettered(title: str, letter: str) -> str:

@@ -50,7 +50,7 @@ class KeysDialog(QDialog):
         ask = button(
             "printKeys", tr("&Print…"), help_text=tr("Print all keys, or save them as PDF")
         )
-        close = button("close", tr("Close"))
+        close = button("close", tr("&Close"))
         close.setDefault(True)
         search.textChanged.connect(self._search)
         ask.clicked.connect(lambda: ask_printer(self, self.print_to))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from PySide6.QtGui import QHideEvent, QIcon, QShowEvent
-from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDialogButtonBox, QWidget
 
 from handcal.bridge.bridges import BridgeSettings
 from handcal.station.doctor import Finding, Health
@@ -16,7 +16,14 @@ from handcal_gui.preferences import Preferences, Theme
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.calibration_fields import CalibrationFields
-from handcal_gui.widgets.fields import choice, number, paragraph, whole_number, with_name
+from handcal_gui.widgets.fields import (
+    choice,
+    make_equally_wide,
+    number,
+    paragraph,
+    whole_number,
+    with_name,
+)
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import fit_soon, scrollable, vbox
 from handcal_gui.widgets.path_field import PathField
@@ -197,6 +204,7 @@ class PreferencesDialog(QDialog):
         add(tr("The&me"), self._theme, tr("Colours of all windows."))
         add(tr("Session f&older"), self._sessions)
         self._calibration.add_line(self._sessions_found)
+        make_equally_wide(self._calibration.findChildren(QComboBox))
         buttons = self._buttons
         for one in buttons.buttons():
             one.setIcon(QIcon())  # like all other buttons
@@ -204,7 +212,7 @@ class PreferencesDialog(QDialog):
         buttons.rejected.connect(self.reject)
         self._ok = buttons.button(QDialogButtonBox.StandardButton.Ok)
         defaults = buttons.button(QDialogButtonBox.StandardButton.RestoreDefaults)
-        defaults.setText(tr("&Defaults"))
+        defaults.setText(tr("Restore &defaults"))
         defaults.setToolTip(tr("Shows the default of every field; Cancel keeps the former values."))
         defaults.clicked.connect(lambda: self._show(Preferences()))
         self._area = area = scrollable(self._calibration)

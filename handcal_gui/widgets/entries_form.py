@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal_gui.theme import SPACING_PX
-from handcal_gui.widgets.fields import label_for
+from handcal_gui.widgets.fields import label_for, make_equally_wide
 from handcal_gui.widgets.layouts import fit_soon
 from handcal_gui.widgets.path_field import PathField
 
@@ -48,6 +48,7 @@ class EntriesForm(QWidget):
         super().__init__(parent)
         self._fields = {name: field for name, (_, field) in fields.items()}
         self._labels = [label_for(field, text) for text, field in fields.values()]
+        make_equally_wide(one for one in self._fields.values() if isinstance(one, QSpinBox))
         self.narrow_px = 0
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from html import escape
 from typing import TypeVar, cast
 
@@ -238,6 +238,14 @@ def label_for(field: QWidget, text: str) -> QLabel:
     parts = filter(None, (field, field.focusProxy(), *field.findChildren(QWidget)))
     label.setBuddy(next(one for one in parts if one.focusPolicy() != Qt.FocusPolicy.NoFocus))
     return label
+
+
+def make_equally_wide(fields: Iterable[QWidget]) -> None:
+    """Make the fields of a column as wide as the widest of them."""
+    column = list(fields)
+    widest_px = max((max(one.sizeHint().width(), one.minimumWidth()) for one in column), default=0)
+    for one in column:
+        one.setMinimumWidth(widest_px)
 
 
 def fill_row(row: QWidget, *widgets: QWidget, grows: QWidget) -> None:

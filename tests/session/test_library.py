@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,6 +70,22 @@ def test_an_entry_says_what_the_session_holds(make: Callable[..., Path], tmp_pat
     assert entry.trials_arcmin == pytest.approx(np.mean(means))
     assert not entry.problem
     assert not entry.damaged
+
+
+@pytest.mark.parametrize(
+    ("settings", "target_arcmin"),
+    [
+        ({"calibration": {"solve": {"verdict": {"target_arcmin": 6.0}}}}, 6.0),
+        ({"calibration": {"solve": {"verdict": {}}}}, None),
+        ({"calibration": []}, None),
+    ],
+)
+def test_an_entry_has_the_target_of_its_session(
+    tmp_path: Path, settings: dict[str, Any], target_arcmin: float | None
+) -> None:
+    Session.create(tmp_path, example_rig(), settings, name="one").close()
+    (entry,) = read_library(tmp_path)
+    assert entry.target_arcmin == target_arcmin
 
 
 def test_an_eye_that_keeps_the_offline_calibration_has_its_error(

@@ -15,12 +15,21 @@ from handcal_gui.translation import tr
 _PATIENCE_S = 120.0
 
 
+def pairing_problem() -> str:
+    """Return why no headset can connect; empty if one is paired."""
+    try:
+        is_paired = bool(Pairings.read(pairing_file()).all)
+    except HandcalError as error:
+        return str(error)
+    return "" if is_paired else tr("no headset is paired; pair one with Connect a headset")
+
+
 @contextmanager
 def paired_headset() -> Iterator[HeadsetServer]:
     """Yield the link once a paired headset has connected; HandcalError if none is paired."""
+    if problem := pairing_problem():
+        raise HandcalError(problem)
     pairings = Pairings.read(pairing_file())
-    if not pairings.all:
-        raise HandcalError(tr("no headset is paired; pair one with Connect a headset"))
     with HeadsetServer(pairings, ("0.0.0.0", 47800)) as server:  # noqa: S104
         server.wait_connected(_PATIENCE_S)
         yield server

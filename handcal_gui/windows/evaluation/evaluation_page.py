@@ -36,6 +36,8 @@ class EvaluationSpec:
     evaluation: Evaluation
     form: Callable[[], EntriesForm]
     """Creates the form for its entries."""
+    coming: str = ""
+    """What its results will show, said in their place before there are any."""
     preparations: tuple[Preparation, ...] = ()
     """Buttons and dialogs that prepare data and devices."""
     note: str = ""
@@ -81,7 +83,7 @@ class EvaluationPage(QWidget):
         self._bar = JobBar()
         self._found = FindingLine("readiness")
         keep_space(self._found)
-        self._results = ResultsView()
+        self._results = ResultsView(spec.coming)
         self._look = LatestJob(self._check, self)
         self._lay_out(spec)
         self.form.changed.connect(self._on_entries_changed)

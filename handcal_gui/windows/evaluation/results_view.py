@@ -39,14 +39,20 @@ from handcal_gui.windows.evaluation.work import Outcome
 
 
 class ResultsView(QWidget):
-    """Shows the main finding, the key tables, and each figure as written to file."""
+    """Shows the main finding, the key tables, and each figure as written to file.
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    Parameters
+    ----------
+    coming : str
+        What will be shown here, said while there is no result.
+    """
+
+    def __init__(self, coming: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("results")
         self._folder = Path()
         self._makers: list[Callable[[], QWidget]] = []
-        self._empty = with_name(QLabel(tr("Figures and numbers will be shown here.")), "noResults")
+        self._empty = paragraph("noResults", coming)
         self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._lead = paragraph("lead")
         self._lead.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)

@@ -44,10 +44,15 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             tr("Noise study"),
             tr(
                 "How much rotation and noise do the solvers tolerate before their error exceeds "
-                "the paper's 4 mm? About ten minutes on two cores; half a minute for a quick run."
+                "the 4 mm of Hu et al. 2021? About ten minutes on two cores; half a minute for a "
+                "quick run."
             ),
             StudyEvaluation(noise_cases, run_noise_study),
             _noise_form,
+            tr(
+                "The mean error of each solver over rotation and noise will be shown here, and up "
+                "to where it stays within 4 mm."
+            ),
         ),
         "methods": EvaluationSpec(
             tr("Method comparison"),
@@ -57,6 +62,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             ),
             StudyEvaluation(method_cases, run_method_comparison),
             _methods_form,
+            tr("The errors and effort of each method will be shown here, beside published ones."),
         ),
         "cube": EvaluationSpec(
             tr("Cube test"),
@@ -66,6 +72,10 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             ),
             FileEvaluation(_missing_captures, run_cube_test),
             _cube_form,
+            tr(
+                "How far the drawn cube is from the real one will be shown here, by axis and by "
+                "position of the camera."
+            ),
             (
                 Preparation(
                     tr("&Capture…"),
@@ -75,7 +85,7 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                     request=tr("To capture, choose a folder in Captures."),
                 ),
                 Preparation(
-                    tr("&Track…"),
+                    tr("&Track cube…"),
                     tr("Track the cube with the depth camera, and have the headset draw it."),
                     lambda _: True,
                     TrackDialog,
@@ -94,9 +104,13 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
                 lambda entries, progress: run_user_test(entries.settings, progress),
             ),
             _users_form,
+            tr(
+                "The errors of all trials and of each wearer will be shown here, and where the "
+                "corners were drawn."
+            ),
             (
                 Preparation(
-                    tr("Re&cord…"),
+                    tr("Re&cord trials…"),
                     tr(
                         "Record the trials of one session with a cube in the room; enter the "
                         "session first."
@@ -115,6 +129,10 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
             ),
             FileEvaluation(_missing_frames, run_segmentation_test),
             _segmentation_form,
+            tr(
+                "How well each frame agrees with its mask will be shown here, with pictures of "
+                "where they differ."
+            ),
             note=tr(
                 "A frame NAME is NAME_depth.png, NAME_handmask.png and, if there is one, "
                 'NAME_color.png; meta.json describes all frames: <a href="{}">its contents</a>.'
@@ -147,11 +165,12 @@ def _missing_sessions(entries: UserEntries) -> str:
         return ""
     if (folder / JOURNAL).is_file():
         return tr(
-            "the session of {} holds no trial: record some in the panel Trials, or press Record…"
+            "the session of {} holds no trial: record some in the panel Trials, or press Record "
+            "trials…"
         ).format(replay(folder).state.wearer or tr("a wearer without a name"))
     return tr(
         "no session in {} holds a trial: record some in the panel Trials, or choose one session "
-        "and press Record…"
+        "and press Record trials…"
     ).format(entries.sessions)
 
 
@@ -228,7 +247,7 @@ def _cube_form() -> EntriesForm:
             "square_px": (tr("Grid s&quares"), square),
             "seed": (tr("&Seed of the rendering"), _seed()),
             "poses": (tr("Poses &at each position"), poses),
-            "alignments": (tr("Align&ments at each"), alignments),
+            "alignments": (tr("Align&ments per position"), alignments),
         }
     )
 

@@ -29,7 +29,7 @@ from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, Row
-from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset
+from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset, pairing_problem
 from handcal_gui.windows.evaluation.preparation import PreparationDialog
 
 _POLL_MS = 30
@@ -49,6 +49,8 @@ class TrackDialog(PreparationDialog):
     entries : CubeEntries
     track : callable
         Like `track_cube`.
+    pairing_problem : callable
+        As in `devices`.
     """
 
     def __init__(
@@ -56,12 +58,13 @@ class TrackDialog(PreparationDialog):
         entries: CubeEntries,
         parent: QWidget | None = None,
         track: Track = track_cube,
+        pairing_problem: Callable[[], str] = pairing_problem,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("trackDialog")
         self.setWindowTitle(tr("Track the cube"))
         self.entries = entries
-        self._track = track
+        self._track, self._pairing_problem = track, pairing_problem
         self._sight: CubeSight | None = None
         self._shown: CubeSight | None = None
         self.form = EntriesForm(
@@ -84,7 +87,9 @@ class TrackDialog(PreparationDialog):
         self.form.show_entries(entries)
         self._view = ImageView(tr("Depth camera, colour"))
         self._view.setMinimumSize(56 * SPACING_PX, 32 * SPACING_PX)
-        self._view.show_text(message=tr("No image yet"))
+        self._view.show_text(
+            message=tr("The camera's image and the cube's edges will be shown here.")
+        )
         self._pose = NumberTable("pose-of-the-cube", tr("Pose of the cube"))
         self._pose.setMinimumWidth(44 * SPACING_PX)
         self._pose.hide()
@@ -106,6 +111,7 @@ class TrackDialog(PreparationDialog):
         self._bar.failed.connect(self._show_failure)
         self._bar.busy_changed.connect(self._refresh)
         self._lay_out()
+        self._refresh()
 
     def start(self) -> None:
         """Track until stopped."""
@@ -153,12 +159,16 @@ class TrackDialog(PreparationDialog):
 
     def _keep(self) -> None:
         self.entries = self.form.take(self.entries)
+        self._found.clear()
+        self._refresh()
 
     def _refresh(self) -> None:
         is_busy = self._bar.is_busy
         self._task.setCurrentIndex(int(is_busy))
         self.form.setEnabled(not is_busy)
-        self._start.setEnabled(not is_busy)
+        by_headset = self.entries.tracked_by == "network" and not is_busy
+        problem = self._pairing_problem() if by_headset else ""
+        self._start.setEnabled(not (is_busy or problem))
         self._pose.setEnabled(is_busy)  # dimmed like the image: it is no longer so
         if is_busy:
             self._timer.start()
@@ -167,6 +177,9 @@ class TrackDialog(PreparationDialog):
         if self._shown is not None:
             self._view.show_text(message=tr("Stopped"))
             self._found.show_finding(Finding("", Health.LIMITED, tr("the cube is not tracked")))
+        if problem:
+            advice = tr("or choose something else in Tracked by")
+            self._found.show_finding(Finding("", Health.LIMITED, problem, advice))
 
     def _lay_out(self) -> None:
         middle = hbox((self._view, 2), (self._pose, 1), spacing=2 * SPACING_PX)

@@ -102,7 +102,11 @@ def _errors(kind: Literal["found", "expected"]) -> Callable[[LibraryEntry], str]
 def _trials(entry: LibraryEntry) -> str:
     if entry.trials_arcmin is None:
         return NOTHING
-    return tr("{:.1f} (n = {})").format(entry.trials_arcmin, entry.trials)
+    mean_arcmin, target_arcmin = entry.trials_arcmin, entry.target_arcmin
+    if target_arcmin is not None and mean_arcmin > target_arcmin:
+        said = tr("⚠ {:.1f}, over {:g} (n = {})")
+        return said.format(mean_arcmin, target_arcmin, entry.trials)
+    return tr("{:.1f} (n = {})").format(mean_arcmin, entry.trials)
 
 
 def _known_first(value: float | None) -> float:
@@ -133,17 +137,17 @@ COLUMNS = (
     ),
     _Column(tr("Verdict"), tr("Of the newest results"), _verdicts, _verdicts),
     _Column(
-        tr("Found ′"),
+        tr("Found ′\nleft / right"),
         tr(
-            "Error that the wearer's verification found, and corrected, left / right, in "
-            "arcminutes;\n– was not verified"
+            "Error of the calibration that the wearer's verification found, and corrected, "
+            "left / right,\nin arcminutes; – was not verified"
         ),
         _errors("found"),
         lambda e: _known_first(worst_arcmin(e, "found")),
         is_number=True,
     ),
     _Column(
-        tr("Expected ′"),
+        tr("Expected ′\nleft / right"),
         tr("Error that is left, as expected from all that is known, left / right, in arcminutes"),
         _errors("expected"),
         lambda e: _known_first(worst_arcmin(e, "expected")),
@@ -151,7 +155,12 @@ COLUMNS = (
     ),
     _Column(
         tr("Trials ′"),
-        tr("Mean error of the user test in arcminutes, each trial counting once, and their number"),
+        tr(
+            "Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all "
+            "trials\nof the session, also of a calibration that was then repeated, and their "
+            "number.\n⚠ over the lab's target: look at the trials; if φ was set well by hand, "
+            "calibrate again"
+        ),
         _trials,
         lambda e: _known_first(e.trials_arcmin),
         is_number=True,
@@ -319,5 +328,6 @@ def _is_of(entry: LibraryEntry, kind: Filter) -> bool:
 
 
 def _alignment(column: _Column) -> Qt.AlignmentFlag:
-    side = Qt.AlignmentFlag.AlignRight if column.is_number else Qt.AlignmentFlag.AlignLeft
+    # Right-aligned, a number ran into the text of the next column.
+    side = Qt.AlignmentFlag.AlignHCenter if column.is_number else Qt.AlignmentFlag.AlignLeft
     return side | Qt.AlignmentFlag.AlignVCenter

@@ -18,27 +18,27 @@ _SYMBOLS: dict[Eye, str] = {"left": "o", "right": "t1"}
 
 
 class TrendPlot(Plot):
-    """Shows errors after a verification by filled symbols, and those expected by hollow ones."""
+    """Shows the expected errors: filled symbols after a verification, hollow ones without it."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(
             "trend",
             tr("Trend"),
             tr("Calibration of this wearer, oldest first"),
-            tr("Error (′)"),
+            tr("Expected error (′)"),
             parent,
         )
         self.show_legend()
-        self._measured = {
+        self._verified = {
             eye: self.add_line(
                 eye, name=tr("{}, verified").format(EYE_NAMES[eye]), symbol=_SYMBOLS[eye]
             )
             for eye in EYES
         }
-        self._expected = {
+        self._unverified = {
             eye: self.add_line(
                 eye,
-                name=tr("{}, expected").format(EYE_NAMES[eye]),
+                name=tr("{}, not verified").format(EYE_NAMES[eye]),
                 dashed=True,
                 symbol=_SYMBOLS[eye],
             )
@@ -50,9 +50,12 @@ class TrendPlot(Plot):
         numbers, largest = np.arange(1.0, len(entries) + 1.0), 1.0
         for eye in EYES:
             outcomes = [entry.eyes.get(eye) for entry in entries]
-            measured = [None if one is None else one.remaining_arcmin for one in outcomes]
-            expected = [None if one is None else one.expected_arcmin for one in outcomes]
-            for line, errors in ((self._measured, measured), (self._expected, expected)):
+            verified = [None if one is None else one.remaining_arcmin for one in outcomes]
+            unverified = [
+                None if one is None or one.remaining_arcmin is not None else one.expected_arcmin
+                for one in outcomes
+            ]
+            for line, errors in ((self._verified, verified), (self._unverified, unverified)):
                 known = [np.nan if error is None else error for error in errors]
                 largest = max(largest, *(error or 0.0 for error in errors))
                 if any(error is not None for error in errors):
@@ -69,8 +72,7 @@ class TrendPlot(Plot):
 def trend_text(wearer: str, count: int) -> str:
     """Return what the plot shows, in a sentence."""
     return tr(
-        "{}: {} calibrations, and the error that each left, after the wearer's verification or "
-        "only expected"
+        "{}: {} calibrations, and the error expected after each, verified by the wearer or not"
     ).format(wearer, count)
 
 

@@ -33,6 +33,7 @@ from handcal_gui.widgets.error_bars import PICTURE_HELP, PICTURE_LEGEND
 from handcal_gui.widgets.fields import (
     button,
     choice,
+    label_for,
     main_button,
     paragraph,
     plain_tooltip,
@@ -98,7 +99,7 @@ class LibraryWindow(QDialog):
         self._is_read = False
         self._sessions = SessionsModel()
         self._search = with_name(QLineEdit(), "search", tr("Search"))
-        self._search.setPlaceholderText(tr("Search wearer, date, rig, headset"))
+        self._search.setPlaceholderText(tr("Search wearer, date, rig, headset (Ctrl+F)"))
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
         self._table = SessionsTable(self._sessions)
@@ -370,10 +371,11 @@ class LibraryWindow(QDialog):
         # Enter in the search opens the first session that it finds.
         opening = _pressed_for(self._open, main_button("openSession", self._open.text()))
         counts = hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX)
+        shown = label_for(self._kind, tr("S&how"))
         actions = hbox(1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
-            hbox((self._search, 1), self._kind, self._legend, spacing=SPACING_PX),
+            hbox((self._search, 1), shown, self._kind, self._legend, spacing=SPACING_PX),
             (halves, 1),
             counts,
             self._said,
@@ -382,7 +384,7 @@ class LibraryWindow(QDialog):
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,
         )
-        self.resize(130 * SPACING_PX, 84 * SPACING_PX)
+        self.resize(144 * SPACING_PX, 84 * SPACING_PX)
 
 
 def _pressed_for(action: QAction, made: QPushButton) -> QPushButton:

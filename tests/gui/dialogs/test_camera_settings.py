@@ -8,7 +8,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
-from tests.gui.helpers import letters
+from tests.gui.helpers import child, letters
 
 ALL_SET = RealSenseSettings(
     serial="42",
@@ -77,4 +77,19 @@ def test_every_field_has_a_letter_of_its_own(qtbot: QtBot) -> None:
     dialog = CameraSettingsDialog(RealSenseSettings())
     qtbot.addWidget(dialog)
     found = letters(dialog)
-    assert len(set(found)) == len(found) >= 9
+    assert len(set(found)) == len(found)
+    for box in dialog.findChildren(QCheckBox):
+        assert "&" in box.text()
+        assert "&" not in box.accessibleName()
+
+
+def test_size_rate_and_the_other_exposure_are_said(qtbot: QtBot) -> None:
+    dialog = CameraSettingsDialog(RealSenseSettings())
+    qtbot.addWidget(dialog)
+    sizes = child(dialog, QComboBox, "profile")
+    for i in range(sizes.count()):
+        assert "848 × 480 px, 30 Hz" in sizes.itemText(i) or "1280 × 720 px, 30 Hz" in (
+            sizes.itemText(i)
+        )
+    assert child(dialog, QCheckBox, "wholeImage").text().endswith(", not the hand once found")
+    assert sizes.minimumWidth() == child(dialog, QComboBox, "preset").minimumWidth()

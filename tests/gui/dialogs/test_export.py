@@ -162,10 +162,20 @@ def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog)
     assert text(dialog, "exportTask") == "Choose the folder to export to."
 
 
+def test_it_fits_a_small_screen_and_a_heading_stands_by_its_own_group(
+    dialog: ExportDialog,
+) -> None:
+    assert dialog.height() <= 510
+    (heading,) = (one for one in dialog.findChildren(QLabel) if one.text().startswith("For one"))
+    text_top = heading.y() + heading.contentsRect().top()
+    below = box(dialog, "unity").y() - heading.geometry().bottom()
+    assert text_top - box(dialog, "zip").geometry().bottom() > 2 * below
+
+
 def test_a_folder_that_cannot_be_created_is_refused_beside_it(
     qtbot: QtBot, dialog: ExportDialog, tmp_path: Path
 ) -> None:
-    made = f"The folder {dialog._choices.target.name} is created there."
+    made = f"The export will create the folder {dialog._choices.target.name} there."
     qtbot.waitUntil(lambda: text(dialog, "folderFound") == made)
     field, file = child(dialog, PathField), tmp_path / "file"
     file.touch()

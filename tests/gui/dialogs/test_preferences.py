@@ -191,6 +191,13 @@ def _button(dialog: PreferencesDialog, name: str) -> QPushButton:
     return box.button(QDialogButtonBox.StandardButton[name])
 
 
+def test_lists_are_equally_wide_and_defaults_are_named_as_elsewhere(
+    opened: PreferencesDialog,
+) -> None:
+    assert len({one.width() for one in opened.findChildren(QComboBox)}) == 1
+    assert _button(opened, "RestoreDefaults").text() == "Restore &defaults"
+
+
 def test_every_field_has_a_letter_of_its_own(qtbot: QtBot) -> None:
     dialog = PreferencesDialog(BEFORE)
     qtbot.addWidget(dialog)

@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 from handcal_gui.dialogs.keys import KeysDialog, keys_html
 from handcal_gui.keys import keys_by_group
 from handcal_gui.window import MainWindow
-from tests.gui.helpers import child, show
+from tests.gui.helpers import child, letters, show
 
 
 @pytest.fixture
@@ -46,6 +46,12 @@ def test_headings_say_where_keys_work(dialog: KeysDialog) -> None:
     assert {"H", "Ctrl+P"} <= {*shown["Guide: works during a calibration"]}
     assert "F11" in shown["View: a menu; works everywhere"]
     assert "F" in shown["Camera: a panel; works while it has the keyboard focus"]
+
+
+def test_esc_also_closes_windows_and_each_button_has_a_letter(dialog: KeysDialog) -> None:
+    (esc,) = child(dialog, QTreeWidget, "keys").findItems("Esc", Qt.MatchFlag.MatchRecursive)
+    assert esc.text(1) == "Close the message, or a dialog or window opened from here"
+    assert letters(dialog) == ["p", "c"]
 
 
 def test_words_are_searched_in_keys_effects_and_headings(dialog: KeysDialog) -> None:

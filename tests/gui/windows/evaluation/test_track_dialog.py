@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,23 +14,25 @@ from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.errors import CameraError
+from handcal.link.pairing import Pairings
 from handcal.progress import Progress
 from handcal.station.cube_tracking import CubeSight, CubeTracking, TrackingOrder, track_cube
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.windows.evaluation import devices
 from handcal_gui.windows.evaluation.devices import depth_camera, paired_headset
 from handcal_gui.windows.evaluation.track_dialog import TrackDialog
 from tests.gui.helpers import child, letters
 
-Make = Callable[[str, Any], TrackDialog]
+Make = Callable[..., TrackDialog]
 
 
 @pytest.fixture
 def make(qtbot: QtBot) -> Iterator[Make]:
     made: list[TrackDialog] = []
 
-    def make_one(by: str, track: Any) -> TrackDialog:
-        made.append(TrackDialog(CubeEntries(tracked_by=by), track=track))
+    def make_one(by: str, track: Any, problem: str = "") -> TrackDialog:
+        made.append(TrackDialog(CubeEntries(tracked_by=by), None, track, lambda: problem))
         qtbot.addWidget(made[-1])
         made[-1].show()
         return made[-1]
@@ -112,11 +115,35 @@ def test_the_simulated_cube_is_shown_with_its_pose_until_stopped(qtbot: QtBot, m
     assert np.ptp(sight.corners_px, axis=0).max() < camera.width / 2
 
 
+def test_without_a_paired_headset_only_other_cameras_can_start(make: Make) -> None:
+    dialog = make("network", track_cube, "no headset is paired")
+    assert not button(dialog, "start").isEnabled()
+    assert finding(dialog).startswith("No headset is paired. Or choose something else")
+    chosen = child(dialog, QComboBox, "trackedBy")
+    chosen.setCurrentIndex(chosen.findData("camera"))
+    assert button(dialog, "start").isEnabled()
+    assert not finding(dialog)
+
+
+def test_a_headset_is_paired_once_its_key_is_stored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "pairing.key"
+    monkeypatch.setattr(devices, "pairing_file", lambda: file)
+    assert devices.pairing_problem() == "no headset is paired; pair one with Connect a headset"
+    file.write_text("nonsense")
+    assert str(file) in devices.pairing_problem()
+    file.unlink()
+    Pairings.read(file).open_key()
+    assert not devices.pairing_problem()
+
+
 def test_before_a_cube_is_seen_there_is_no_empty_table_and_nothing_is_cut(make: Make) -> None:
     dialog = make("network", track_cube)
     chosen = child(dialog, QComboBox, "trackedBy")
     assert chosen.width() >= chosen.sizeHint().width()
     assert not child(dialog, QTableWidget, "pose-of-the-cube").isVisible()
+    assert "will be shown here" in child(dialog, ImageView).message
 
 
 def test_the_failure_of_a_camera_is_shown_and_it_can_be_started_again(

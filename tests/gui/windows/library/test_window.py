@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
@@ -50,7 +51,7 @@ def test_the_bars_have_a_key_while_there_are_any(
     qtbot: QtBot, window: LibraryWindow, folder: Path
 ) -> None:
     key = child(window, QLabel, "legend")
-    assert (key.text(), key.isVisible()) == ("Bars: error before, after", True)
+    assert (key.text(), key.isVisible()) == ("Bars: error before, after; left eye above", True)
     for name in ("ada-1", "ada-2", "bea"):
         delete_session(folder / name)
     window.reload()
@@ -69,7 +70,7 @@ def test_search_filter_and_sorting(window: LibraryWindow) -> None:
         assert len(rows(window)) == expected[kind]
     kinds.setCurrentIndex(0)
     header = table(window).model().headerData(5, Qt.Orientation.Horizontal)
-    assert header == "Found ′"
+    assert header == "Found ′\nleft / right"
     table(window).sortByColumn(5, Qt.SortOrder.AscendingOrder)  # those not verified follow
     assert rows(window)[0][5] == "8.0 / 8.0"  # not what is expected to be left of it
 
@@ -81,9 +82,37 @@ def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
     choose(window, "Ada")
     assert not plot.isHidden()
     assert text(window, "trendTitle").startswith("Ada: 2 calibrations, and the error")
-    measured, expected = plot._measured["left"].getData(), plot._expected["left"].getData()
-    assert list(measured[1][:1]) == [4.0]
-    assert list(expected[1]) == [9.0, 8.0]
+    verified, unverified = plot._verified["left"].getData(), plot._unverified["left"].getData()
+    np.testing.assert_equal(verified[1], [4.0, np.nan])
+    np.testing.assert_equal(unverified[1], [np.nan, 8.0])  # each calibration has one symbol
+
+
+def test_trials_over_the_target_are_marked(tmp_path: Path) -> None:
+    def trials(arcmin: float, target_arcmin: float | None) -> str:
+        entry = LibraryEntry(
+            tmp_path, (0, 0), trials=2, trials_arcmin=arcmin, target_arcmin=target_arcmin
+        )
+        return make_row(entry).texts[7]
+
+    assert trials(10.4, 8.0) == "⚠ 10.4, over 8 (n = 2)"
+    assert trials(7.9, 8.0) == "7.9 (n = 2)"
+    assert trials(10.4, None) == "10.4 (n = 2)"  # of an older version
+
+
+def test_search_and_kind_show_their_keys(window: LibraryWindow) -> None:
+    assert "(Ctrl+F)" in child(window, QLineEdit, "search").placeholderText()
+    kind = child(window, QComboBox, "kind")
+    assert [one.text() for one in window.findChildren(QLabel) if one.buddy() is kind] == ["S&how"]
+
+
+def test_numbers_stand_apart_from_the_text_of_the_next_column(window: LibraryWindow) -> None:
+    model = table(window).model()
+    centre = Qt.AlignmentFlag.AlignHCenter
+    assert all(
+        model.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.TextAlignmentRole)
+        & centre
+        for column in (5, 6, 7)
+    )
 
 
 def test_buttons_fit_the_choice(window: LibraryWindow) -> None:
