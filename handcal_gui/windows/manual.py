@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QModelIndex, QSize, Qt, QUrl
+from PySide6.QtCore import QModelIndex, QSize, Qt, QTimer, QUrl
 from PySide6.QtGui import QKeyEvent, QTextBlock, QTextCursor, QTextDocument
 from PySide6.QtWidgets import (
     QLabel,
@@ -27,6 +27,7 @@ from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
+from handcal_gui.windows.excerpts import Excerpts, pattern_of
 from handcal_gui.windows.manual_page import ManualPage, markdown_of
 
 _FIRST_SIZE = QSize(1000, 750)
@@ -35,8 +36,10 @@ _CONTENTS_PX, _PAGE_PX = 220, 660
 _BESIDE_TITLES_PX = 4 * SPACING_PX
 """Room for the edges of the contents and their scroll bar."""
 _FOUND_PX = 230
-_SECTION_CHARACTERS = 40
-"""That fit in a line of the lines found, beside the titles of pages."""
+_PAGE_CHARACTERS, _SECTION_CHARACTERS = 24, 40
+"""That fit in a line of the lines found, beside their text."""
+_SETTLE_MS = 300
+"""From the last letter typed until the first line found is shown: a page takes 0.1 to 0.3 s."""
 _MOST_FOUND = 200
 _GUIDE = "guide.md"
 _NOTHING = tr("Nothing found: search for fewer or other words")
@@ -115,6 +118,8 @@ class Manual(QWidget):
         self.found.setRootIsDecorated(False)
         self.found.setHeaderLabels([tr("Page"), tr("Section"), tr("Line")])
         self.found.setMaximumHeight(_FOUND_PX)
+        self._excerpts = Excerpts(self.found)
+        self.found.setItemDelegateForColumn(2, self._excerpts)
         self.found.hide()
         self.contents = with_name(QTreeWidget(), "manualContents", tr("Contents"))
         self.contents.setHeaderHidden(True)
@@ -123,6 +128,8 @@ class Manual(QWidget):
         self._count = QLabel()
         self._lines: list[Line] = []
         self._shown: list[Line] = []
+        self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
+        self._settle.timeout.connect(self._show_next)
         vbox(
             hbox((self.search, 1), self._count, spacing=SPACING_PX),
             self.found,
@@ -219,10 +226,13 @@ class Manual(QWidget):
         """List the lines that contain the words typed."""
         found = find_lines(self._lines, words)
         self._shown = found[:_MOST_FOUND]
+        self._excerpts.words = pattern_of(words)
+        self.page.mark(self._excerpts.words)
         self.found.clear()
         for line in self._shown:
+            title = textwrap.fill(line.title, _PAGE_CHARACTERS)
             section = textwrap.fill(line.section, _SECTION_CHARACTERS)
-            item = QTreeWidgetItem(self.found, [line.title, section, line.text])
+            item = QTreeWidgetItem(self.found, [title, section, line.text])
             item.setToolTip(2, line.text)
         for column in (0, 1):
             self.found.resizeColumnToContents(column)
@@ -230,9 +240,11 @@ class Manual(QWidget):
         most = tr(", the first {} listed").format(_MOST_FOUND) if len(found) > _MOST_FOUND else ""
         count = pluralize(len(found), tr("line"), tr("lines")) if found else _NOTHING
         self._count.setText(f"{count}{most}" if words.split() else "")
+        self._settle.start()
 
     def _show_next(self) -> None:
         """Show the next line found, after the last the first."""
+        self._settle.stop()
         if self._shown:
             following = (self.found.currentIndex().row() + 1) % len(self._shown)
             self.found.setCurrentIndex(self.found.model().index(following, 0))
@@ -240,6 +252,7 @@ class Manual(QWidget):
 
     def _show_current(self) -> None:
         self._show_line(self._shown[self.found.currentIndex().row()])
+        self.page.go_to_mark()
 
     def _show_line(self, line: Line) -> None:
         self.page.setSource(QUrl.fromLocalFile(str(line.page)))

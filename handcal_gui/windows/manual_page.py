@@ -11,10 +11,11 @@ from PySide6.QtGui import (
     QImage,
     QPainter,
     QTextBlock,
+    QTextCharFormat,
     QTextCursor,
     QTextDocument,
 )
-from PySide6.QtWidgets import QTextBrowser, QWidget
+from PySide6.QtWidgets import QTextBrowser, QTextEdit, QWidget
 
 from handcal_gui.theme import colors, follow_theme, is_dark
 from handcal_gui.widgets.drawing import themed_drawing
@@ -23,6 +24,8 @@ _BESIDE_PX = 50
 """Room beside the widest picture."""
 _DIMMED = 0.25
 """Share of the light that a picture of the light window loses on a dark page."""
+_MARKED = 0.3
+"""Opacity of the ground of the words searched for."""
 _PAGES = (".md", ".py", ".proto")
 _DIRECTIVE = re.compile(r"^::: (\S+)$", re.MULTILINE)
 """Place of a function's description in a web page."""
@@ -38,7 +41,33 @@ class ManualPage(QTextBrowser):
         super().__init__(parent)
         self.setObjectName("manualPage")
         self.setOpenExternalLinks(True)
+        self._words: re.Pattern[str] | None = None
         follow_theme(self, self._load_again)
+
+    def mark(self, words: re.Pattern[str] | None) -> None:
+        """Mark words wherever they are, in this page and in those shown later."""
+        self._words = words
+        marked, shade = [], QTextCharFormat()
+        ground = QColor(colors().live)
+        ground.setAlphaF(_MARKED)
+        shade.setBackground(ground)
+        block = self.document().begin()
+        while words is not None and block.isValid():
+            for match in words.finditer(block.text()):
+                one = QTextEdit.ExtraSelection()
+                one.cursor, one.format = _cursor(block, match), shade
+                marked.append(one)
+            block = block.next()
+        self.setExtraSelections(marked)
+
+    def go_to_mark(self) -> None:
+        """Select the first word marked from the text cursor on."""
+        block = self.textCursor().block()
+        while self._words is not None and block.isValid():
+            if match := self._words.search(block.text()):
+                self.setTextCursor(_cursor(block, match))
+                return
+            block = block.next()
 
     def go_to(self, block: QTextBlock) -> None:
         """Scroll until a block is at the top."""
@@ -57,6 +86,7 @@ class ManualPage(QTextBrowser):
         if target.isLocalFile() and not target.path().endswith(_PAGES):
             return  # a picture or a folder would replace the page
         super().doSetSource(url, type)
+        self.mark(self._words)
         heading = url.fragment(QUrl.ComponentFormattingOption.FullyDecoded)
         block = self.document().begin()
         while heading and block.isValid():
@@ -90,6 +120,14 @@ class ManualPage(QTextBrowser):
         place = self.verticalScrollBar().value()
         self.reload()
         self.verticalScrollBar().setValue(place)
+
+
+def _cursor(block: QTextBlock, match: re.Match[str]) -> QTextCursor:
+    """Return a cursor that selects what matches in a block."""
+    cursor = QTextCursor(block)
+    cursor.setPosition(block.position() + match.start())
+    cursor.setPosition(block.position() + match.end(), QTextCursor.MoveMode.KeepAnchor)
+    return cursor
 
 
 def _dimmed(image: QImage) -> QImage:
