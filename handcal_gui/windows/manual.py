@@ -28,7 +28,7 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.windows.excerpts import Excerpts, pattern_of
-from handcal_gui.windows.manual_page import ManualPage, markdown_of
+from handcal_gui.windows.manual_page import FULL_SIZE, ManualPage, markdown_of
 
 _FIRST_SIZE = QSize(1000, 750)
 _CONTENTS_PX, _PAGE_PX = 220, 660
@@ -277,5 +277,5 @@ def _lines(page: Path) -> Iterator[Line]:
         if level := line[0].blockFormat().headingLevel():
             section = text
             title = title or text
-        if text:
+        if text and text != FULL_SIZE:
             yield Line(page, title, section, text, line[0].blockNumber(), level)

@@ -15,11 +15,16 @@ from PySide6.QtGui import (
     QTextCursor,
     QTextDocument,
 )
+from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QTextBrowser, QTextEdit, QWidget
 
 from handcal_gui.theme import colors, follow_theme, is_dark
+from handcal_gui.translation import tr
 from handcal_gui.widgets.drawing import themed_drawing
+from handcal_gui.widgets.opening import open_path
 
+FULL_SIZE = tr("Full size")
+"""Link below a picture."""
 _BESIDE_PX = 50
 """Room beside the widest picture."""
 _DIMMED = 0.25
@@ -27,6 +32,7 @@ _DIMMED = 0.25
 _MARKED = 0.3
 """Opacity of the ground of the words searched for."""
 _PAGES = (".md", ".py", ".proto")
+_PICTURE = re.compile(r"^!\[.+\]\((\S+\.png)\)$", re.MULTILINE)
 _DIRECTIVE = re.compile(r"^::: (\S+)$", re.MULTILINE)
 """Place of a function's description in a web page."""
 
@@ -34,7 +40,8 @@ _DIRECTIVE = re.compile(r"^::: (\S+)$", re.MULTILINE)
 class ManualPage(QTextBrowser):
     """Shows pages in Markdown, with their links and pictures.
 
-    Backspace and Alt+Left go back. Pages of the web open in the web browser.
+    Backspace and Alt+Left go back. Pages of the web open in the web browser, and the full size of a
+    picture in the system's program for it.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -42,6 +49,7 @@ class ManualPage(QTextBrowser):
         self.setObjectName("manualPage")
         self.setOpenExternalLinks(True)
         self._words: re.Pattern[str] | None = None
+        self.anchorClicked.connect(self._open_picture)
         follow_theme(self, self._load_again)
 
     def mark(self, words: re.Pattern[str] | None) -> None:
@@ -98,6 +106,7 @@ class ManualPage(QTextBrowser):
     def loadResource(self, kind: int, name: QUrl | str) -> object:
         """Return a page or a picture; a wide picture is reduced, a drawing has the theme's colours.
 
+        On screens of high resolution, a picture is reduced by as much less, so that it is sharp.
         In dark themes, photographs and pictures of the light window are dimmed and framed.
         """
         path = Path(self.source().resolved(QUrl(name)).toLocalFile())
@@ -106,12 +115,23 @@ class ManualPage(QTextBrowser):
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
         is_drawing = path.suffix == ".svg" and path.is_file()
-        image = QImage.fromData(themed_drawing(path)) if is_drawing else QImage(str(path))
-        widest_px = self.width() - _BESIDE_PX
-        if image.width() > widest_px:
-            image = image.scaledToWidth(widest_px, Qt.TransformationMode.SmoothTransformation)
-        is_light = not is_drawing and not image.isNull()
-        return _dimmed(image) if is_light and is_dark() else image
+        ratio = self.devicePixelRatioF()
+        image = _drawn(path, ratio) if is_drawing else QImage(str(path))
+        if image.isNull():
+            return image
+        width_px = min(image.deviceIndependentSize().width(), self.width() - _BESIDE_PX)
+        if image.width() > ratio * width_px:
+            smooth = Qt.TransformationMode.SmoothTransformation
+            image = image.scaledToWidth(round(ratio * width_px), smooth)
+        if is_dark() and not is_drawing:
+            image = _dimmed(image)
+        image.setDevicePixelRatio(image.width() / width_px)
+        return image
+
+    def _open_picture(self, link: QUrl) -> None:
+        target = self.source().resolved(link)
+        if target.isLocalFile() and target.path().endswith(".png"):
+            open_path(self, Path(target.toLocalFile()))
 
     def _load_again(self) -> None:
         """Load the page with its pictures in the colours of the theme."""
@@ -130,6 +150,17 @@ def _cursor(block: QTextBlock, match: re.Match[str]) -> QTextCursor:
     return cursor
 
 
+def _drawn(path: Path, ratio: float) -> QImage:
+    """Return a drawing with a number of pixels for each of the window's."""
+    drawing = QSvgRenderer(themed_drawing(path))
+    image = QImage(drawing.defaultSize() * ratio, QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    drawing.render(painter)
+    painter.end()
+    image.setDevicePixelRatio(ratio)
+    return image
+
+
 def _dimmed(image: QImage) -> QImage:
     """Return a light picture for a dark page: with less glare, and an edge where it is dark."""
     image = image.convertToFormat(QImage.Format.Format_RGB32)
@@ -142,8 +173,11 @@ def _dimmed(image: QImage) -> QImage:
 
 
 def markdown_of(page: Path) -> str:
-    """Return the text of a page; Python's own help has what only the web page describes."""
-    text = page.read_text("utf-8")
+    """Return the text of a page, with a link to the full size below each picture.
+
+    Python's own help has what only the web page describes.
+    """
+    text = _PICTURE.sub(rf"\g<0>\n\n[{FULL_SIZE}](\1)", page.read_text("utf-8"))
     return _DIRECTIVE.sub(r"`\1`, described by `help(\1)` in Python", text)
 
 

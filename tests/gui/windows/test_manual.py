@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.theme import SPACING_PX, use_theme
+from handcal_gui.windows import manual_page
 from handcal_gui.windows.excerpts import Excerpts, excerpt, pattern_of
 from handcal_gui.windows.manual import Manual, find_lines, read_lines
 from tests.helpers import ROOT
@@ -202,6 +203,8 @@ def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:
     assert rows == [("Page", "Keys", "F1 · shows keys")]
     assert find_lines(lines, "key")[0].text == "Keys"  # headings come first
     assert find_lines(lines, "  ") == []
+    (tmp_path / "page.md").write_text("# Page\n\n![Start](start.png)\n")
+    assert not find_lines(read_lines(tmp_path), "full size"), "nobody looks for those links"
 
 
 @pytest.mark.parametrize("name", ["guide.md", "rig-guide.md"])
@@ -298,3 +301,24 @@ def test_a_word_searched_for_is_bold_in_sight_and_marked_and_selected_in_the_pag
     use_theme("light")
     manual.search.clear()
     assert not manual.page.extraSelections()
+
+
+def test_a_picture_has_the_pixels_of_the_screen_and_opens_at_full_size_by_keys(
+    manual: Manual, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Path] = []
+    monkeypatch.setattr(manual_page, "open_path", lambda _, path: opened.append(path))
+    monkeypatch.setattr(manual.page, "devicePixelRatioF", lambda: 2.0)
+    manual.resize(960, 510)
+    manual.open("docs/guide.md")
+    kind = QTextDocument.ResourceType.ImageResource.value
+    for name in ("start.png", "setup-stereo.svg"):
+        picture = manual.page.loadResource(kind, QUrl(f"pictures/{name}"))
+        assert isinstance(picture, QImage)
+        assert picture.deviceIndependentSize().width() < manual.page.width()
+        assert picture.width() > 1.8 * picture.deviceIndependentSize().width()
+    for _ in range(2):  # to the link to the platforms' page first
+        QTest.keyClick(manual.page, Qt.Key.Key_Tab)
+    QTest.keyClick(manual.page, Qt.Key.Key_Return)
+    assert [path.name for path in opened] == ["start.png"]
+    assert manual.page.source().fileName() == "guide.md"
