@@ -269,7 +269,7 @@ def test_a_grid_that_has_no_room_is_reported(qtbot: QtBot, wizard: RigWizard) ->
     page = wizard.page
     assert isinstance(page, StepPage)
     for name in ("saveGrid", "take"):
-        button = page.panels[0].setup.findChild(QPushButton, name)
+        button = page.panels[0].buttons.findChild(QPushButton, name)
         assert isinstance(button, QPushButton)
         button.click()
     assert wizard.findChild(TakeDialog) is None
