@@ -77,7 +77,7 @@ class Drawing(QWidget):
         """Draw as large as fits."""
         painter = QPainter(self)
         size = QSizeF(self._renderer.defaultSize())
-        room = QSizeF(self.size()).boundedTo(_LARGEST_SCALE * size)
+        room = QSizeF(self.size()).boundedTo(size * _LARGEST_SCALE)
         size.scale(room, Qt.AspectRatioMode.KeepAspectRatio)
         place = QRectF(QPointF(), size)
         place.moveCenter(QRectF(self.rect()).center())
