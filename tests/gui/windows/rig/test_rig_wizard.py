@@ -188,7 +188,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
     assert told["Depth camera"] == "Not known"
     assert told["left: display"] == ""
-    assert told["Viewpoints"] == "Good"
+    assert "Good" not in told.values()
 
 
 def test_another_board_and_a_changed_rig_lose_their_ticks(
