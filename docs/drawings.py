@@ -22,7 +22,7 @@ from typing import TypeAlias
 Point: TypeAlias = tuple[float, float, float]
 Triangle: TypeAlias = tuple[Point, Point, Point]
 PICTURES = Path(__file__).parent / "pictures"
-_STYLE = "font-family='sans-serif' font-size='13' fill='#222'"
+_FONT, _INK = "font-family='sans-serif'", "fill='#222'"
 
 
 @dataclass(frozen=True)
@@ -149,55 +149,69 @@ def mount_svg(mount: Mount) -> str:
 
 ARRANGEMENTS = {
     "setup-stereo": (
-        "Depth and headset camera: one board, seen by both",
-        [(40, 60, "depth camera D"), (40, 130, "headset camera H")],
-        [(430, 95, "board")],
+        "Depth and headset camera:\none board, seen by both",
+        [(20, 60, "depth\ncamera D"), (20, 116, "headset\ncamera H")],
+        [(316, 88, "board")],
         "0.3 to 0.6 m",
     ),
     "setup-viewpoint": (
-        "Viewpoint camera alone: focus as behind the display",
-        [(40, 95, "viewpoint camera C")],
-        [(430, 95, "board")],
+        "Viewpoint camera alone:\nfocus as behind the display",
+        [(20, 88, "viewpoint\ncamera C")],
+        [(316, 88, "board")],
         "all parts of the view, tilted",
     ),
     "setup-board": (
-        "Display off: the camera unmoved, the headset tracks the board",
-        [(40, 60, "headset H tracks"), (40, 130, "viewpoint camera C")],
-        [(230, 112, "combiner (off)"), (430, 95, "board")],
+        "Display off: the camera unmoved,\nthe headset tracks the board",
+        [(20, 60, "headset H\ntracks"), (20, 116, "viewpoint\ncamera C")],
+        [(168, 106, "combiner\n(off)"), (316, 88, "board")],
         "several distances, tilted",
     ),
     "setup-display": (
-        "Display: the viewpoint camera in the eye's place, dark room",
-        [(40, 95, "viewpoint camera C")],
-        [(230, 95, "combiner"), (430, 95, "virtual grid")],
+        "Display: the viewpoint camera\nin the eye's place, dark room",
+        [(20, 88, "viewpoint\ncamera C")],
+        [(168, 88, "combiner"), (316, 88, "virtual\ngrid")],
         "focus at the virtual image",
     ),
     "setup-accept": (
-        "Acceptance: after the grid, the board at several distances",
-        [(40, 60, "depth camera D"), (40, 130, "viewpoint camera C")],
-        [(230, 112, "combiner (off)"), (430, 95, "board")],
+        "Acceptance: after the grid,\nthe board at several distances",
+        [(20, 60, "depth\ncamera D"), (20, 116, "viewpoint\ncamera C")],
+        [(168, 106, "combiner\n(off)"), (316, 88, "board")],
         "0.35 to 0.65 m",
     ),
     "setup-cube": (
-        "Cube in the room: tracked by D, drawn by the headset",
-        [(40, 60, "depth camera D"), (40, 130, "eye, or camera C")],
-        [(230, 112, "combiner"), (430, 95, "cube")],
+        "Cube in the room:\ntracked by D, drawn by the headset",
+        [(20, 60, "depth\ncamera D"), (20, 116, "eye, or\ncamera C")],
+        [(168, 106, "combiner"), (316, 88, "cube")],
         "0.4, 0.5, 0.6 m",
     ),
 }
+BOX_PX = 104, 44
+"""Size of a camera or thing of an arrangement."""
 
 
 def arrangement_svg(name: str) -> str:
-    """Return the drawing of an arrangement, seen from the side."""
+    """Return the drawing of an arrangement, seen from the side.
+
+    It is narrow, so that its text is as large as the window's where two stand side by side.
+    """
     title, lookers, things, distance = ARRANGEMENTS[name]
-    parts = [_text(20, 28, title)]
+    width, height = BOX_PX
+    parts = [_lines(20, 32, title)]
     x_end, y_end, _ = things[-1]
     for x, y, _ in lookers:
-        line = f"x1='{x + 130}' y1='{y + 18}' x2='{x_end}' y2='{y_end + 18}'"
+        line = f"x1='{x + width}' y1='{y + height / 2:g}' x2='{x_end}' y2='{y_end + height / 2:g}'"
         parts.append(f"<line {line} stroke='#888' stroke-dasharray='5 4'/>")
-    parts += [_box(x, y, 150, 36, label) for x, y, label in (*lookers, *things)]
-    parts.append(_text(430, 160, distance))
-    return _svg(620, 190, parts)
+    for x, y, label in (*lookers, *things):
+        parts.append(_box(x, y, width, height, "") + _lines(x + 10, y + height / 2, label))
+    parts.append(_text(x_end + width, 173, distance, "font-size='15' text-anchor='end'"))
+    return _svg(440, 190, parts)
+
+
+def _lines(x: float, y: float, text: str) -> str:
+    """Return the large text of an arrangement, its lines centred at a height."""
+    lines = text.split("\n")
+    top = y + 5 - 9 * (len(lines) - 1)
+    return "".join(_text(x, top + 18 * i, one, "font-size='15'") for i, one in enumerate(lines))
 
 
 def _box(x: float, y: float, width: float, height: float, label: str, fill: str = "#dde6f0") -> str:
@@ -206,8 +220,8 @@ def _box(x: float, y: float, width: float, height: float, label: str, fill: str 
     return box + (_text(x + 10, y + height / 2 + 5, label) if label else "")
 
 
-def _text(x: float, y: float, text: str) -> str:
-    return f"<text x='{x:.1f}' y='{y:.1f}' {_STYLE}>{text}</text>"
+def _text(x: float, y: float, text: str, size: str = "font-size='13'") -> str:
+    return f"<text x='{x:.1f}' y='{y:.1f}' {_FONT} {size} {_INK}>{text}</text>"
 
 
 def _svg(width: float, height: float, parts: list[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ from handcal_gui.dialogs.export import Export, ExportDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.dialogs.support import SupportDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
+from handcal_gui.help_menu import read_manual
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import CurrentPreferences
 from handcal_gui.theme import use_theme
@@ -34,6 +36,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
 from handcal_gui.window import MainWindow
+from handcal_gui.windows.manual import Manual
 
 if TYPE_CHECKING:  # imported when they open: they take longer than all the rest
     from handcal_gui.windows.evaluation.window import EvaluationWindow
@@ -200,6 +203,8 @@ class SeparateWindows(QObject):
             return None
         wizard = RigWizard(folder, self._window, self._start.new.settings.realsense)
         wizard.rig_saved.connect(self._use_rig)
+        manual = Manual(wizard)  # of its own: the wizard blocks the window's
+        wizard.manual_wanted.connect(partial(read_manual, self._window, manual))
         wizard.finished.connect(self._start.new.check)
         self._open(wizard, wizard.accept)
         return wizard

@@ -19,7 +19,7 @@ from handcal.rig_types import (
     Rig,
     RigPart,
 )
-from handcal.types import EYES, Float64
+from handcal.types import EYES, Eye, Float64
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0
@@ -45,6 +45,8 @@ class RigFinding:
     """The expected value; empty if any value is."""
     is_known: bool = True
     """False if the file does not contain it: neither fine nor doubtful."""
+    parts: tuple[RigPart, ...] = ()
+    """Parts of the rig from which it was computed; empty if it is not about their values."""
 
     @property
     def is_judged(self) -> bool:
@@ -94,13 +96,14 @@ def missing_parts(rig: Rig) -> tuple[str, ...]:
 def _findings(rig: Rig) -> Iterator[RigFinding]:
     left_m, right_m = (invert(view_of_eye(rig.eyes[eye], np.eye(4)))[:3, 3] for eye in EYES)
     apart_m = float(np.linalg.norm(right_m - left_m))
-    yield _within("Distance of the viewpoints", apart_m, _EYE_DISTANCE_M, 1e3, "mm")
+    yield _within("Distance of the viewpoints", apart_m, _EYE_DISTANCE_M, 1e3, "mm", EYES)
     facing = view_of_eye(rig.eyes["left"], np.eye(4))[:3, :3] @ (right_m - left_m)
     yield RigFinding(
         "Viewpoints",
         "right is to the right of left" if facing[0] > 0 else "left and right are exchanged",
         bool(facing[0] > 0),
         "right is to the right of left",
+        parts=EYES,
     )
     for eye in EYES:
         yield from _display_findings(eye, rig.eyes[eye])
@@ -110,12 +113,14 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
             f"{100 * seen:.0f} % of the display",
             seen >= _LEAST_SEEN,
             f"{100 * _LEAST_SEEN:.0f} % or more",
+            parts=(eye, "T_H_D"),
         )
     left, right = (1.0 / rig.eyes[eye].z_C0_S_m for eye in EYES)
     bounds, what = (0.0, _LARGEST_FOCAL_DIFFERENCE), "Difference of the virtual screens' distances"
-    yield _within(what, abs(right - left), bounds, 1.0, "dioptres")
+    yield _within(what, abs(right - left), bounds, 1.0, "dioptres", EYES)
     reach_m = float(np.linalg.norm(rig.T_H_D[:3, 3]))
-    yield _within("Depth camera from the headset rig", reach_m, (0.0, _LARGEST_REACH_M), 1e3, "mm")
+    what, bounds = "Depth camera from the headset rig", (0.0, _LARGEST_REACH_M)
+    yield _within(what, reach_m, bounds, 1e3, "mm", ("T_H_D",))
     camera = rig.depth_camera
     yield RigFinding(
         "Depth camera",
@@ -134,24 +139,27 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
         yield _origin_finding(rig, part)
 
 
-def _display_findings(eye: str, display: EyeDisplay) -> Iterator[RigFinding]:
+def _display_findings(eye: Eye, display: EyeDisplay) -> Iterator[RigFinding]:
     arcmin = float(arcmin_from_px(display, 1.0))
     yield RigFinding(
         f"{eye}: display",
         f"{display.width_px}×{display.height_px} px, {arcmin:.2f}′ per pixel, "
         f"{_angle_deg(display):.0f}° across",
     )
-    yield _within(
-        f"{eye}: distance of the virtual screen", display.z_C0_S_m, _FOCAL_DISTANCE_M, 1.0, "m"
-    )
+    what = f"{eye}: distance of the virtual screen"
+    yield _within(what, display.z_C0_S_m, _FOCAL_DISTANCE_M, 1.0, "m", (eye,))
     offset_m = float(np.linalg.norm(display.t_C0_V_m))
-    yield _within(
-        f"{eye}: viewpoint from the rendering camera", offset_m, (0.0, _LARGEST_OFFSET_M), 1e3, "mm"
-    )
+    what = f"{eye}: viewpoint from the rendering camera"
+    yield _within(what, offset_m, (0.0, _LARGEST_OFFSET_M), 1e3, "mm", (eye,))
 
 
 def _within(
-    what: str, value: float, bounds: tuple[float, float], scale: float, unit: str
+    what: str,
+    value: float,
+    bounds: tuple[float, float],
+    scale: float,
+    unit: str,
+    parts: tuple[RigPart, ...],
 ) -> RigFinding:
     low, high = bounds
     return RigFinding(
@@ -159,6 +167,7 @@ def _within(
         f"{scale * value:.3g} {unit}",
         low <= value <= high,
         f"{scale * low:g} to {scale * high:g} {unit}",
+        parts=parts,
     )
 
 

@@ -94,8 +94,10 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
         files += [file for file in inside if file.suffix.lower() in IMAGE_SUFFIXES]
     if not files:
         missing = [str(path) for path in paths if not path.exists()]
-        why = f" ({', '.join(missing[:3])} does not exist)" if missing else ""
-        raise FileError(f"no PNG or JPEG images in {', '.join(map(str, paths[:3]))}{why}")
+        empty = [str(path) for path in paths if path.exists()]
+        where = f" in {', '.join(empty[:3])}" if empty else ""
+        why = f": {', '.join(missing[:3])} does not exist" if missing else ""
+        raise FileError(f"no PNG or JPEG images{where}{why}")
     if len(files) > MAX_VIEWS:
         raise FileError(f"{len(files)} images are more than the {MAX_VIEWS} allowed")
     name, count = Counter(file.name for file in files).most_common(1)[0]

@@ -13,6 +13,8 @@ from handcal.io.resources import resource_path
 from handcal_gui.theme import colors, follow_theme
 from handcal_gui.translation import tr
 
+_LARGEST_SCALE = 1.25
+"""At which the text is half as large again as the window's."""
 _LIVE_SHARE = 0.18
 """Of the live colour in filled parts, which hide the lines below them."""
 
@@ -49,7 +51,7 @@ def _mixed(ground: QColor, live: QColor) -> QColor:
 
 
 class Drawing(QWidget):
-    """Shows a shipped SVG drawing, as large as fits.
+    """Shows a shipped SVG drawing, as large as fits and its text is not too large.
 
     Parameters
     ----------
@@ -75,7 +77,8 @@ class Drawing(QWidget):
         """Draw as large as fits."""
         painter = QPainter(self)
         size = QSizeF(self._renderer.defaultSize())
-        size.scale(QSizeF(self.size()), Qt.AspectRatioMode.KeepAspectRatio)
+        room = QSizeF(self.size()).boundedTo(size * _LARGEST_SCALE)
+        size.scale(room, Qt.AspectRatioMode.KeepAspectRatio)
         place = QRectF(QPointF(), size)
         place.moveCenter(QRectF(self.rect()).center())
         self._renderer.render(painter, place)

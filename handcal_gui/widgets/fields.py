@@ -218,6 +218,14 @@ def paragraph(name: str = "", text: str = "") -> QLabel:
     return label
 
 
+def make_linked(label: QLabel) -> QLabel:
+    """Let a label show HTML with links, which keys reach, too."""
+    by = Qt.TextInteractionFlag
+    label.setTextFormat(Qt.TextFormat.RichText)
+    label.setTextInteractionFlags(by.LinksAccessibleByMouse | by.LinksAccessibleByKeyboard)
+    return label
+
+
 def one_of(texts: Mapping[str, str]) -> QStackedWidget:
     """Return paragraphs by their names, one of which is shown; as high as the highest of them.
 

@@ -24,6 +24,7 @@ class FindingLine(QWidget):
         super().__init__(parent)
         self.setObjectName(f"{name}Finding")
         self._finding: Finding | None = None
+        self._is_waiting = False
         self._mend: Callable[[], object] | None = None
         self._icon = with_name(QLabel(), f"{name}Health")
         self._icon.setFixedSize(2 * SPACING_PX, 2 * SPACING_PX)
@@ -57,10 +58,18 @@ class FindingLine(QWidget):
         self._button.hide()
 
     def show_finding(
-        self, finding: Finding, fix: str = "", mend: Callable[[], object] | None = None
+        self,
+        finding: Finding,
+        fix: str = "",
+        mend: Callable[[], object] | None = None,
+        *,
+        is_waiting: bool = False,
     ) -> None:
-        """Show a finding; `fix` labels the button that calls `mend`."""
-        self._finding, self._mend = finding, mend
+        """Show a finding; `fix` labels the button that calls `mend`.
+
+        If it waits only for a later step, a clock stands in place of the sign of its health.
+        """
+        self._finding, self._mend, self._is_waiting = finding, mend, is_waiting
         self._text.setText(
             " ".join(map(_full_sentence, filter(None, (finding.found, finding.advice))))
         )
@@ -77,9 +86,12 @@ class FindingLine(QWidget):
             Health.LIMITED: colors().warning,
             Health.BROKEN: colors().red,
         }
-        self._icon.setPixmap(icon(_ICONS[health], shades[health]).pixmap(2 * SPACING_PX))
-        self._icon.setAccessibleName(_WORDS[health])
-        self._icon.setToolTip(_WORDS[health])
+        name, shade, word = _ICONS[health], shades[health], _WORDS[health]
+        if self._is_waiting:
+            name, shade, word = "wait", colors().muted, tr("Not yet")
+        self._icon.setPixmap(icon(name, shade).pixmap(2 * SPACING_PX))
+        self._icon.setAccessibleName(word)
+        self._icon.setToolTip(word)
 
     def _click(self) -> None:
         if self._mend is not None:

@@ -48,11 +48,13 @@ class LiveCameras(QWidget):
     are_stored : bool
         True if the images shown are those of a recording or video, which does not wait.
     images_changed : Signal()
+    chosen_changed : Signal()
     failed : Signal(str)
         Reason why no camera is shown.
     """
 
     images_changed = Signal()
+    chosen_changed = Signal()
     failed = Signal(str)
 
     def __init__(
@@ -87,11 +89,13 @@ class LiveCameras(QWidget):
         for source in self._sources.values():
             source.currentIndexChanged.connect(self._refresh)
             source.currentIndexChanged.connect(self._stop_another)
+            source.currentIndexChanged.connect(self.chosen_changed)
         for field in self._recorded.values():
             field.changed.connect(self._stop_another)
+            field.changed.connect(self.chosen_changed)
         self._lay_out()
         self._refresh()
-        self._show_message(tr("No image yet"))
+        self._show_message(tr("The camera's image will be shown here"))
 
     def add_cameras(self, numbers: Iterable[int]) -> None:
         """Add cameras of this computer to the choices, by their numbers."""
@@ -123,11 +127,8 @@ class LiveCameras(QWidget):
         """Show images of the chosen cameras."""
         self.stop()
         sources = self._opened = self.chosen
-        if "" in sources.values():
-            self.failed.emit(tr("choose the recording or video"))
-            return
-        if len(set(sources.values())) < len(sources):
-            self.failed.emit(tr("both are the same camera: choose another for one of them"))
+        if need := self.need:
+            self.failed.emit(need)
             return
         self.are_stored = any(one.currentData() == _RECORDED for one in self._sources.values())
         self._live = LiveImages(
@@ -167,6 +168,16 @@ class LiveCameras(QWidget):
     def chosen(self) -> dict[str, str]:
         """The source of each camera for `open_view_source`, by title; empty if none is chosen."""
         return {title: self._source(title) for title in self._sources}
+
+    @property
+    def need(self) -> str:
+        """What must be chosen before images can be shown; empty if nothing must."""
+        for title, source in self.chosen.items():
+            if not source:
+                return tr("choose the recording or video of the {}").format(title.lower())
+        if len(set(self.chosen.values())) < len(self._sources):
+            return tr("both are the same camera: choose another for one of them")
+        return ""
 
     def _stop_another(self) -> None:
         """Stop once another camera is chosen than the one shown."""

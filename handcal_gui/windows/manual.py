@@ -8,21 +8,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QModelIndex, QSize, Qt, QUrl
-from PySide6.QtGui import (
-    QColor,
-    QImage,
-    QKeyEvent,
-    QPainter,
-    QTextBlock,
-    QTextCursor,
-    QTextDocument,
-)
+from PySide6.QtCore import QModelIndex, QSize, Qt, QTimer, QUrl
+from PySide6.QtGui import QKeyEvent, QTextBlock, QTextCursor, QTextDocument
 from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QSplitter,
-    QTextBrowser,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -30,33 +21,29 @@ from PySide6.QtWidgets import (
 
 from handcal.io.resources import resource_path
 from handcal_gui.keys import add_action
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, is_dark
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.drawing import themed_drawing
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
+from handcal_gui.windows.excerpts import Excerpts, pattern_of
+from handcal_gui.windows.manual_page import FULL_SIZE, ManualPage, markdown_of
 
 _FIRST_SIZE = QSize(1000, 750)
 _CONTENTS_PX, _PAGE_PX = 220, 660
 """Least widths; wider contents show the titles whole."""
 _BESIDE_TITLES_PX = 4 * SPACING_PX
 """Room for the edges of the contents and their scroll bar."""
-_BESIDE_PX = 50
-"""Room beside the widest picture."""
 _FOUND_PX = 230
-_SECTION_CHARACTERS = 40
-"""That fit in a line of the lines found, beside the titles of pages."""
+_PAGE_CHARACTERS, _SECTION_CHARACTERS = 24, 40
+"""That fit in a line of the lines found, beside their text."""
+_SETTLE_MS = 300
+"""From the last letter typed until the first line found is shown: a page takes 0.1 to 0.3 s."""
 _MOST_FOUND = 200
 _GUIDE = "guide.md"
 _NOTHING = tr("Nothing found: search for fewer or other words")
-_DIMMED = 0.25
-"""Share of the light that a picture of the light window loses on a dark page."""
-_PAGES = (".md", ".py", ".proto")
 _LINK = re.compile(r"\]\(([\w-]+\.md)")
-_DIRECTIVE = re.compile(r"^::: (\S+)$", re.MULTILINE)
-"""Place of a function's description in a web page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +118,8 @@ class Manual(QWidget):
         self.found.setRootIsDecorated(False)
         self.found.setHeaderLabels([tr("Page"), tr("Section"), tr("Line")])
         self.found.setMaximumHeight(_FOUND_PX)
+        self._excerpts = Excerpts(self.found)
+        self.found.setItemDelegateForColumn(2, self._excerpts)
         self.found.hide()
         self.contents = with_name(QTreeWidget(), "manualContents", tr("Contents"))
         self.contents.setHeaderHidden(True)
@@ -139,6 +128,8 @@ class Manual(QWidget):
         self._count = QLabel()
         self._lines: list[Line] = []
         self._shown: list[Line] = []
+        self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
+        self._settle.timeout.connect(self._show_next)
         vbox(
             hbox((self.search, 1), self._count, spacing=SPACING_PX),
             self.found,
@@ -235,10 +226,13 @@ class Manual(QWidget):
         """List the lines that contain the words typed."""
         found = find_lines(self._lines, words)
         self._shown = found[:_MOST_FOUND]
+        self._excerpts.words = pattern_of(words)
+        self.page.mark(self._excerpts.words)
         self.found.clear()
         for line in self._shown:
+            title = textwrap.fill(line.title, _PAGE_CHARACTERS)
             section = textwrap.fill(line.section, _SECTION_CHARACTERS)
-            item = QTreeWidgetItem(self.found, [line.title, section, line.text])
+            item = QTreeWidgetItem(self.found, [title, section, line.text])
             item.setToolTip(2, line.text)
         for column in (0, 1):
             self.found.resizeColumnToContents(column)
@@ -246,9 +240,11 @@ class Manual(QWidget):
         most = tr(", the first {} listed").format(_MOST_FOUND) if len(found) > _MOST_FOUND else ""
         count = pluralize(len(found), tr("line"), tr("lines")) if found else _NOTHING
         self._count.setText(f"{count}{most}" if words.split() else "")
+        self._settle.start()
 
     def _show_next(self) -> None:
         """Show the next line found, after the last the first."""
+        self._settle.stop()
         if self._shown:
             following = (self.found.currentIndex().row() + 1) % len(self._shown)
             self.found.setCurrentIndex(self.found.model().index(following, 0))
@@ -256,97 +252,17 @@ class Manual(QWidget):
 
     def _show_current(self) -> None:
         self._show_line(self._shown[self.found.currentIndex().row()])
+        self.page.go_to_mark()
 
     def _show_line(self, line: Line) -> None:
         self.page.setSource(QUrl.fromLocalFile(str(line.page)))
         self.page.go_to(self.page.document().findBlockByNumber(line.block))
 
 
-class ManualPage(QTextBrowser):
-    """Shows pages in Markdown, with their links and pictures.
-
-    Backspace and Alt+Left go back. Pages of the web open in the web browser.
-    """
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setObjectName("manualPage")
-        self.setOpenExternalLinks(True)
-        follow_theme(self, self._load_again)
-
-    def go_to(self, block: QTextBlock) -> None:
-        """Scroll until a block is at the top."""
-        self.setTextCursor(QTextCursor(self.document().lastBlock()))
-        self.setTextCursor(QTextCursor(block))
-
-    def doSetSource(
-        self,
-        name: QUrl | str,
-        /,
-        type: QTextDocument.ResourceType = QTextDocument.ResourceType.UnknownResource,  # noqa: A002
-    ) -> None:
-        """Show a page, from the heading that the link names, as GitHub writes it."""
-        url = QUrl(name)
-        target = self.source().resolved(url)
-        if target.isLocalFile() and not target.path().endswith(_PAGES):
-            return  # a picture or a folder would replace the page
-        super().doSetSource(url, type)
-        heading = url.fragment(QUrl.ComponentFormattingOption.FullyDecoded)
-        block = self.document().begin()
-        while heading and block.isValid():
-            if block.blockFormat().headingLevel() and _anchor(block.text()) == heading:
-                self.go_to(block)
-                return
-            block = block.next()
-
-    def loadResource(self, kind: int, name: QUrl | str) -> object:
-        """Return a page or a picture; a wide picture is reduced, a drawing has the theme's colours.
-
-        In dark themes, photographs and pictures of the light window are dimmed and framed.
-        """
-        path = Path(self.source().resolved(QUrl(name)).toLocalFile())
-        if kind == QTextDocument.ResourceType.MarkdownResource.value and path.is_file():
-            return _markdown(path)
-        if kind != QTextDocument.ResourceType.ImageResource.value:
-            return super().loadResource(kind, name)
-        is_drawing = path.suffix == ".svg" and path.is_file()
-        image = QImage.fromData(themed_drawing(path)) if is_drawing else QImage(str(path))
-        widest_px = self.width() - _BESIDE_PX
-        if image.width() > widest_px:
-            image = image.scaledToWidth(widest_px, Qt.TransformationMode.SmoothTransformation)
-        is_light = not is_drawing and not image.isNull()
-        return _dimmed(image) if is_light and is_dark() else image
-
-    def _load_again(self) -> None:
-        """Load the page with its pictures in the colours of the theme."""
-        if self.source().isEmpty():
-            return
-        place = self.verticalScrollBar().value()
-        self.reload()
-        self.verticalScrollBar().setValue(place)
-
-
-def _dimmed(image: QImage) -> QImage:
-    """Return a light picture for a dark page: with less glare, and an edge where it is dark."""
-    image = image.convertToFormat(QImage.Format.Format_RGB32)
-    painter = QPainter(image)
-    painter.fillRect(image.rect(), QColor(0, 0, 0, round(255 * _DIMMED)))
-    painter.setPen(QColor(colors().muted))
-    painter.drawRect(image.rect().adjusted(0, 0, -1, -1))
-    painter.end()
-    return image
-
-
-def _markdown(page: Path) -> str:
-    """Return the text of a page; Python's own help has what only the web page describes."""
-    text = page.read_text("utf-8")
-    return _DIRECTIVE.sub(r"`\1`, described by `help(\1)` in Python", text)
-
-
 def _lines(page: Path) -> Iterator[Line]:
     """Yield the lines of a page; the cells of a table's row are one."""
     document = QTextDocument()
-    document.setMarkdown(_markdown(page))
+    document.setMarkdown(markdown_of(page))
     blocks: dict[object, list[QTextBlock]] = {}
     block = document.begin()
     while block.isValid():
@@ -361,9 +277,5 @@ def _lines(page: Path) -> Iterator[Line]:
         if level := line[0].blockFormat().headingLevel():
             section = text
             title = title or text
-        if text:
+        if text and text != FULL_SIZE:
             yield Line(page, title, section, text, line[0].blockNumber(), level)
-
-
-def _anchor(heading: str) -> str:
-    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")

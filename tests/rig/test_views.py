@@ -49,6 +49,12 @@ def test_images_are_read_and_what_is_wrong_is_kept(tmp_path: Path) -> None:
 
 
 def test_files_must_be_there_and_told_apart(tmp_path: Path) -> None:
+    gone = tmp_path / "gone"
+    with pytest.raises(FileError, match=f"^no PNG or JPEG images: {gone} does not exist$"):
+        image_files([gone])
+    both = f"^no PNG or JPEG images in {tmp_path}: {gone} does not exist$"
+    with pytest.raises(FileError, match=both):
+        image_files([tmp_path, gone])
     with pytest.raises(FileError, match="no PNG or JPEG"):
         image_files([tmp_path])
     for folder in ("a", "b"):

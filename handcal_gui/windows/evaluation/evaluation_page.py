@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
@@ -17,7 +17,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import main_button, paragraph, with_name
+from handcal_gui.widgets.fields import main_button, make_linked, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import keep_space, vbox
@@ -225,10 +225,7 @@ class EvaluationPage(QWidget):
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))
 
     def _lay_out(self, spec: EvaluationSpec) -> None:
-        note = paragraph("format", spec.note)
-        note.setTextFormat(Qt.TextFormat.RichText)
-        by = Qt.TextInteractionFlag
-        note.setTextInteractionFlags(by.LinksAccessibleByMouse | by.LinksAccessibleByKeyboard)
+        note = make_linked(paragraph("format", spec.note))
         note.linkActivated.connect(self.manual_wanted)
         note.setVisible(bool(spec.note))
         vbox(

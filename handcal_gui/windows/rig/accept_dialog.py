@@ -79,7 +79,7 @@ class AcceptDialog(QDialog):
         self._table = NumberTable("drawn-against-seen", tr("Drawn and seen corners"))
         self._bar = JobBar()
         self._run = main_button("runAcceptance", tr("Accept"))
-        self._open = button("openPage", tr("Open &page"))
+        self._open = button("openPage", tr("Open re&port"))
         self._close = button("close", tr("&Close"))
         self._run.clicked.connect(self.run)
         self._open.clicked.connect(self._open_page)
@@ -227,7 +227,8 @@ class AcceptDialog(QDialog):
     def _refresh(self) -> None:
         for eye, shown in self._counts.items():
             grids, pairs = self._count(eye, "grid"), self._count(eye, "viewpoint")
-            shown.setText(tr("{} of the grid, {} of the board").format(grids, pairs))
+            told = tr("Grid: {} of 1 or more images. Board: {} of {} or more pairs.")
+            shown.setText(told.format(grids, pairs, FEWEST_VIEWS))
         self._run.setEnabled(not self._need and not self._bar.is_busy)
         self._run.setToolTip(self._need)
         self._open.setEnabled(self._page is not None)

@@ -19,8 +19,10 @@ from handcal.io.images import write_png
 from handcal.io.resources import resource_path
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
 from handcal.rig.board_print import draw_board, write_board_pdf
+from handcal.rig.compare import compare_rigs
 from handcal.rig.print_page import Paper
-from handcal.rig_types import PART_NAMES
+from handcal.rig.rig_file import read_rig
+from handcal.rig_types import PART_NAMES, Rig
 from handcal.station.doctor import Finding, Health
 from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
@@ -45,6 +47,8 @@ from handcal_gui.windows.rig.file_dialogs import ask_open, ask_save
 from handcal_gui.windows.rig.project import RigProject
 
 _KINDS: dict[BoardKind, str] = {"charuco": "ChArUco", "checkerboard": tr("Checkerboard")}
+_TINY = 1e-6
+"""Difference of a number that was rounded."""
 _PREVIEW_PX, _PICTURE_PX = 40, 100  # side of a square
 
 
@@ -55,6 +59,7 @@ class BoardPage(QWidget):
         super().__init__(parent)
         self.setObjectName("boardPage")
         self._project = project
+        self._example = resource_path("example_rig.yaml")
         squares_help = tr("Squares, not inner corners.")
         self._kind = choice(
             "kind",
@@ -99,9 +104,7 @@ class BoardPage(QWidget):
             "savePicture", tr("Save &image…"), help_text=tr("PNG, to show on a screen")
         )
         self._begin = button("begin", tr("&Use another initial rig…"))
-        self._afresh = button(
-            "afresh", tr("Use the e&xample"), help_text=tr("Start afresh from the example rig")
-        )
+        self._afresh = button("afresh", tr("Use the e&xample"))
         self._rig, self._state = paragraph("initialRig"), paragraph("initialRigState")
         self._found = FindingLine("board")
         self._problem = ""
@@ -119,7 +122,7 @@ class BoardPage(QWidget):
         self.main.clicked.connect(self._save_pdf)
         self._picture.clicked.connect(self._save_picture)
         self._begin.clicked.connect(self._ask_for_rig)
-        self._afresh.clicked.connect(lambda: self._start_from(resource_path("example_rig.yaml")))
+        self._afresh.clicked.connect(lambda: self._start_from(self._example))
         project.rig_changed.connect(self._show_rig)
         self._show_rig()
         self._take()
@@ -168,14 +171,15 @@ class BoardPage(QWidget):
     def _show_state(self) -> None:
         inner = " × ".join(map(str, self._project.inputs.board.inner))
         corners = tr("{} inner corners").format(inner)
-        found = Finding("", Health.LIMITED, corners, tr("no image shows this board yet"))
+        advice = tr("no image shows this board yet: take images in the next step")
+        found = Finding("", Health.LIMITED, corners, advice)
         for save in (self.main, self._picture):
             save.setEnabled(not self._problem)
         if self._problem:
             found = Finding("", Health.BROKEN, self._problem)
         elif self._project.inputs.board_found:
             found = Finding("", Health.GOOD, tr("{}, found in an image").format(corners))
-        self._found.show_finding(found)
+        self._found.show_finding(found, is_waiting=found.advice == advice)
 
     def _save_pdf(self) -> None:
         title = tr("Save the board")
@@ -227,7 +231,14 @@ class BoardPage(QWidget):
         parts = ", ".join(PART_NAMES[part] for part in rig.origins)
         self._rig.setText(rig.name)
         self._state.setText(
-            tr("Calibrated: {}.").format(parts) if parts else tr("Not calibrated yet.")
+            tr("Calibrated: {}.").format(parts)
+            if parts
+            else tr("Nothing of this rig is calibrated yet.")
+        )
+        is_example = _is_same(rig, read_rig(self._example))
+        self._afresh.setEnabled(not is_example)
+        self._afresh.setToolTip(
+            tr("The example is in use") if is_example else tr("Start afresh from the example rig")
         )
 
     def _lay_out(self) -> None:
@@ -260,6 +271,12 @@ class BoardPage(QWidget):
         left.addLayout(hbox((self._state, 1), self._begin, spacing=SPACING_PX))
         left.addStretch(1)
         hbox((left, 1), (self._preview, 1), on=self, margins=0, spacing=3 * SPACING_PX)
+
+
+def _is_same(a: Rig, b: Rig) -> bool:
+    """Return whether two rigs of which nothing was calibrated agree."""
+    differences = [one.value for one in compare_rigs(a, b)]
+    return a.name == b.name and not (a.origins or b.origins) and max(differences) < _TINY
 
 
 def _draw(board: Board) -> UInt8:

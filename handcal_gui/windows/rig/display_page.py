@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from handcal.errors import FileError, HandcalError
@@ -16,7 +17,7 @@ from handcal.station.doctor import Finding, Health
 from handcal.types import Eye
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.fields import button, choice, number, whole_number
+from handcal_gui.widgets.fields import button, choice, make_linked, number, whole_number
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.file_dialogs import ask_save
 from handcal_gui.windows.rig.images_panel import ImagesPanel
@@ -36,9 +37,8 @@ _GRID_HINT = tr(
 _BOARD_HINT = tr(
     "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
     "through it while the headset tracks the board. Save in one JSON file for each image its name "
-    "and the board's pose in the headset rig, 4 rows of 4 numbers in metres; the tooltip of Poses "
-    "of the board in Inputs shows it."
-)
+    'and the board\'s pose in the headset rig: <a href="{}">its contents</a>.'
+).format("docs/rig-guide.md#left-and-right-display")
 
 
 class DisplayPage(StepPage):
@@ -48,7 +48,14 @@ class DisplayPage(StepPage):
     ----------
     project : RigProject
     eye : {"left", "right"}
+
+    Attributes
+    ----------
+    manual_wanted : Signal(str)
+        The user wants to read a page of the manual.
     """
+
+    manual_wanted = Signal(str)
 
     def __init__(self, project: RigProject, eye: Eye, parent: QWidget | None = None) -> None:
         distance = choice(
@@ -139,6 +146,7 @@ class DisplayPage(StepPage):
         board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
         panels = {tr("Grid on the &display"): grid, tr("Ca&mera pose"): board}
         super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
+        make_linked(board.hint).linkActivated.connect(self.manual_wanted)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}

@@ -91,7 +91,8 @@ class FindingList(QTreeWidget):
         for column, texts in (_ITEM, [one.what for one in self._findings]), (_EXPECTED, doubtful):
             longest_px = max(map(self.fontMetrics().horizontalAdvance, texts), default=0)
             icon_px = self.iconSize().width() * (column == _ITEM)
-            needed_px = min(longest_px + icon_px + 2 * SPACING_PX, self.viewport().width() // 4)
+            most_px = self.viewport().width() // (2 if column == _ITEM else 4)
+            needed_px = min(longest_px + icon_px + 2 * SPACING_PX, most_px)
             self.header().resizeSection(
                 column, max(needed_px, self.header().sectionSizeHint(column))
             )

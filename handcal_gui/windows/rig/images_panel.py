@@ -44,8 +44,8 @@ class ImagesPanel(QWidget):
 
     Attributes
     ----------
-    setup, search : QWidget
-        How to take the images, and how their search goes on; the page places both.
+    hint, drawing, buttons, search : QWidget
+        How to take the images, and how their search goes on; the page places them.
     shots : tuple of Shot
     dropped_changed : Signal()
         The images or the set of excluded images have changed.
@@ -70,7 +70,7 @@ class ImagesPanel(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.setup, self.search = QWidget(), QWidget()
+        self.buttons, self.search = QWidget(), QWidget()
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
         self._list = ShotList(tr("Images"))
@@ -87,10 +87,11 @@ class ImagesPanel(QWidget):
             ),
         )
         self._shown_map.currentIndexChanged.connect(self._show_map)
-        self._drawing = Drawing(f"docs/pictures/{drawing}.svg")
+        self.drawing = Drawing(f"docs/pictures/{drawing}.svg")
         self._count = QLabel()
         self._count.setObjectName("count")
-        self._hint = paragraph("hint", hint)
+        self.hint = paragraph("hint", hint)
+        self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)  # where another one is longer
         self._trouble = FindingLine("images")
         self._trouble.hide()
         self._again = button("again", again, help_text=tr("Read the folders again"))
@@ -125,7 +126,7 @@ class ImagesPanel(QWidget):
 
     def add_button(self, added: QPushButton) -> None:
         """Add a button in front of the panel's own."""
-        self._buttons.insertWidget(0, added)
+        self._button_row.insertWidget(0, added)
         QWidget.setTabOrder(added, self._take)
 
     def look(self, folders: Sequence[str], board: Board, dropped: Sequence[str]) -> None:
@@ -208,13 +209,6 @@ class ImagesPanel(QWidget):
         split.addWidget(self._view)
         split.setStretchFactor(1, 1)
         hbox((split, 1), side, on=self, margins=SPACING_PX, spacing=2 * SPACING_PX)
-        self._buttons = hbox(self._take, self._again, 1, spacing=SPACING_PX)
-        vbox(
-            self._hint,
-            (self._drawing, 1),
-            self._buttons,
-            on=self.setup,
-            margins=0,
-            spacing=SPACING_PX,
-        )
+        buttons = self._take, self._again
+        self._button_row = hbox(*buttons, 1, on=self.buttons, margins=0, spacing=SPACING_PX)
         vbox(self._trouble, self.bar, on=self.search, margins=0, spacing=0)

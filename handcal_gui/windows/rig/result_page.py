@@ -28,7 +28,7 @@ from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
-from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
+from handcal_gui.widgets.fields import button, label_for, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.number_table import NumberTable
@@ -93,10 +93,11 @@ class ResultPage(QWidget):
         rig = self._project.rig
         self._name.setText(rig.name)
         findings = (*report_rig(rig), *self._outdated(), self._accepted())
-        self._findings.show_findings(findings)
+        self._findings.show_findings([_unless_initial(one, rig) for one in findings])
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         saved = self._project.saved_file
         self._use.setEnabled(saved is not None)
+        self._use.setToolTip("" if saved is not None else tr("Save the rig file first"))
         summary = _summary(rig, findings)
         if saved is not None:
             summary = Finding("", Health.GOOD, tr("saved as {}").format(saved))
@@ -215,7 +216,7 @@ class ResultPage(QWidget):
         tabs.addTab(compare, tr("Com&pare"))
         form = QFormLayout()
         form.setHorizontalSpacing(2 * SPACING_PX)
-        form.addRow(tr("Name"), self._name)
+        form.addRow(label_for(self._name, tr("Nam&e")), self._name)
         form.addRow("", self._name_problem)
         self._name_problem.hide()
         foot = QHBoxLayout()
@@ -226,8 +227,21 @@ class ResultPage(QWidget):
         vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)
 
 
+def _unless_initial(finding: RigFinding, rig: Rig) -> RigFinding:
+    """Return a finding without a judgement if it is fine but of the initial rig's values."""
+    initial = [part for part in finding.parts if part not in rig.origins]
+    if not initial or not finding.is_fine:
+        return finding
+    is_whole = len(initial) == len(finding.parts)
+    told = tr("{}, as in the initial rig") if is_whole else tr("{}, partly as in the initial rig")
+    return replace(finding, found=told.format(finding.found), expected="")
+
+
 def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
-    """Return how many findings are doubtful or not known, and which parts are not calibrated."""
+    """Return how many findings are doubtful or not known, and which parts are not calibrated.
+
+    Its advice says how to go on with a rig that is not saved.
+    """
     doubtful = sum(not one.is_fine for one in findings)
     missing = [part for part in RIG_PARTS if part not in rig.origins]
     unknown = sum(not one.is_known for one in findings) - len(missing)
@@ -241,4 +255,7 @@ def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
             ", ".join(PART_NAMES[part] for part in missing)
         )
     health = Health.LIMITED if doubtful or unknown or missing else Health.GOOD
-    return Finding("", health, text)
+    advice = tr("save the rig file to use it")
+    if missing:
+        advice = tr("solve these steps, or save the rig file to use it as it is")
+    return Finding("", health, text, advice)

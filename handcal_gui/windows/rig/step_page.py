@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QTabWidget, QWidget
+from PySide6.QtWidgets import QGridLayout, QTabWidget, QWidget
 
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
@@ -17,7 +17,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
-from handcal_gui.widgets.layouts import hbox, scrollable, vbox
+from handcal_gui.widgets.layouts import scrollable, vbox
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
@@ -182,8 +182,15 @@ class StepPage(QWidget):
 
     def _lay_out(self) -> None:
         setup, inputs = QWidget(), QWidget()
-        setups = [(panel.setup, 1) for panel in self.panels]
-        hbox(*setups, on=setup, margins=SPACING_PX, spacing=3 * SPACING_PX)
+        grid = QGridLayout(setup)
+        grid.setContentsMargins(*4 * (SPACING_PX,))
+        grid.setHorizontalSpacing(3 * SPACING_PX)
+        grid.setVerticalSpacing(SPACING_PX)
+        grid.setRowStretch(1, 1)
+        for column, panel in enumerate(self.panels):
+            grid.setColumnStretch(column, 1)
+            for row, part in enumerate((panel.hint, panel.drawing, panel.buttons)):
+                grid.addWidget(part, row, column)
         self.form.narrow_px = _NARROW_PX
         vbox(self.form, 1, on=inputs, margins=SPACING_PX)
         self._tabs.addTab(setup, tr("Set-&up"))

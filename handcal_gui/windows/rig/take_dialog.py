@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import cast
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
@@ -28,6 +29,7 @@ from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.rig.coverage_map import CoverageMap
 
 _TAKEN = tr("this has been taken already")
@@ -92,10 +94,9 @@ class TakeDialog(QDialog):
             lambda title, frame, identity: keep_imager(folders[title], frame, identity),
             open_source,
         )
-        both = tr("Choose the cameras and press Show.")
         self._task = one_of(
             {
-                "takeShow": both if len(folders) > 1 else tr("Choose the camera and press Show."),
+                "takeShow": self._show_task,
                 "takeTake": tr("Press Take while nothing moves. Close when there are enough."),
                 "takeWait": tr("Images are taken automatically. Close when there are enough."),
             }
@@ -106,7 +107,7 @@ class TakeDialog(QDialog):
         self._take = main_button("takeImage", tr("Take"))
         self._mains = one_of_strips(self._start, self._take, keys="Space")
         self._by_itself = with_name(
-            QCheckBox(tr("&Automatically")),
+            QCheckBox(tr("Take &automatically when the board is still")),
             "byItself",
             help_text=tr(
                 "Take an image whenever the board is at rest, sharp, and at a position not covered "
@@ -118,6 +119,7 @@ class TakeDialog(QDialog):
         self._search.answered.connect(self._on_searched)
         self._search.failed.connect(self._show_failure)
         self._cameras.images_changed.connect(self._follow)
+        self._cameras.chosen_changed.connect(self._refresh)
         self._cameras.failed.connect(self._show_failure)
         self._start.clicked.connect(self.start)
         self._take.clicked.connect(self.take)
@@ -240,14 +242,28 @@ class TakeDialog(QDialog):
 
     def _show_coverage(self) -> None:
         """Show how many images of those asked for there are, and what they cover."""
-        self._count.setText(tr("{} of {} usable images").format(len(self._seen), self._asked))
+        told = tr("{} of {} usable images")
+        if len(self._folders) > 1:
+            told = tr("{} of {} usable pairs of images")
+        self._count.setText(told.format(len(self._seen), self._asked))
         searched = [seen for seen in self._seen if seen]
         for camera, shown in enumerate(self._maps):
             found = [seen[camera] for seen in searched]
             shown.show_coverage(coverage(found) if found else None)
 
+    @property
+    def _show_task(self) -> str:
+        """What to do before the cameras are shown."""
+        if need := self._cameras.need:
+            return f"{sentence(need)}."
+        if len(self._folders) > 1:
+            return tr("Choose the cameras and press Show.")
+        return tr("Choose the camera and press Show.")
+
     def _refresh(self) -> None:
         is_shown = self.shown_images is not None
+        cast(QLabel, self._task.widget(0)).setText(self._show_task)
+        self._start.setEnabled(not self._cameras.need)
         self._task.setCurrentIndex(1 + self._by_itself.isChecked() if is_shown else 0)
         self._take.setEnabled(is_shown and not self._bar.is_busy)
         self._mains.setCurrentIndex(int(is_shown))
@@ -256,10 +272,12 @@ class TakeDialog(QDialog):
         told = vbox(self._count, self._found, 1, spacing=SPACING_PX)
         others = self._close, self._by_itself
         foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
+        maps = hbox(*self._maps, 1, spacing=2 * SPACING_PX)
+        covered = vbox(QLabel(tr("Covered by the board so far:")), maps, spacing=0)
         vbox(
             self._task,
             (self._cameras, 1),
-            hbox((told, 1), *self._maps, spacing=2 * SPACING_PX),
+            hbox((told, 1), covered, spacing=2 * SPACING_PX),
             foot,
             on=self,
             margins=2 * SPACING_PX,

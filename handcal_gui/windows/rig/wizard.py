@@ -106,10 +106,13 @@ class RigWizard(QDialog):
     ----------
     rig_saved : Signal(Path)
         Rig file to use for the next calibration.
+    manual_wanted : Signal(str)
+        The user wants to read a page of the manual.
     project : RigProject
     """
 
     rig_saved = Signal(object)
+    manual_wanted = Signal(str)
 
     def __init__(
         self,
@@ -145,6 +148,8 @@ class RigWizard(QDialog):
             self._rail.addItem(QListWidgetItem(title))
         self._lay_out()
         self._rail.currentRowChanged.connect(self._go_to)
+        for display in self.findChildren(DisplayPage):
+            display.manual_wanted.connect(self.manual_wanted)
         self._back.clicked.connect(lambda: self.show_step(self.step - 1))
         self._next.clicked.connect(lambda: self.show_step(self.step + 1))
         self._close.clicked.connect(self.reject)

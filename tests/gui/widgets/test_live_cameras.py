@@ -108,8 +108,10 @@ def test_a_recording_is_shown_as_a_camera_is(qtbot: QtBot, pair: Pair) -> None:
     pair.choose(1, "Recording or video")
     assert [field.isEnabled() for field in fields] == [False, True]
     pair.widget.start()
-    assert pair.said == ["choose the recording or video"]
+    assert pair.said == ["choose the recording or video of the right camera"] == [pair.widget.need]
     pair.cameras["film.mp4"] = pair.cameras["1"]
-    fields[1].set_path("film.mp4")
+    with qtbot.waitSignal(pair.widget.chosen_changed):
+        fields[1].set_path("film.mp4")
+    assert not pair.widget.need
     pair.widget.start()
     qtbot.waitUntil(lambda: pair.levels == [50, 90])

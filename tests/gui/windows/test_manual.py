@@ -15,6 +15,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.theme import SPACING_PX, use_theme
+from handcal_gui.windows import manual_page
+from handcal_gui.windows.excerpts import Excerpts, excerpt, pattern_of
 from handcal_gui.windows.manual import Manual, find_lines, read_lines
 from tests.helpers import ROOT
 
@@ -201,6 +203,8 @@ def test_a_row_of_a_table_is_one_line_under_its_heading(tmp_path: Path) -> None:
     assert rows == [("Page", "Keys", "F1 · shows keys")]
     assert find_lines(lines, "key")[0].text == "Keys"  # headings come first
     assert find_lines(lines, "  ") == []
+    (tmp_path / "page.md").write_text("# Page\n\n![Start](start.png)\n")
+    assert not find_lines(read_lines(tmp_path), "full size"), "nobody looks for those links"
 
 
 @pytest.mark.parametrize("name", ["guide.md", "rig-guide.md"])
@@ -252,3 +256,69 @@ def test_no_page_and_no_section_of_a_line_found_is_cut(manual: Manual) -> None:
         height_px = manual.found.visualItemRect(row).height()
         assert height_px >= metrics.lineSpacing() * len(row.text(1).splitlines())
     assert sum(width_px[:2]) < 0.65 * manual.found.viewport().width()  # the rest is the line's
+
+
+def test_a_line_found_begins_shortly_before_the_word_searched_for() -> None:
+    text = "For each eye the result shows the error before and after, and the lab's target."
+    assert excerpt(text, pattern_of("TARGET")) == "… and after, and the lab's target."
+    assert excerpt("The target is far", pattern_of("target")) == "The target is far"
+    assert excerpt(text, pattern_of("  ")) == text
+
+
+def test_a_word_searched_for_is_bold_in_sight_and_marked_and_selected_in_the_page(
+    qtbot: QtBot, manual: Manual
+) -> None:
+    def ink(row: int) -> float:
+        line = manual.found.topLevelItem(row)
+        assert line is not None
+        place = manual.found.visualItemRect(line)
+        place.setLeft(manual.found.columnViewportPosition(2) + 4)
+        image = manual.found.viewport().grab(place).toImage()
+        pixels = [(x, y) for x in range(image.width()) for y in range(image.height())]
+        return sum(255 - image.pixelColor(x, y).lightness() for x, y in pixels)
+
+    manual.resize(960, 510)
+    manual.open("docs/index.md")
+    manual.search.setText("target")
+    qtbot.waitUntil(lambda: manual.page.source().fileName() == "guide.md")
+    assert manual.found.currentIndex().row() == 0
+    cursor = manual.page.textCursor()
+    assert cursor.selectedText() == "target"
+    assert manual.page.viewport().rect().contains(manual.page.cursorRect())
+    marked = [one.cursor.selectedText() for one in manual.page.extraSelections()]
+    assert len(marked) > 5
+    assert {word.lower() for word in marked} == {"target"}
+    line = manual.found.topLevelItem(2)
+    assert line is not None
+    with_bold = ink(2)
+    delegate = manual.found.itemDelegateForColumn(2)
+    assert isinstance(delegate, Excerpts)
+    line.setText(2, excerpt(line.text(2), delegate.words))
+    delegate.words = None
+    assert ink(2) < with_bold
+    use_theme("dark")
+    assert len(manual.page.extraSelections()) == len(marked), "the page was loaded again"
+    use_theme("light")
+    manual.search.clear()
+    assert not manual.page.extraSelections()
+
+
+def test_a_picture_has_the_pixels_of_the_screen_and_opens_at_full_size_by_keys(
+    manual: Manual, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Path] = []
+    monkeypatch.setattr(manual_page, "open_path", lambda _, path: opened.append(path))
+    monkeypatch.setattr(manual.page, "devicePixelRatioF", lambda: 2.0)
+    manual.resize(960, 510)
+    manual.open("docs/guide.md")
+    kind = QTextDocument.ResourceType.ImageResource.value
+    for name in ("start.png", "setup-stereo.svg"):
+        picture = manual.page.loadResource(kind, QUrl(f"pictures/{name}"))
+        assert isinstance(picture, QImage)
+        assert picture.deviceIndependentSize().width() < manual.page.width()
+        assert picture.width() > 1.8 * picture.deviceIndependentSize().width()
+    for _ in range(2):  # to the link to the platforms' page first
+        QTest.keyClick(manual.page, Qt.Key.Key_Tab)
+    QTest.keyClick(manual.page, Qt.Key.Key_Return)
+    assert [path.name for path in opened] == ["start.png"]
+    assert manual.page.source().fileName() == "guide.md"

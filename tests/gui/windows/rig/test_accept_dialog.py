@@ -75,6 +75,20 @@ def test_on_a_small_screen_the_drawing_hides_no_button(dialog: AcceptDialog) -> 
     assert part(dialog, QTableWidget, "drawn-against-seen").isHidden(), "there are no numbers yet"
 
 
+def test_the_images_of_each_eye_are_counted_towards_what_is_needed(
+    qtbot: QtBot, project: RigProject
+) -> None:
+    folder = project.folder.path / "accept"
+    write_acceptance(folder, project.rig, 6, np.random.default_rng(1), samples=1)
+    shutil.rmtree(folder / "right")
+    dialog = AcceptDialog(project)
+    qtbot.addWidget(dialog)
+    told = {label.text() for label in dialog.findChildren(QLabel)}
+    assert "Grid: 0 of 1 or more images. Board: 6 of 5 or more pairs." in told
+    assert "Grid: 0 of 1 or more images. Board: 0 of 5 or more pairs." in told
+    dialog.reject()
+
+
 def test_images_are_taken_with_both_cameras_at_once(dialog: AcceptDialog) -> None:
     assert not part(dialog, QPushButton, "runAcceptance").isEnabled()
     part(dialog, QPushButton, "left-board").click()

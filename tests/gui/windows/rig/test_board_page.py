@@ -133,6 +133,37 @@ def test_dialogs_begin_in_the_folder_used_last(
     assert ProjectFolder(project.folder.path).load()[0].chosen_folder == str(mine)
 
 
+def test_what_waits_for_images_is_no_warning_and_names_the_next_step(page: BoardPage) -> None:
+    sign = page.findChild(QLabel, "boardHealth")
+    assert isinstance(sign, QLabel)
+    assert "take images in the next step" in found(page)
+    assert sign.accessibleName() == "Not yet"
+    marker = page.findChild(QDoubleSpinBox, "marker")
+    assert isinstance(marker, QDoubleSpinBox)
+    marker.setValue(25.0)
+    assert sign.accessibleName() == "Problem"
+
+
+def test_the_example_is_offered_unless_it_is_in_use(page: BoardPage, project: RigProject) -> None:
+    afresh = page.findChild(QPushButton, "afresh")
+    state = page.findChild(QLabel, "initialRigState")
+    assert isinstance(afresh, QPushButton)
+    assert isinstance(state, QLabel)
+    assert state.text() == "Nothing of this rig is calibrated yet."
+    assert (afresh.isEnabled(), afresh.toolTip()) == (False, "The example is in use")
+    example = example_rig()
+    left = replace(example.eyes["left"], z_C0_S_m=1.5)
+    for other in (
+        replace(example, name="ours"),
+        replace(example, origins={"left": ORIGIN}),
+        replace(example, eyes={**example.eyes, "left": left}),
+    ):
+        project.use_rig(other)
+        assert afresh.isEnabled()
+        project.use_rig(example)
+        assert not afresh.isEnabled()
+
+
 def test_another_rig_is_begun_from(
     page: BoardPage,
     project: RigProject,

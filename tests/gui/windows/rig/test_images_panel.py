@@ -229,10 +229,10 @@ def test_what_was_left_out_of_other_images_is_forgotten(
 
 
 def test_the_set_up_shows_a_drawing(qtbot: QtBot, panel: ImagesPanel) -> None:
-    drawing = panel.setup.findChild(Drawing)
-    assert isinstance(drawing, Drawing)
-    panel.setup.resize(700, 400)
-    panel.setup.show()
+    drawing = panel.drawing
+    qtbot.addWidget(drawing)
+    drawing.resize(700, 300)
+    drawing.show()
     image = drawing.grab().toImage()
     shades = {image.pixel(x, y) for x in range(0, image.width(), 3) for y in range(0, 200, 3)}
     assert len(shades) > 3

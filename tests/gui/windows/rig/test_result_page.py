@@ -1,21 +1,83 @@
-"""The last step: the rig's name."""
+"""The last step: the rig's name, what is known of it, and its use."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtWidgets import QLabel, QLineEdit
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QTreeWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
+from handcal.rig.example import example_rig
+from handcal.rig_types import RIG_PARTS, Origin
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.result_page import ResultPage
-from tests.gui.helpers import child
+from tests.gui.helpers import child, show
+
+ORIGIN = Origin("as told", "now", 3, 0.1, "good", "as told", ("a",), np.eye(1))
 
 
-def test_a_missing_name_is_said_beside_the_field_at_once(qtbot: QtBot, tmp_path: Path) -> None:
-    project = RigProject(ProjectFolder(tmp_path), RealSenseSettings())
+@pytest.fixture
+def project(tmp_path: Path) -> RigProject:
+    return RigProject(ProjectFolder(tmp_path), RealSenseSettings())
+
+
+def told(page: ResultPage) -> dict[str, tuple[str, str]]:
+    """Return what was found of each item, and its sign in words."""
+    shown = child(page, QTreeWidget, "rigFindings")
+    rows = [shown.topLevelItem(row) for row in range(shown.topLevelItemCount())]
+    role = Qt.ItemDataRole.AccessibleDescriptionRole
+    return {one.text(0): (one.text(1), one.data(0, role)) for one in rows if one}
+
+
+def test_what_is_of_the_initial_rig_is_named_and_not_ticked(
+    qtbot: QtBot, project: RigProject
+) -> None:
+    page = ResultPage(project)
+    qtbot.addWidget(page)
+    apart, screen = "Distance of the viewpoints", "left: distance of the virtual screen"
+    assert told(page)[apart] == ("63 mm, as in the initial rig", "")
+    project.use_rig(replace(project.rig, origins={"left": ORIGIN}))
+    assert told(page)[apart] == ("63 mm, partly as in the initial rig", "")
+    assert told(page)[screen] == ("2 m", "Good")
+    project.use_rig(replace(project.rig, origins={"left": ORIGIN, "right": ORIGIN}))
+    assert told(page)[apart] == ("63 mm", "Good")
+    left = replace(example_rig().eyes["left"], z_C0_S_m=20.0)
+    project.use_rig(replace(example_rig(), eyes={**example_rig().eyes, "left": left}))
+    assert told(page)[screen] == ("20 m", "Doubtful"), "of the initial rig, too"
+
+
+def test_it_says_how_to_go_on_and_why_a_rig_cannot_be_used_yet(
+    qtbot: QtBot, project: RigProject, tmp_path: Path
+) -> None:
+    page = ResultPage(project)
+    qtbot.addWidget(page)
+    said, use = child(page, QLabel, "savedRigFound"), child(page, QPushButton, "useRig")
+    assert "Solve these steps, or save the rig file to use it as it is." in said.text()
+    assert not use.isEnabled()
+    assert use.toolTip() == "Save the rig file first"
+    project.use_rig(replace(project.rig, origins=dict.fromkeys(RIG_PARTS, ORIGIN)))
+    assert said.text().endswith("Save the rig file to use it.")
+    project.save_rig_as(tmp_path / "ours.yaml")
+    assert use.isEnabled()
+    assert not use.toolTip()
+
+
+def test_no_item_is_broken_in_a_small_window(qtbot: QtBot, project: RigProject) -> None:
+    page = show(qtbot, ResultPage(project), 760, 400)
+    shown = child(page, QTreeWidget, "rigFindings")
+    QApplication.processEvents()
+    rows = [shown.topLevelItem(row) for row in range(shown.topLevelItemCount())]
+    heights = {shown.visualItemRect(one).height() for one in rows if one}
+    assert len(heights) == 1
+
+
+def test_a_missing_name_is_said_beside_the_field_at_once(qtbot: QtBot, project: RigProject) -> None:
     page = ResultPage(project)
     qtbot.addWidget(page)
     page.show()

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -15,7 +16,9 @@ from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from handcal_gui.windows.manual import Manual
 from handcal_gui.windows.rig.wizard import RigWizard
+from tests.gui.windows.rig.wizard_steps import LEFT
 
 
 @pytest.fixture
@@ -68,3 +71,28 @@ def test_a_missing_folder_is_reported_with_the_reason(program: Program, tmp_path
     (tmp_path / "config" / "rig").touch()
     assert program.windows.calibrate_rig() is None
     assert "cannot create the folder" in program.window.banner.text
+
+
+def test_a_link_shows_what_the_file_of_poses_contains_in_a_manual_that_can_be_used(
+    qtbot: QtBot, program: Program
+) -> None:
+    wizard = program.windows.calibrate_rig()
+    assert wizard is not None
+    wizard.show_step(LEFT)
+    with qtbot.waitActive(wizard):
+        wizard.activateWindow()
+    hints = [one for one in wizard.findChildren(QLabel, "hint") if one.isVisible()]
+    (told,) = (one for one in hints if "<a " in one.text())
+    told.setFocus()
+    for key in (Qt.Key.Key_Tab, Qt.Key.Key_Return):
+        QTest.keyClick(told, key)
+    (manual,) = wizard.findChildren(Manual)
+    qtbot.waitUntil(manual.isVisible)
+    assert manual.page.textCursor().block().text() == "Left and right display"
+    assert "handcal_tracked" in manual.page.toPlainText()
+    place = manual.search.mapTo(manual, manual.search.rect().center())
+    QTest.mouseClick(
+        manual.windowHandle(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, place
+    )
+    qtbot.waitUntil(manual.search.hasFocus)
+    wizard.accept()

@@ -188,7 +188,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
     assert told["Depth camera"] == "Not known"
     assert told["left: display"] == ""
-    assert told["Viewpoints"] == "Good"
+    assert "Good" not in told.values()
 
 
 def test_another_board_and_a_changed_rig_lose_their_ticks(
@@ -269,7 +269,7 @@ def test_a_grid_that_has_no_room_is_reported(qtbot: QtBot, wizard: RigWizard) ->
     page = wizard.page
     assert isinstance(page, StepPage)
     for name in ("saveGrid", "take"):
-        button = page.panels[0].setup.findChild(QPushButton, name)
+        button = page.panels[0].buttons.findChild(QPushButton, name)
         assert isinstance(button, QPushButton)
         button.click()
     assert wizard.findChild(TakeDialog) is None

@@ -116,18 +116,18 @@ def test_what_is_taken_is_counted_and_what_it_covers_is_shown_at_once(
 
     maps = dialog.findChildren(CoverageMap)
     assert [one.caption for one in maps] == ["Depth camera: –", "Headset camera: –"]
-    assert count() == "0 of 20 usable images"
+    assert count() == "0 of 20 usable pairs of images"
     start(qtbot, dialog)
     button(dialog, "takeImage").click()
     qtbot.waitUntil(lambda: "corners" in said(dialog))
-    assert count() == "1 of 20 usable images"
+    assert count() == "1 of 20 usable pairs of images"
     covered = [one.caption for one in maps]
     assert all(caption.endswith(" %") for caption in covered)
     cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
     qtbot.waitUntil(lambda: dialog.shown_images is not None and dialog.shown_images[1].max() == 90)
     button(dialog, "takeImage").click()
     qtbot.waitUntil(lambda: "Take another" in said(dialog))
-    assert count() == "1 of 20 usable images", "the headset camera's shows no board"
+    assert count() == "1 of 20 usable pairs of images", "the headset camera's shows no board"
     assert [one.caption for one in maps] == covered
     dialog.resize(960, 500)  # as on a screen of 960x540
     QApplication.processEvents()
@@ -152,7 +152,7 @@ def test_earlier_images_count(qtbot: QtBot, wizard: RigWizard, photographs: Any)
     wait(qtbot, wizard)
     page.panels[0].take_requested.emit()
     taking = child(wizard, TakeDialog)
-    assert child(taking, QLabel, "takenCount").text() == "8 of 20 usable images"
+    assert child(taking, QLabel, "takenCount").text() == "8 of 20 usable pairs of images"
     assert "–" not in taking.findChildren(CoverageMap)[1].caption
     taking.reject()
 
@@ -231,7 +231,7 @@ def test_images_are_taken_by_themselves_until_they_are_enough(
     start(qtbot, dialog)
     by_itself.click()
     qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
-    assert child(dialog, QLabel, "takenCount").text() == "2 of 20 usable images"
+    assert child(dialog, QLabel, "takenCount").text() == "2 of 20 usable pairs of images"
     assert not by_itself.isChecked()
     for folder in ("depth", "headset"):
         names = [path.name for path in sorted((tmp_path / folder).iterdir())]
@@ -263,3 +263,31 @@ def test_what_is_not_taken_by_itself_is_explained(
     told = "0 taken; the board is not seen by the headset camera: bring it into view, "
     qtbot.waitUntil(lambda: said(dialog) == f"{told}and see to focus and light.")
     assert not (tmp_path / "depth").exists()
+
+
+def test_what_is_missing_is_said_and_nothing_can_be_shown_without_it(
+    qtbot: QtBot, dialog: TakeDialog, cameras: dict[str, Any], tmp_path: Path
+) -> None:
+    task, show = child(dialog, QLabel, "takeShow"), button(dialog, "startCameras")
+    source = dialog.findChildren(QComboBox, "source")[1]
+    source.setCurrentIndex(source.findText("Recording or video"))
+    assert task.text() == "Choose the recording or video of the headset camera."
+    assert not show.isEnabled()
+    source.setCurrentIndex(source.findText("Camera 0"))
+    assert task.text() == "Both are the same camera: choose another for one of them."
+    assert not show.isEnabled()
+    source.setCurrentIndex(source.findText("Camera 1"))
+    assert task.text() == "Choose the cameras and press Show."
+    assert show.isEnabled()
+
+
+def test_one_camera_takes_images_and_two_take_pairs(
+    qtbot: QtBot, dialog: TakeDialog, photographs: Any, tmp_path: Path
+) -> None:
+    folders = {"Viewpoint camera": tmp_path / "grid"}
+    board, settings = photographs.work.board, RealSenseSettings()
+    one = TakeDialog(folders, board, ChooseSettings(), settings, list_cameras=lambda: [0])
+    qtbot.addWidget(one)
+    assert child(one, QLabel, "takenCount").text() == "0 of 20 usable images"
+    assert child(dialog, QLabel, "takenCount").text() == "0 of 20 usable pairs of images"
+    one.reject()

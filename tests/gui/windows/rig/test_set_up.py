@@ -1,0 +1,30 @@
+"""How to take the images of a step: texts and drawings."""
+
+from __future__ import annotations
+
+import re
+
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.theme import font_px
+from handcal_gui.widgets.drawing import Drawing
+from handcal_gui.windows.rig.wizard import RigWizard
+from tests.gui.windows.rig.wizard_steps import LEFT
+from tests.helpers import ROOT
+
+
+def test_two_drawings_stand_on_one_line_with_text_as_large_as_the_window_s(
+    qtbot: QtBot, wizard: RigWizard
+) -> None:
+    wizard.resize(960, 540)
+    wizard.show_step(LEFT)
+    QApplication.processEvents()
+    left, right = (one for one in wizard.findChildren(Drawing) if one.isVisible())
+    assert left.y() == right.y()
+    assert left.height() == right.height()
+    svg = (ROOT / "docs" / "pictures" / "setup-board.svg").read_text("utf-8")
+    found = re.search("width='(.+?)' height='(.+?)'.+?font-size='(.+?)'", svg, re.DOTALL)
+    assert found is not None
+    width, height, text = map(float, found.groups())
+    assert text * min(left.width() / width, left.height() / height) > 0.95 * font_px()
