@@ -171,7 +171,7 @@ class LiveCameras(QWidget):
 
     @property
     def need(self) -> str:
-        """What must be chosen before images can be shown; empty if nothing must."""
+        """Advice on the choice that is missing before images can be shown; empty if none is."""
         for title, source in self.chosen.items():
             if not source:
                 return tr("choose the recording or video of the {}").format(title.lower())

@@ -253,7 +253,7 @@ class TakeDialog(QDialog):
 
     @property
     def _show_task(self) -> str:
-        """What to do before the cameras are shown."""
+        """The task before the cameras are shown."""
         if need := self._cameras.need:
             return f"{sentence(need)}."
         if len(self._folders) > 1:

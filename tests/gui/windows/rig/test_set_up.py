@@ -1,4 +1,4 @@
-"""How to take the images of a step: texts and drawings."""
+"""The set-up of a step, by texts and drawings."""
 
 from __future__ import annotations
 
