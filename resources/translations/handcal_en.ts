@@ -132,10 +132,6 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Largest available</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Default</source>
         <translation type="unfinished"></translation>
     </message>
@@ -164,10 +160,6 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Size of both depth and colour images, at 30 Hz.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Depth preset</source>
         <translation type="unfinished"></translation>
     </message>
@@ -184,19 +176,11 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Automatic</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Laser power</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Power of the projector; 0 mW switches it off.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>For the &amp;whole image</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -213,6 +197,26 @@
     </message>
     <message>
         <source>Measures the exposure of colour on the whole image, not on the hand once found.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest (1280 × 720 or 848 × 480 px, 30 Hz)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Size and rate of both depth and colour images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Automatic</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Keep the camera&apos;s setting</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For the &amp;whole image, not the hand once found</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -280,6 +284,14 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The wearer &amp;sees it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer sees &amp;it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Connect a headset</source>
         <translation type="unfinished"></translation>
     </message>
@@ -333,10 +345,6 @@
     </message>
     <message>
         <source>Show to &amp;{}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The wearer sees it</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -416,6 +424,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The export will create the folder {} there.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose what to write: nothing is ticked.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -436,19 +448,15 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Far plane</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Ne&amp;ar plane (OpenGL, Unity)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Far plane (OpenGL, Unity)</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Export &amp;to</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The folder {} is created there.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -655,10 +663,6 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Defaults</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Shows the default of every field; Cancel keeps the former values.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -815,7 +819,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Close the message</source>
+        <source>Close the message, or a dialog or window opened from here</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3716,15 +3720,19 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The camera&apos;s image will be shown here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>choose the recording or video of the {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>No image yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Camera {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>choose the recording or video</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3821,6 +3829,10 @@ Depth alone: the nearest hand-sized object.</source>
     </message>
     <message>
         <source>Target: {:.1f}′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Solved: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4223,6 +4235,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>⚠ {:.1f}, over {:g} (n = {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{:.1f} (n = {})</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4251,16 +4267,24 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Found ′</source>
+        <source>Found ′
+left / right</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error that the wearer&apos;s verification found, and corrected, left / right, in arcminutes;
-– was not verified</source>
+        <source>Error of the calibration that the wearer&apos;s verification found, and corrected, left / right,
+in arcminutes; – was not verified</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Expected ′</source>
+        <source>Expected ′
+left / right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all trials
+of the session, also of a calibration that was then repeated, and their number.
+⚠ over the lab&apos;s target: look at the trials; if φ was set well by hand, calibrate again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4269,10 +4293,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Trials ′</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Mean error of the user test in arcminutes, each trial counting once, and their number</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4312,23 +4332,23 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Expected error (′)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{}, verified</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{}: {} calibrations, and the error that each left, after the wearer&apos;s verification or only expected</source>
+        <source>{}, not verified</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{}, expected</source>
+        <source>{}: {} calibrations, and the error expected after each, verified by the wearer or not</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Noise study</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>How much rotation and noise do the solvers tolerate before their error exceeds the paper&apos;s 4 mm? About ten minutes on two cores; half a minute for a quick run.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4340,6 +4360,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The errors and effort of each method will be shown here, beside published ones.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Cube test</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4348,7 +4372,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>How far the drawn cube is from the real one will be shown here, by axis and by position of the camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Take the captures with a camera; enter their folder first.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Track cube…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4368,11 +4400,15 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>To capture, choose a folder in Captures.</source>
+        <source>How much rotation and noise do the solvers tolerate before their error exceeds the 4 mm of Hu et al. 2021? About ten minutes on two cores; half a minute for a quick run.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Track…</source>
+        <source>The mean error of each solver over rotation and noise will be shown here, and up to where it stays within 4 mm.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>To capture, choose a folder in Captures.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4408,15 +4444,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the session of {} holds no trial: record some in the panel Trials, or press Record…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>a wearer without a name</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>no session in {} holds a trial: record some in the panel Trials, or choose one session and press Record…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4484,10 +4512,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Align&amp;ments at each</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>&amp;Seed</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4505,10 +4529,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Captures</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Re&amp;cord…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4569,6 +4589,30 @@ one turns out.</source>
     </message>
     <message>
         <source>Grid squares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The errors of all trials and of each wearer will be shown here, and where the corners were drawn.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Re&amp;cord trials…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>How well each frame agrees with its mask will be shown here, with pictures of where they differ.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>the session of {} holds no trial: record some in the panel Trials, or press Record trials…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no session in {} holds a trial: record some in the panel Trials, or choose one session and press Record trials…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Align&amp;ments per position</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4648,10 +4692,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Search wearer, date, rig, headset</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Sessions shown</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4685,6 +4725,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Search wearer, date, rig, headset (Ctrl+F)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4733,6 +4777,10 @@ one turns out.</source>
     </message>
     <message>
         <source>Cop&amp;y path</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>S&amp;how</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5076,10 +5124,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Figures and numbers will be shown here.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Open &amp;report</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5240,6 +5284,10 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The camera&apos;s image and the cube&apos;s edges will be shown here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Pose of the cube</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5261,6 +5309,10 @@ one turns out.</source>
     </message>
     <message>
         <source>the cube is not tracked</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>or choose something else in Tracked by</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5472,7 +5524,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Open &amp;page</source>
+        <source>Open re&amp;port</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5516,7 +5568,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} of the grid, {} of the board</source>
+        <source>Grid: {} of 1 or more images. Board: {} of {} or more pairs.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5576,7 +5628,19 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>no image shows this board yet: take images in the next step</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nothing of this rig is calibrated yet.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Start afresh from the example rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The example is in use</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5609,10 +5673,6 @@ one turns out.</source>
     </message>
     <message>
         <source>{} inner corners</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>no image shows this board yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5653,10 +5713,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Calibrated: {}.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Not calibrated yet.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5788,7 +5844,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board. Save in one JSON file for each image its name and the board&apos;s pose in the headset rig, 4 rows of 4 numbers in metres; the tooltip of Poses of the board in Inputs shows it.</source>
+        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board. Save in one JSON file for each image its name and the board&apos;s pose in the headset rig: &lt;a href=&quot;{}&quot;&gt;its contents&lt;/a&gt;.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6044,6 +6100,18 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Nam&amp;e</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, as in the initial rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, partly as in the initial rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} of {} findings are doubtful: see Check</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6077,6 +6145,10 @@ one turns out.</source>
     </message>
     <message>
         <source>&amp;Use for the next calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Save the rig file first</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6130,7 +6202,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Name</source>
+        <source>save the rig file to use it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>solve these steps, or save the rig file to use it as it is</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6394,6 +6470,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Take &amp;automatically when the board is still</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} of {} usable pairs of images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose the cameras and press Show.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6407,10 +6491,6 @@ one turns out.</source>
     </message>
     <message>
         <source>Images are taken automatically. Close when there are enough.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>&amp;Automatically</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6439,6 +6519,10 @@ one turns out.</source>
     </message>
     <message>
         <source>{} of {} usable images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Covered by the board so far:</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6650,7 +6734,7 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Bars: error before, after</source>
+        <source>Bars: error before, after; left eye above</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6751,6 +6835,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Arrow keys move the picture: ← → φ1, ↑ ↓ φ2; PgUp PgDn make it larger or smaller (φ3). E changes the eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Full size</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
