@@ -23,6 +23,7 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _BLINK_MS = 800
 _LEAST_PX = 80, 48
+_HIGH_PX = 45 * SPACING_PX
 _ANY_HEIGHT_PX = 16_777_215
 """Qt's largest height of a widget."""
 _ASPECT = 0.8
@@ -70,7 +71,7 @@ class GuidePicture(QWidget):
         # From the left, so that no entry moves when another is added.
         legend = hbox(*self._legend.values(), 1, margins=0, spacing=2 * SPACING_PX)
         # Above: below, it would be far from pictures that are less high than their place.
-        vbox(legend, (eyes, 1), on=self._both, margins=0, spacing=0)
+        self._rows = vbox(legend, (eyes, 1), on=self._both, margins=0)
         self._layout = vbox((self._both, 1), self.result, on=views, margins=0, spacing=SPACING_PX)
         self._views = views
         self._stack = QStackedLayout(self)
@@ -185,7 +186,10 @@ class GuidePicture(QWidget):
         width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
         title_px = self._titles["left"].sizeHint().height()
         legend_px = self._legend["hand"].sizeHint().height()
+        # A low window has no room to hold the key apart from the titles below it.
+        self._rows.setSpacing(SPACING_PX // 2 if self.height() > _HIGH_PX else 0)
         fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1]) + legend_px
+        fitted_px += self._rows.spacing()
         self._both.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
 
     def _set_blinking(self, is_blinking: bool) -> None:

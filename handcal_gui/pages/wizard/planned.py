@@ -159,11 +159,13 @@ class PlannedWizard(Wizard):
         text = tr(
             "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
         ).format(distance(snapshot))
+        looks = needs_look(snapshot)
+        awaited = tr("Waiting for the look around…") if looks else _WAITS_FOR_HAND
         return WizardView(
             Step.SHOW_HAND,
-            LOOK if needs_look(snapshot) else text,
+            LOOK if looks else text,
             (hand_found(snapshot), hand_still(snapshot)),
-            ButtonSpec(Action.TAKE_STEP, _WAITS_FOR_HAND, False),
+            ButtonSpec(Action.TAKE_STEP, awaited, False),
             (ButtonSpec(Action.BACK, tr("&Back")),),
         )
 
