@@ -190,6 +190,6 @@ def _report_error(
     program.window.banner.show_message(
         tr(
             "handcal hit an unexpected error ({}: {}). Everything captured is saved; restart the "
-            "program if it no longer works."
+            "program if it no longer works, and report it with Help > Support bundle."
         ).format(kind.__name__, error)
     )

@@ -152,7 +152,7 @@ class AlignmentSteps:
         if frame.T_W_D is None and self._delay.see(frame):
             self._hands.clear()  # they were placed by an assumed delay
         contradiction = (
-            self.evidence.see(frame, self.camera)
+            self.evidence.see(frame, self.camera, is_used=bool(self.alignments))
             or self.evidence.see_delay(self._delay.delay_s, self._delay.largest_delay_s)
             or self.evidence.see_delivery(self._drawing.is_lost and self._link.connected)
             or self._see_world(frame, t_host_ns)

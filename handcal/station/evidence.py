@@ -75,15 +75,20 @@ class Evidence:
         """All evidence so far against the result."""
         return tuple(self._found.values())
 
-    def see(self, frame: Frame, identity: CameraIdentity) -> Contradiction | None:
+    def see(
+        self, frame: Frame, identity: CameraIdentity, *, is_used: bool = True
+    ) -> Contradiction | None:
         """Look at a frame; return what forbids using it, if anything does.
 
         A frozen picture passes by, so it forbids frames only while it lasts. Another camera
-        contradicts the whole calibration.
+        contradicts the whole calibration, unless it is replaced before any frame `is_used` in an
+        alignment.
         """
         if (identity, frame.depth_intrinsics) != self._camera:
             self._camera = identity, frame.depth_intrinsics
             differences = compare_camera(self._rig, identity, frame.depth_intrinsics)
+            if not is_used:
+                self._found.pop("other-camera", None)
             if differences:
                 self._add(
                     "other-camera",

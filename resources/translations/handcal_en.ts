@@ -847,10 +847,6 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>handcal hit an unexpected error ({}: {}). Everything captured is saved; restart the program if it no longer works.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Look at the result, then export it, or resume the session to add to it.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1453,6 +1449,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Keeping offline…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>&amp;Discard and repeat</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1550,6 +1550,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Verified before the alignments changed. Finish, or verify an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Waiting for the look around…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1741,10 +1745,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The session is finished, its result not accepted: calibrate this wearer again, or continue with the next.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Everything is already saved. The session finishes by itself; Hold keeps it open.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1830,6 +1830,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>The session is complete. Take the headset off, or continue with the next wearer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The session is finished, its result not accepted: go back to measure more, or continue with the next wearer.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3358,6 +3362,10 @@ trials above and below it. A single trial has no SD.</source>
     </message>
     <message>
         <source>drawn before calibration (φ = 0)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Against solved φ</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6839,6 +6847,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Full size</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>handcal hit an unexpected error ({}: {}). Everything captured is saved; restart the program if it no longer works, and report it with Help &gt; Support bundle.</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

@@ -58,6 +58,15 @@ def test_another_camera_contradicts_for_good(focal_scale: float, serial: str, sa
     assert said in contradiction.text
 
 
+def test_another_camera_is_forgotten_if_it_is_replaced_before_any_alignment() -> None:
+    evidence = Evidence(replace(RIG, depth_camera=IDENTITY))
+    for serial, count in (("77", 1), ("1234", 0), ("77", 1)):
+        evidence.see(frame(0), replace(IDENTITY, serial_number=serial), is_used=False)
+        assert len(evidence.contradictions) == count
+    evidence.see(frame(1), IDENTITY, is_used=True)
+    assert evidence.contradictions
+
+
 def test_a_biased_depth_camera_contradicts_once_the_rig_says_so() -> None:
     check = DepthCheck(
         scale=1.0,

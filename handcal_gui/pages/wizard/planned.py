@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from handcal.register.results import USED
 from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Snapshot
@@ -22,6 +23,7 @@ from handcal_gui.pages.wizard.step_views import (
     LOOK,
     SETTLED,
     UNUSABLE,
+    VERIFY_AGAIN,
     align_view,
     connect_view,
     distance,
@@ -66,10 +68,6 @@ _FOLLOWS = Step.SHOW_HAND
 _OMITTED = frozenset({Step.MAKE_CURSOR, Step.ALIGN, Step.SOLVE})
 """Steps that a session which begins with a stored result does without."""
 _WAITS_FOR_HAND, _SENDING = tr("Waiting for the hand…"), tr("Sending…")
-_VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
-    "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify &left eye")),
-    "right": ButtonSpec(Action.VERIFY_RIGHT, tr("Verify &right eye")),
-}
 
 
 class PlannedWizard(Wizard):
@@ -193,7 +191,8 @@ class PlannedWizard(Wizard):
         if snapshot.procedure.state is State.SOLVED and results is not None:
             instruction, label = sending(results)
             text = tr("{} The hand stays up.").format(instruction)
-            main = self._take_step(label, _SENDING, True)
+            is_sent = any(one.name in USED for one in results.verdicts.values())
+            main = self._take_step(label, _SENDING if is_sent else tr("Keeping offline…"), True)
         redo = ButtonSpec(
             Action.REDO,
             tr("&Discard and repeat"),
@@ -249,7 +248,7 @@ class PlannedWizard(Wizard):
                         "Verified; the result is not used for every eye. Finish, or verify again."
                     )
             main = ButtonSpec(Action.NEXT, tr("Finish"))
-        verify = (_VERIFY_AGAIN[eye] for eye in self.usable_eyes)
+        verify = (VERIFY_AGAIN[eye] for eye in self.usable_eyes)
         others = (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *verify)
         return WizardView(Step.VERIFY, text, preconditions, main, others)
 
@@ -262,7 +261,7 @@ class PlannedWizard(Wizard):
         procedure, can_do = snapshot.procedure, is_steady(snapshot)
         text = tr("Not accepted yet. Raise the hand and hold it still, then add an alignment.")
         main = ButtonSpec(Action.ANOTHER, tr("Add alignment"), can_do)
-        others = [_VERIFY_AGAIN[eye] for eye in self.usable_eyes]
+        others = [VERIFY_AGAIN[eye] for eye in self.usable_eyes]
         again: list[Eye] = []
         if (results := procedure.results) is not None:
             again = [eye for eye, one in results.advice.items() if one.verify]
@@ -273,7 +272,7 @@ class PlannedWizard(Wizard):
             text = tr(
                 "Not accepted yet: verify {} again. Another alignment would change little."
             ).format(eye_names(sorted(again)))
-            first = _VERIFY_AGAIN[again[0]]
+            first = VERIFY_AGAIN[again[0]]
             others.remove(first)
             others.insert(0, ButtonSpec(Action.ANOTHER, tr("&Add alignment")))
             label = tr("Verify the {} eye").format(EYE_WORDS[again[0]])

@@ -32,6 +32,10 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.times import session_time
 
+VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
+    "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify &left eye")),
+    "right": ButtonSpec(Action.VERIFY_RIGHT, tr("Verify &right eye")),
+}
 SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
 """Waiting times of automatic steps: for the hand, and to read a text or advice."""
 LOOK = tr("Keep the hand up, and look slowly to the left and to the right.")
@@ -286,8 +290,8 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         )
         if judged and not is_settled:
             ended = tr(
-                "The session is finished, its result not accepted: calibrate this wearer again, or "
-                "continue with the next."
+                "The session is finished, its result not accepted: go back to measure more, or "
+                "continue with the next wearer."
             )
         return WizardView(
             Step.SAVE,

@@ -25,6 +25,7 @@ from handcal_gui.pages.wizard.step_views import (
     SHOWN_S,
     STILL_S,
     UNUSABLE,
+    VERIFY_AGAIN,
     align_view,
     connect_view,
     distance,
@@ -282,7 +283,10 @@ class Wizard:
             ),
             preconditions,
             ButtonSpec(Action.NEXT, tr("It fits")),
-            (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *each),
+            (
+                ButtonSpec(Action.ANOTHER, tr("&Add alignment")),
+                *(VERIFY_AGAIN[eye] for eye in EYES if eye in self._skipped),
+            ),
         )
 
 

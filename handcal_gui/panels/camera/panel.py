@@ -38,6 +38,8 @@ from handcal_gui.widgets.sentence import sentence
 
 _STATUS_NS = 200_000_000
 """Interval of the numbers below the image; nobody reads faster."""
+_LONG = 60
+"""Characters of a reason beside the image; the guide and the cloud have the whole."""
 _EMPTY = tr("Waiting for the camera's first image…")
 _NO_COLOR = tr("This camera has no colour image.")
 
@@ -256,7 +258,9 @@ class _Status(QWidget):
 def _age(age_ms: float | None) -> str:
     if age_ms is None:
         return UNKNOWN
-    return f"{age_ms:.1f} ms" if age_ms < 10_000 else f"{age_ms / 1e3:.0f} s"
+    if age_ms < 1_000:
+        return f"{age_ms:.1f} ms"
+    return f"{age_ms / 1e3:.1f} s" if age_ms < 10_000 else f"{age_ms / 1e3:.0f} s"
 
 
 def _caption(seen: Observation) -> str:
@@ -267,4 +271,5 @@ def _caption(seen: Observation) -> str:
         return tr("Rotated by {:.1f}°: too far").format(
             np.degrees(np.linalg.norm(seen.rotation_rad))
         )
-    return sentence(seen.problem)
+    problem = sentence(seen.problem)
+    return problem if len(problem) <= _LONG else problem.split(";")[0].split(",")[0]

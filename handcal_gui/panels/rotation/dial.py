@@ -34,7 +34,7 @@ class RotationDial(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._angle_deg: float | None = None
         self._limit_deg = 9.0
-        self._word = ""
+        self._word, self._word_is_red = "", False
 
     def sizeHint(self) -> QSize:
         """Prefer a square that is readable from across the room."""
@@ -45,10 +45,16 @@ class RotationDial(QWidget):
         """True if the angle shown exceeds the limit."""
         return self._angle_deg is not None and self._angle_deg > self._limit_deg
 
-    def show_angle(self, angle_rad: float | None, limit_rad: float, word: str) -> None:
-        """Show an angle and its meaning in a word or two; None if there is no angle."""
+    def show_angle(
+        self, angle_rad: float | None, limit_rad: float, word: str, *, is_refused: bool = False
+    ) -> None:
+        """Show an angle and its meaning in a word or two; None if there is no angle.
+
+        The word of what is refused whatever its angle has the colour of too large an angle.
+        """
         self._angle_deg = None if angle_rad is None else math.degrees(angle_rad)
         self._limit_deg = math.degrees(limit_rad)
+        self._word_is_red = is_refused
         if word != self._word:
             self._word = word
             self.setAccessibleDescription(word)
@@ -68,7 +74,8 @@ class RotationDial(QWidget):
         _write(painter, fixed, digits, -14, 46, self._color())
         limit_size = round(min(max(13.0, _LEAST_PX * 200 / side), 23.0))
         _write(painter, normal, tr("limit {:.1f}°").format(self._limit_deg), 22, limit_size, text)
-        _write(painter, normal, self._word, 64, 22, self._color())
+        color = QColor(colors().red) if self._word_is_red else self._color()
+        _write(painter, normal, self._word, 64, 22, color)
 
     def _color(self) -> QColor:
         if self._angle_deg is None:

@@ -102,8 +102,9 @@ class RotationPanel(QWidget):
             observation.is_over_limit and not observation.has_changed
         )
         if not is_turned and (angle_rad < _STRAIGHT_RAD or observation.has_changed):
-            word = tr("▲ Shape differs") if observation.has_changed else tr("✓ Hold still")
-            self._dial.show_angle(angle_rad, self._limit_rad, word)
+            differs = observation.has_changed
+            word = tr("▲ Shape differs") if differs else tr("✓ Hold still")
+            self._dial.show_angle(angle_rad, self._limit_rad, word, is_refused=differs)
             self._hand.show_turn("")
             self._advice.setText(shape or _STRAIGHT)
             return

@@ -145,6 +145,9 @@ class _EyeColumn(QWidget):
         self.canvas.show_view(view, message or ("" if view else _EMPTY))
         self._title.setText(f"{self._name}{origin_text(view, is_solved=is_solved)}")
         is_known = view is not None and (view.is_true or is_solved) and not message
+        # Of a real eye, whose position is only estimated, the solved φ has no error.
+        is_predicted = is_solved and view is not None and not view.is_true
+        self._now.set_name(tr("Against solved φ") if is_predicted else tr("Now"))
         self._now.show_overlay(view.drawn if view and is_known else None)
         self._before.show_overlay(view.offline if view and is_known else None)
 
@@ -174,7 +177,8 @@ class _ErrorRow(QWidget):
         self.setToolTip(tooltip)
         self._px = NumberLabel("error-px", "999.9 px", tooltip, _NUMBER_SCALE)
         self._arcmin = NumberLabel("error-arcmin", "999.9′", tooltip, _NUMBER_SCALE)
-        hbox((QLabel(name), 1), self._px, self._arcmin, on=self, margins=0, spacing=SPACING_PX // 2)
+        self._name = QLabel(name)
+        hbox((self._name, 1), self._px, self._arcmin, on=self, margins=0, spacing=SPACING_PX // 2)
 
     def emphasise(self) -> None:
         """Emphasise this row."""
@@ -182,6 +186,10 @@ class _ErrorRow(QWidget):
             font = label.font()
             font.setBold(True)
             label.setFont(font)
+
+    def set_name(self, name: str) -> None:
+        """Say what the distance is of."""
+        self._name.setText(name)
 
     def show_overlay(self, overlay: Overlay | None) -> None:
         """Show an overlay's errors, if there is one with an outline."""

@@ -73,20 +73,20 @@ def test_a_person_takes_a_step_only_of_a_held_plan(snapshot: Maker, name: StepNa
 
 
 @pytest.mark.parametrize(
-    ("left", "label", "says"),
+    ("left", "label", "doing", "says"),
     [
-        ("accept", "Send left eye", "the right eye keeps the offline calibration"),
-        ("contradicted", "Keep offline", "Do not use this result"),
+        ("accept", "Send left eye", "Sending…", "the right eye keeps the offline calibration"),
+        ("contradicted", "Keep offline", "Keeping offline…", "Do not use this result"),
     ],
 )
 def test_a_plan_says_what_is_sent_as_the_paper_s_guide_does(
-    snapshot: Maker, left: VerdictName, label: str, says: str
+    snapshot: Maker, left: VerdictName, label: str, doing: str, says: str
 ) -> None:
     wizard = begun(snapshot)
+    solved = with_verdicts(planned_snapshot(snapshot, StepName.APPLY), left, "implausible")
+    assert wizard.view(solved).main.label == doing
     wizard.is_held = True
-    view = wizard.view(
-        with_verdicts(planned_snapshot(snapshot, StepName.APPLY), left, "implausible")
-    )
+    view = wizard.view(solved)
     assert view.main.label == label
     assert says in view.sentence
     assert view.sentence.endswith(". The hand stays up.")

@@ -239,6 +239,8 @@ def test_each_solved_eye_is_verified_before_anything_is_said_to_fit(snapshot: Ma
         assert Action.SKIP in actions(wizard.view(unverified))
         wizard.move(Action.SKIP, unverified)
     assert wizard.view(unverified).main.label == "It fits"
+    again = [Action.ANOTHER, Action.VERIFY_LEFT, Action.VERIFY_RIGHT]
+    assert actions(wizard.view(unverified)) == again, "what was skipped can still be done"
     wizard.move(Action.NEXT, unverified)
     assert wizard.view(unverified).unearned == {Step.VERIFY}
 

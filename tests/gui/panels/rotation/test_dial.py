@@ -46,6 +46,14 @@ def test_the_arc_grows_with_the_angle_to_the_end_of_the_scale(dial: RotationDial
     assert arc(18.0) == pytest.approx(arc(88.0), rel=0.1)
 
 
+def test_a_word_of_refusal_is_red_although_the_angle_is_within_the_limit(
+    dial: RotationDial,
+) -> None:
+    dial.show_angle(0.5 * LIMIT_RAD, LIMIT_RAD, "▲ Shape differs", is_refused=True)
+    assert painted(dial, "red") > 50
+    assert painted(dial, "live") > 500, "the angle itself is fine"
+
+
 def test_without_an_angle_there_is_no_verdict_in_colour(dial: RotationDial) -> None:
     dial.show_angle(None, LIMIT_RAD, "? No hand")
     assert not dial.is_over

@@ -87,8 +87,8 @@ def test_eye_that_is_not_known_has_no_error(
     assert _texts(panel, "left") == ["Left eye, not solved yet", *UNKNOWN]
     solved = snapshot(State.SOLVED, procedure={"results": results}, views=_predicted(snapshot()))
     panel.show_snapshot(solved)
-    title, px, *_ = _texts(panel, "left")
-    assert title == "Left eye, predicted"
+    title, name, px, *_ = _texts(panel, "left")
+    assert (title, name) == ("Left eye, predicted", "Against solved φ")
     assert px == f"{solved.views['left'].drawn.error_px:.1f} px"
 
 
