@@ -96,11 +96,13 @@ def test_a_size_is_that_of_the_window_although_it_was_maximized_when_closed(
     program.window.showMaximized()
     program.window.close()
     arguments.size = QSize(1100, 650)
-    seen = []
+    before = set(qapp.topLevelWidgets())
+    seen: list[tuple[bool, QSize]] = []
 
     def look() -> None:
-        windows = [one for one in qapp.topLevelWidgets() if isinstance(one, MainWindow)]
-        seen.extend((one.isMaximized(), one.size()) for one in windows if one.isVisible())
+        opened = set(qapp.topLevelWidgets()) - before
+        windows = [one for one in opened if isinstance(one, MainWindow)]
+        seen.extend((one.isMaximized(), one.size()) for one in windows)
 
     monkeypatch.setattr(qapp, "exec", look)
     launch.launch(qapp, arguments, first)
