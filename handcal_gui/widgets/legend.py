@@ -161,7 +161,8 @@ class _Sample(QWidget):
             draw_dots(painter, ((x, middle) for x in xs), color, width_px, halo)
             return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        line = QLineF(0, middle, self.width(), middle)
+        across = middle + 0.5 * (round(width_px) % 2)  # or its edges are blurred
+        line = QLineF(0, across, self.width(), across)
         flat = Qt.PenCapStyle.FlatCap
         if halo:
             painter.setPen(QPen(QColor(halo), width_px + HALO_PX, Qt.PenStyle.SolidLine, flat))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from handcal.station.snapshot import Snapshot
 from handcal_gui.translation import tr
-from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.sentence import lowered, sentence
 
 
 def missing_text(snapshot: Snapshot) -> str:
@@ -21,4 +21,8 @@ def missing_view_text(snapshot: Snapshot) -> str:
     """Return in short why the eyes' views are missing; empty if they are there or to come."""
     if snapshot.comparing is not None:
         return tr("Hidden while the wearer compares")
-    return missing_text(snapshot)
+    text, seen = missing_text(snapshot), snapshot.observation
+    if text and not snapshot.camera.problem and seen is not None and seen.cloud is None:
+        # The hand may be whole in what the wearer sees.
+        return tr("In the camera's image: {}").format(lowered(text))
+    return text

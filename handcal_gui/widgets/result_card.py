@@ -15,7 +15,7 @@ from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_COLORS, VERDICT_WORDS
+from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_COLORS, verdict_word
 from handcal_gui.widgets.sentence import sentence
 
 _NOT_VERIFIED = tr("not verified")
@@ -43,6 +43,7 @@ class EyeResult:
 
     eye: Eye
     verdict: VerdictName
+    word: str
     reason: str
     bars: tuple[Bar, ...]
     details: tuple[str, ...]
@@ -70,7 +71,8 @@ def eye_results(results: Results) -> list[EyeResult]:
             results.expected_after_another_arcmin[eye]
         )
         details = (tr("Depth error: {}").format(benefit.depth), another) if is_used else ()
-        found.append(EyeResult(eye, verdict.name, sentence(verdict.reason), bars, details))
+        word, reason = verdict_word(results, eye), sentence(verdict.reason)
+        found.append(EyeResult(eye, verdict.name, word, reason, bars, details))
     return found
 
 
@@ -88,7 +90,7 @@ def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] 
     lines = [f"{name}: {value}" for name, value in head.items()]
     lines.append(tr("Target: {:.1f}′").format(target_arcmin))
     for one in eye_results(results):
-        lines += ["", f"{EYE_NAMES[one.eye]}: {VERDICT_WORDS[one.verdict]}", one.reason]
+        lines += ["", f"{EYE_NAMES[one.eye]}: {one.word}", one.reason]
         lines.append(tr("Solved: {}").format(phi_text(results.eyes[one.eye])))
         lines += [f"{bar.name}: {bar.text}" for bar in one.bars]
         lines += one.details
@@ -162,7 +164,7 @@ class _Column(QWidget):
         self, result: EyeResult | None, target_arcmin: float, scale_arcmin: float
     ) -> None:
         self._result = result
-        word = tr("– Not solved") if result is None else VERDICT_WORDS[result.verdict]
+        word = tr("– Not solved") if result is None else result.word
         self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
         self._reason.setText(result.reason if result else "")
         self.details.setText("\n".join(result.details) if result else "")

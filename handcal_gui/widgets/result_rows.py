@@ -169,6 +169,14 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
     return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
 
 
+def verdict_word(results: Results, eye: Eye) -> str:
+    """Return an eye's verdict in a word: what a result to be repeated needs may be to verify."""
+    name, advice = results.verdicts[eye].name, results.advice.get(eye)
+    if name == "repeat" and advice is not None and advice.verify and not advice.alignments:
+        return tr("↻ Verify")
+    return VERDICT_WORDS[name]
+
+
 def verdict_rows(results: Results) -> list[Row]:
     """Return each solved eye's verdict and its reason."""
     return [

@@ -304,10 +304,6 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Close</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>&amp;New code</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1201,7 +1197,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Review it, solve it again, export it.</source>
+        <source>Review it, compare methods, export it.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1389,7 +1385,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Waiting for the camera&apos;s first image…</source>
+        <source>The camera&apos;s image will appear here.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1462,6 +1458,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Not every eye has been verified. Finish as it is, or verify an eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer has verified and corrected the result. Finish, or verify an eye again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1569,10 +1569,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The wearer has verified the result. Finish, or verify an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Headset &amp;slipped</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1673,6 +1669,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Turned {:.1f}°: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{} confirmed</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1697,6 +1697,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} eye&apos;s outline moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Do not use this result: keep the offline calibration of {}, and follow the advice below.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1706,10 +1710,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Last refused: {}.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Hand rotated by {:.1f}°, more than {:g}°: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1734,10 +1734,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Outline shown for {:g} s</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1797,6 +1793,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The wearer has verified and corrected the result. Finish, or add an alignment.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Raise the hand and hold it still, to measure the error of the {} eye.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1806,10 +1806,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Add alignment</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The wearer has verified the result. Finish, or add an alignment.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2411,6 +2407,10 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Click here, or Ctrl+6: keys ← → ↑ ↓, PgUp, PgDn, E</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>against the offline φ</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2460,10 +2460,6 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>In the headset. Keys: ← → ↑ ↓, PgUp, PgDn, E</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Click here to use the keys ← → ↑ ↓, PgUp, PgDn</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2836,7 +2832,11 @@ among the numbers of each eye, which is to single points of the cursor.</source>
     <message>
         <source>Nothing is solved yet.
 
-Each eye&apos;s position, its uncertainty and the verdict appear here after its first alignment or verification.</source>
+Each eye&apos;s position, its uncertainty and the verdict appear here once it is solved or verified.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>±: of measuring the hand in this alignment alone. That of the result also counts how well the wearer aligns.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3553,6 +3553,10 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Close (Esc)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Close this message (Esc)</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3973,6 +3977,10 @@ root mean square over the inliers</source>
     </message>
     <message>
         <source>Where eyes are expected before any alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>↻ Verify</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6757,6 +6765,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>Hidden while the wearer compares</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In the camera&apos;s image: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

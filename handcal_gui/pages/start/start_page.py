@@ -87,7 +87,7 @@ class StartPage(QWidget):
         self._unfinished = SessionList(tr("Unfinished sessions"), tr("Res&ume"))
         self._resume.body.addWidget(self._unfinished)
         self._open = Card(
-            tr("Open a session"), tr("Review it, solve it again, export it."), "folder"
+            tr("Open a session"), tr("Review it, compare methods, export it."), "folder"
         )
         self._open.setObjectName("open")
         self._opened = SessionList(

@@ -145,8 +145,9 @@ class GuidePicture(QWidget):
                     overlay = HandOverlay(seen.cloud, depth_px, color_px, seen.is_over_limit)
                     outline = overlay.draw
             self._camera.show_overlay(outline)
-        message = "" if frame is not None else tr("Waiting for the camera's first image…")
-        self._camera.show_text(message=tr("No image") if snapshot.camera.problem else message)
+        message = "" if frame is not None else tr("The camera's image will appear here.")
+        has_ended = frame is not None and snapshot.camera.problem
+        self._camera.show_text(message=tr("No image") if has_ended else message)
 
     def _show_eyes(self, snapshot: Snapshot, eyes: tuple[Eye, ...], *, is_result: bool) -> None:
         message = missing_view_text(snapshot)
@@ -161,7 +162,8 @@ class GuidePicture(QWidget):
         has_image = any(view.image is not None for view in snapshot.views.values())
         for entry in self._legend.values():
             entry.show_on_image(has_image)
-        self._legend["cursor"].setVisible(snapshot.procedure.cursor is not None)
+        has_cursor = any(len(view.cursor_px) for view in snapshot.views.values())
+        self._legend["cursor"].setVisible(has_cursor or snapshot.procedure.cursor is not None)
         part_px = show_alike([self._eyes[eye] for eye in eyes])
         is_new = is_result and self.result.isHidden()
         self.result.setVisible(is_result)

@@ -242,7 +242,10 @@ class PlannedWizard(Wizard):
         if set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
             if snapshot.record.verified_now >= set(self.usable_eyes):
-                text = tr("The wearer has verified the result. Finish, or verify an eye again.")
+                text = tr(
+                    "The wearer has verified and corrected the result. Finish, or verify an eye "
+                    "again."
+                )
                 if any(one.verdict == "keep" for one in preconditions):
                     text = tr(
                         "Verified; the result is not used for every eye. Finish, or verify again."

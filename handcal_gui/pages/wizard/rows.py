@@ -16,11 +16,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.pages.wizard.view import STEPS, Precondition, WizardView
+from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, WizardView
 from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import VERDICT_COLORS, VERDICT_ICONS
+
+_IN_TWO_LINES = 0.65
+"""Share of a row's width with which its text takes two lines."""
 
 
 class StepRail(QWidget):
@@ -45,7 +48,8 @@ class StepRail(QWidget):
         present = view.step
         place = STEPS.index(present)
         for i, (step, label) in enumerate(self._labels.items()):
-            is_done = i < place and step not in view.omitted
+            is_over = view.main.action is Action.NEXT_WEARER
+            is_done = (i < place or is_over) and step not in view.omitted
             mark, color = ("✓ ", colors().good) if is_done else ("", colors().muted)
             if step in view.unearned:
                 mark, color = "– ", colors().warning
@@ -55,7 +59,7 @@ class StepRail(QWidget):
             font.setBold(True)
             self._row.setStretch(i, QFontMetrics(font).horizontalAdvance(f"▸ {step.label}"))
             if step is present:
-                label.setText(f"▸ {step.label}")
+                label.setText(f"{'✓' if is_over else '▸'} {step.label}")
                 # A change of the theme reaches this widget's own palette only later.
                 color = QApplication.palette().windowText().color().name()
             weight = "bold" if step is present else "normal"
@@ -83,13 +87,20 @@ class PreconditionRows(QWidget):
         self.setVisible(bool(preconditions))
 
     def fit(self, *, is_low: bool) -> None:
-        """Put the preconditions side by side in a low window, if each has room for its text."""
+        """Put the preconditions side by side in a low window, if each has room for its text.
+
+        The longest may take two lines, so that it does not move the picture while it changes.
+        """
         needed_px = [0 if row.isHidden() else row.needed_px for row in self._rows]
+        if sum(needed_px) > self.width():
+            longest = needed_px.index(max(needed_px))
+            needed_px[longest] = round(_IN_TWO_LINES * needed_px[longest])
         is_beside = is_low and sum(needed_px) <= self.width()
         directions = QBoxLayout.Direction
         self._box.setDirection(directions.LeftToRight if is_beside else directions.TopToBottom)
-        for i, one_px in enumerate(needed_px):
-            self._box.setStretch(i, one_px if is_beside else 0)  # so that no text is wrapped
+        for i, (row, one_px) in enumerate(zip(self._rows, needed_px, strict=True)):
+            row.set_lines(2 if is_beside else 1)
+            self._box.setStretch(i, one_px if is_beside else 0)
 
 
 class _Row(QWidget):
@@ -100,7 +111,12 @@ class _Row(QWidget):
         self._icon = QLabel()
         self._text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         hbox(self._icon, (self._text, 1), on=self, margins=0, spacing=SPACING_PX)
-        self.setMinimumHeight(3 * SPACING_PX)
+        self.set_lines(1)
+
+    def set_lines(self, lines: int) -> None:
+        """Have room for as many lines of text."""
+        least_px = lines * self._text.fontMetrics().lineSpacing()
+        self.setMinimumHeight(max(3 * SPACING_PX, least_px))
 
     @property
     def needed_px(self) -> int:

@@ -29,7 +29,7 @@ from handcal_gui.pages.wizard.view import (
 )
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.sentence import lowered, sentence
 from handcal_gui.widgets.times import session_time
 
 VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
@@ -123,7 +123,7 @@ def align_view(snapshot: Snapshot) -> WizardView:
         (ButtonSpec(Action.REDO, tr("&Make another cursor"), discards=tr("Discards this cursor")),),
         # The preconditions say what the live hand lacks.
         "" if was or not preconditions[0].holds else procedure.refusal,
-        fact=tr("Last refused: {}.").format(_lowered(was)) if was else "",
+        fact=tr("Last refused: {}.").format(lowered(was)) if was else "",
     )
 
 
@@ -139,9 +139,7 @@ def _as_cursor(snapshot: Snapshot) -> Precondition:
         return Precondition(sentence(seen.shape_text), False)
     if seen.is_over_limit:
         advice = turn_advice(seen.rotation_rad).text
-        text = tr("Hand rotated by {:.1f}°, more than {:g}°: {}").format(
-            np.degrees(angle_rad), limit_deg, _lowered(advice)
-        )
+        text = tr("Turned {:.1f}°: {}").format(np.degrees(angle_rad), lowered(advice))
         return Precondition(text, False)
     return Precondition(straight, True)
 
@@ -248,7 +246,7 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
             ButtonSpec(Action.SKIP, tr("&Skip")),
         ),
         snapshot.procedure.refusal,
-        fact=tr("{} eye moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %").format(
+        fact=tr("{} eye's outline moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %").format(
             EYE_WORDS[eye].capitalize(),
             total_arcmin,
             abs(moved.right_arcmin),
@@ -343,11 +341,6 @@ def _kept(results: Results) -> tuple[Eye, ...]:
 def _looked(text: str, shown_ns: int) -> Precondition:
     """Return whether the wearer has had the time to look at a drawing, as a precondition."""
     return Precondition(text.format(_LEAST_LOOK_NS / 1e9), shown_ns > _LEAST_LOOK_NS)
-
-
-def _lowered(text: str) -> str:
-    """Return a text to follow a colon."""
-    return text[:1].lower() + text[1:]
 
 
 def _all_hold(preconditions: Sequence[Precondition]) -> bool:

@@ -269,7 +269,9 @@ class Wizard:
         if not self._skipped:
             return WizardView(
                 Step.VERIFY,
-                tr("The wearer has verified the result. Finish, or add an alignment."),
+                tr(
+                    "The wearer has verified and corrected the result. Finish, or add an alignment."
+                ),
                 preconditions,
                 ButtonSpec(Action.NEXT, tr("Finish")),
                 (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *each),

@@ -204,7 +204,7 @@ class WizardPanel(QWidget):
         self.picture.fit(has_details=has_details, has_eyes=height >= _SEEN)
         gap_px = SPACING_PX // 2 if is_low else SPACING_PX
         if (layout := self.layout()) is not None:
-            layout.setContentsMargins(*4 * (2 * gap_px,))
+            layout.setContentsMargins(*3 * (2 * gap_px,), gap_px if is_low else 2 * gap_px)
             layout.setSpacing(gap_px)
         self._rail.set_gap(gap_px // 2)
         self._preconditions.fit(is_low=is_low)

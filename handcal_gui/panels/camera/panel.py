@@ -40,7 +40,7 @@ _STATUS_NS = 200_000_000
 """Interval of the numbers below the image; nobody reads faster."""
 _LONG = 60
 """Characters of a reason beside the image; the guide and the cloud have the whole."""
-_EMPTY = tr("Waiting for the camera's first image…")
+_EMPTY = tr("The camera's image will appear here.")
 _NO_COLOR = tr("This camera has no colour image.")
 
 
@@ -101,7 +101,9 @@ class CameraPanel(QWidget):
         """Show the newest frame, unless frozen, and the state of the camera."""
         if not self._freeze.isChecked() and snapshot.frame is not None:
             self._show_frame(snapshot.frame, snapshot.observation)
-        message = tr("No image") if snapshot.camera.problem else "" if self._frame else _EMPTY
+        message = "" if self._frame else _EMPTY
+        if self._frame and snapshot.camera.problem:
+            message = tr("No image")
         caption = tr("Frozen") if self._freeze.isChecked() else self._caption
         self._pictures.show_text(message=message, caption="" if message else caption)
         if 0 < snapshot.t_host_ns - self._status_ns < _STATUS_NS:

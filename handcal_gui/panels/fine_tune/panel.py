@@ -156,7 +156,7 @@ class FineTunePanel(QWidget):
         arrival = self._stream.arrival
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
         if self._is_editable() and arrival is Arrival.ARRIVED and not self._has_keys():
-            sign, text = "fine-tune", tr("Click here to use the keys ← → ↑ ↓, PgUp, PgDn")
+            sign, text = "fine-tune", tr("Click here, or Ctrl+6: keys ← → ↑ ↓, PgUp, PgDn, E")
         self._show_status(sign, text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -20,6 +20,7 @@ from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text
+from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
@@ -29,11 +30,16 @@ from handcal_gui.widgets.result_rows import (
     result_rows,
     single_alignment_rows,
     verdict_rows,
+    verdict_word,
 )
 
 _EMPTY = tr(
     "Nothing is solved yet.\n\nEach eye's position, its uncertainty and the verdict appear here "
-    "after its first alignment or verification."
+    "once it is solved or verified."
+)
+_ALONE = tr(
+    "±: of measuring the hand in this alignment alone. That of the result also counts how well "
+    "the wearer aligns."
 )
 _MARGINS_PX = 3 * SPACING_PX // 2
 """Of the tab of the eyes: above the cards, between them and the numbers, and below."""
@@ -108,7 +114,8 @@ class ResultsPanel(QWidget):
             self._tabs.setCurrentIndex(0)
             return
         for eye, card in self._cards.items():
-            card.show_verdict(results.verdicts.get(eye))
+            word = verdict_word(results, eye) if eye in results.verdicts else ""
+            card.show_verdict(results.verdicts.get(eye), word)
             card.setVisible(has_verdicts)
         eyes = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(eyes, result_rows(results, rig))
@@ -201,5 +208,6 @@ class ResultsPanel(QWidget):
 
     def _alignments_tab(self) -> QWidget:
         tab = QWidget()
-        vbox((self._alignments, 1), self._another, on=tab, spacing=SPACING_PX)
+        meaning = paragraph("", _ALONE)
+        vbox((self._alignments, 1), meaning, self._another, on=tab, spacing=SPACING_PX)
         return tab

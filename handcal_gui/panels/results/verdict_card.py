@@ -42,14 +42,14 @@ class VerdictCard(QFrame):
         self.show_verdict(None)
         follow_theme(self, self._recolor)
 
-    def show_verdict(self, verdict: Verdict | None) -> None:
-        """Show a verdict; None if the eye is in no alignment."""
+    def show_verdict(self, verdict: Verdict | None, word: str = "") -> None:
+        """Show a verdict, by its own or another word; None if the eye is in no alignment."""
         self._verdict = verdict
         if verdict is None:
             self._word.setText(tr("{} Not solved").format(NOTHING))
             self._reason.setText(tr("Not in any alignment"))
         else:
-            self._word.setText(VERDICT_WORDS[verdict.name])
+            self._word.setText(word or VERDICT_WORDS[verdict.name])
             self._reason.setText(sentence(verdict.reason))
         self.setToolTip(self._reason.text())
         self.setAccessibleDescription(self._reason.text())

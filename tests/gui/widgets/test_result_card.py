@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
-from handcal.types import Verdict, VerdictName, phi_text
+from handcal.register.verdict import Advice
+from handcal.types import EYES, Verdict, VerdictName, phi_text
 from handcal_gui.theme import colors
 from handcal_gui.widgets.result_card import ResultCard, eye_results, result_text
 from tests.gui.helpers import show, text
@@ -90,3 +91,17 @@ def test_a_result_that_is_not_used_is_named_so_and_not_praised(
     picture = card.grab().toImage()
     shades = {picture.pixelColor(x, y) == good for x in range(320, 600) for y in range(240)}
     assert shades == {False}, "the right eye's half"
+
+
+@pytest.mark.parametrize(("alignments", "word"), [(0, "↻ Verify"), (1, "↻ Repeat")])
+def test_a_result_that_lacks_only_its_verification_asks_for_it(
+    results: Results, alignments: int, word: str
+) -> None:
+    advice = Advice((), alignments, 3.0, 0.99, meets_target=True, is_accepted=True, verify=True)
+    results = replace(
+        results,
+        verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")),
+        advice=dict.fromkeys(EYES, advice),
+    )
+    assert [one.word for one in eye_results(results)] == [word, word]
+    assert f"Left eye: {word}" in result_text(results, 8.0)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Literal
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QObject, QPoint, QRect
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QScrollArea, QTabWidget
@@ -151,6 +152,27 @@ def test_an_eye_that_is_aligned_or_verified_has_room_below_a_message(
         assert len(texts) == 3
         assert len(rows) == (1 if size_px == SMALL_PX[0] else 3)
         assert all(one.fontMetrics().horizontalAdvance(one.text()) <= one.width() for one in texts)
+
+
+def test_a_turned_hand_moves_no_picture_in_a_low_window(program: Program, snapshot: Maker) -> None:
+    window, guide = program.window, program.wizard_panel
+    window.resize(*SMALL_PX[0])
+    window.show_page("live")
+    over = {"rotation_rad": np.array([0.2, 0.0, 0.0]), "is_over_limit": True}
+    heights = []
+    for seen in (snapshot(State.ALIGN), snapshot(State.ALIGN, observation=over)):
+        view = align_view(seen)
+        say(program, seen, view)
+        guide.picture.show_snapshot(seen)
+        for _ in range(3):
+            QApplication.processEvents()
+        heights += [
+            one.height() for one in guide.picture.findChildren(EyeCanvas) if one.isVisible()
+        ]
+        texts = [one for one in guide.findChildren(QLabel) if one.text() in texts_of(view)]
+        assert all(one.height() >= one.heightForWidth(one.width()) for one in texts), "whole"
+    assert "tip your fingers" in texts_of(view)[1]
+    assert len(set(heights)) == 1
 
 
 @pytest.mark.parametrize(("size_px", "eye_px"), [((960, 540), 100), ((960, 510), 80)])

@@ -167,7 +167,7 @@ def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot:
     verdicts = dict.fromkeys(EYES, Verdict("accept", "as told"))
     results = replace(done.procedure.results, verdicts=verdicts)
     done = replace(done, procedure=replace(done.procedure, results=results))
-    assert begun(snapshot).view(done).sentence.startswith("The wearer has verified the result.")
+    assert begun(snapshot).view(done).sentence.startswith("The wearer has verified and")
     aligned = replace(done, record=replace(done.record, verified_now=frozenset()))
     view = begun(snapshot).view(aligned)
     assert view.sentence.startswith("Verified before the alignments changed.")

@@ -50,7 +50,7 @@ def test_the_camera_is_shown_until_an_eye_s_view_helps(qtbot: QtBot, snapshot: M
     start, aligning = snapshot(), snapshot(State.ALIGN)
     picture.show_snapshot(replace(start, frame=None, views={}))
     assert camera.isVisible()
-    assert "first image" in camera.message
+    assert "will appear here" in camera.message
     for step, shown, has_camera in (
         (Step.CONNECT, start, True),
         (Step.SHOW_HAND, start, True),
@@ -112,7 +112,11 @@ def test_a_key_tells_which_outlines_can_be_seen(qtbot: QtBot, snapshot: Maker) -
     aligning = shown_key(picture)
     assert list(aligning) == ["Hand", "Drawn", "Cursor"]
     picture.step = Step.VERIFY
-    picture.show_snapshot(snapshot(State.APPLIED))
+    applied = snapshot(State.APPLIED)
+    picture.show_snapshot(applied)
+    assert list(shown_key(picture)) == ["Hand", "Drawn", "Cursor"], "its line is still drawn"
+    views = {eye: replace(one, cursor_px=one.cursor_px[:0]) for eye, one in applied.views.items()}
+    picture.show_snapshot(replace(applied, views=views))
     verified = shown_key(picture)
     assert list(verified) == ["Hand", "Drawn"]
     button(picture.result.buttons, QToolButton, "Blink before/after").click()

@@ -25,3 +25,12 @@ def test_the_steps_stand_apart_and_none_of_them_moves(qtbot: QtBot) -> None:
         gaps_px = [after - half - (at + own) for (at, own), (after, half) in pairwise(ends)]
         assert min(gaps_px) >= 12
     assert len(places) == 1
+
+
+def test_the_last_step_is_ticked_once_the_session_is_finished(qtbot: QtBot) -> None:
+    rail = show(qtbot, StepRail(), 480, 20)
+    last = []
+    for action in (Action.FINISH, Action.NEXT_WEARER):
+        rail.show_step(WizardView(Step.SAVE, "", (), ButtonSpec(action, "On")))
+        last.append(rail.findChildren(QLabel)[-1].text())
+    assert last == ["▸ Save", "✓ Save"]

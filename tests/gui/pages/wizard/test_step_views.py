@@ -68,8 +68,8 @@ def test_a_refusal_becomes_past_and_orders_nothing(snapshot: Maker) -> None:
 @pytest.mark.parametrize(
     ("turned_deg", "has_changed", "text"),
     [
-        (18.6, False, "Hand rotated by 18.6°, more than 9°: tilt your hand anticlockwise"),
-        (-18.6, True, "Hand rotated by 18.6°, more than 9°: tilt your hand clockwise"),
+        (18.6, False, "Turned 18.6°: tilt your hand anticlockwise"),
+        (-18.6, True, "Turned 18.6°: tilt your hand clockwise"),
         (7.7, True, "Thumb 10 mm further out than in the cursor"),
     ],
 )
@@ -197,7 +197,7 @@ def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> 
     view = Wizard().view(seen)
     assert view.step is Step.VERIFY
     assert view.sentence.startswith("Close the right eye.")
-    assert view.fact == "Left eye moved by 5.0′: 3.0′ left, 4.0′ down, size −0.6 %"
+    assert view.fact == "Left eye's outline moved by 5.0′: 3.0′ left, 4.0′ down, size −0.6 %"
     assert view.note == "Hold your hand still."
     assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
     assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]

@@ -38,7 +38,7 @@ def picture(panel: CameraPanel, name: str = "colour") -> QImage:
 
 
 def test_an_empty_panel_says_what_will_come(panel: CameraPanel) -> None:
-    assert view(panel, "colour").message == "Waiting for the camera's first image…"
+    assert view(panel, "colour").message == "The camera's image will appear here."
     assert text(panel, "camera-age") == "–"
 
 

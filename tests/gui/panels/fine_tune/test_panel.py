@@ -163,7 +163,7 @@ def test_the_panel_says_that_a_click_gives_it_the_arrow_keys(
     other.setFocus()
     qtbot.waitUntil(other.hasFocus)
     show()
-    assert status(panel) == "Click here to use the keys ← → ↑ ↓, PgUp, PgDn"
+    assert status(panel) == "Click here, or Ctrl+6: keys ← → ↑ ↓, PgUp, PgDn, E"
     show(State.ALIGN)
     assert "Click here" not in status(panel)
     panel.activateWindow()

@@ -70,7 +70,7 @@ def test_without_results_it_says_how_to_get_them(panel: ResultsPanel, snapshot: 
     panel.show_snapshot(snapshot(State.ALIGN))
     assert not child(panel, QTabWidget).isVisible()
     [empty] = [one for one in panel.findChildren(QLabel) if "Nothing is solved yet" in one.text()]
-    assert empty.text().endswith("alignment or verification.")
+    assert empty.text().endswith("once it is solved or verified.")
     panel.show_snapshot(snapshot(State.SOLVED))
     assert child(panel, QTabWidget).isVisible()
     child(panel, QTabWidget).setCurrentIndex(2)

@@ -107,7 +107,7 @@ def test_eye_that_is_closed_says_so(panel: WearerViewPanel, snapshot: MakeSnapsh
     [
         (
             {"observation": {"hand": None, "cloud": None, "problem": "no hand in view; raise it"}},
-            "No hand in view; raise it",
+            "In the camera's image: no hand in view; raise it",
         ),
         ({"observation": {"hand": None, "problem": "no pose yet"}}, "No pose yet"),
         ({"observation": None, "camera": {"problem": "no camera is connected"}}, "No image"),
