@@ -4352,6 +4352,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{}, verified</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4836,7 +4840,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>; Repair copies what is sound</source>
+        <source>; select it alone, and Repair copies what is sound</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5504,15 +5508,15 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Largest, ′</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Accept the rig</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>For each eye, put the viewpoint camera behind its display. In a dark room, take images of the grid. Do not move camera or headset: switch the display off, and take images of the board with both cameras at {} or more distances, 0.35 to 0.65 m.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest, ′ (at most {:g})</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5536,7 +5540,11 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Accept</source>
+        <source>Check the rig</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>press Check the rig</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5560,11 +5568,11 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>press Accept</source>
+        <source>not accepted yet</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>not accepted yet</source>
+        <source>Check again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6165,6 +6173,10 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Save the rig file first</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>saved as {}; {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

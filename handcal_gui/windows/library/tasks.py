@@ -75,7 +75,7 @@ def _require_sound(path: Path) -> None:
     if found.state == "none":
         advice = tr("make it readable, or restore it from a backup")
         raise FileError(with_advice(f"{named}{others}", advice))
-    repair = tr("; Repair copies what is sound")
+    repair = tr("; select it alone, and Repair copies what is sound")
     raise FileError(f"{named}{others}{repair}")
 
 

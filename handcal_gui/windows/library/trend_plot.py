@@ -29,6 +29,7 @@ class TrendPlot(Plot):
             parent,
         )
         self.show_legend()
+        self._target = self.add_line("muted", name=tr("Target"), dashed=True)
         self._verified = {
             eye: self.add_line(
                 eye, name=tr("{}, verified").format(EYE_NAMES[eye]), symbol=_SYMBOLS[eye]
@@ -46,8 +47,11 @@ class TrendPlot(Plot):
         }
 
     def show_calibrations(self, entries: Sequence[LibraryEntry]) -> None:
-        """Show the solved sessions of one wearer, the oldest first."""
-        numbers, largest = np.arange(1.0, len(entries) + 1.0), 1.0
+        """Show the solved sessions of one wearer, the oldest first, and the newest target."""
+        numbers, count = np.arange(1.0, len(entries) + 1.0), max(len(entries), 2)
+        targets = [one.target_arcmin for one in entries if one.target_arcmin is not None][-1:]
+        largest = max(1.0, *targets, 0.0)
+        self._target.setData([0.8, count + 0.2][: 2 * len(targets)], 2 * targets)
         for eye in EYES:
             outcomes = [entry.eyes.get(eye) for entry in entries]
             verified = [None if one is None else one.remaining_arcmin for one in outcomes]
@@ -63,7 +67,6 @@ class TrendPlot(Plot):
                 else:
                     line[eye].clear()
         self.item.setYRange(0.0, 1.1 * largest, padding=0.0)
-        count = max(len(entries), 2)
         self.item.setXRange(0.8, count + 0.2)
         ticks = [[(number, f"{number:g}") for number in numbers]]
         self.item.getAxis("bottom").setTicks(ticks if len(entries) <= _MOST_TICKS else None)

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QDialog, QGridLayout, QLabel, QWidget
 from handcal.errors import HandcalError
 from handcal.io.images import IMAGE_SUFFIXES
 from handcal.progress import Progress
-from handcal.rig.accept import FEWEST_VIEWS
+from handcal.rig.accept import FEWEST_VIEWS, LIMIT_ARCMIN
 from handcal.rig.acceptance import (
     Acceptance,
     AcceptanceSettings,
@@ -48,7 +48,7 @@ _HOW = tr(
     "images of the grid. Do not move camera or headset: switch the display off, and take images "
     "of the board with both cameras at {} or more distances, 0.35 to 0.65 m."
 ).format(FEWEST_VIEWS)
-_COLUMNS = (tr("Corners"), tr("Mean, ′"), tr("Largest, ′"))
+_COLUMNS = (tr("Corners"), tr("Mean, ′"), tr("Largest, ′ (at most {:g})").format(LIMIT_ARCMIN))
 _TAKE: dict[Eye, dict[str, str]] = {
     "left": {"grid": tr("Take &grid…"), "board": tr("Take &board…")},
     "right": {"grid": tr("Take g&rid…"), "board": tr("Take bo&ard…")},
@@ -78,7 +78,7 @@ class AcceptDialog(QDialog):
         self._drawing.setMinimumHeight(10 * SPACING_PX)
         self._table = NumberTable("drawn-against-seen", tr("Drawn and seen corners"))
         self._bar = JobBar()
-        self._run = main_button("runAcceptance", tr("Accept"))
+        self._run = main_button("runAcceptance", tr("Check the rig"))
         self._open = button("openPage", tr("Open re&port"))
         self._close = button("close", tr("&Close"))
         self._run.clicked.connect(self.run)
@@ -175,7 +175,7 @@ class AcceptDialog(QDialog):
         dialog.open()
 
     def _show_state(self) -> None:
-        advice = self._need or tr("press Accept")
+        advice = self._need or tr("press Check the rig")
         self._found.show_finding(Finding("", Health.LIMITED, tr("not accepted yet"), advice))
         self._show_numbers(False)
 
@@ -191,6 +191,7 @@ class AcceptDialog(QDialog):
 
     def _show(self, found: Acceptance) -> None:
         self._page = found.files[-1]
+        self._run.setText(tr("Check again"))
         rows = [
             Row(f"{EYE_NAMES[eye]}, {depth_m} m", tuple(numbers))
             for eye, one in found.eyes.items()

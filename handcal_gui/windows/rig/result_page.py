@@ -100,7 +100,8 @@ class ResultPage(QWidget):
         self._use.setToolTip("" if saved is not None else tr("Save the rig file first"))
         summary = _summary(rig, findings)
         if saved is not None:
-            summary = Finding("", Health.GOOD, tr("saved as {}").format(saved))
+            words = tr("saved as {}; {}").format(saved, summary.found)
+            summary = Finding("", summary.health, words)
         self._end.show_finding(summary)
         self._compare()
 

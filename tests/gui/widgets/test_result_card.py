@@ -93,11 +93,11 @@ def test_a_result_that_is_not_used_is_named_so_and_not_praised(
     assert shades == {False}, "the right eye's half"
 
 
-@pytest.mark.parametrize(("alignments", "word"), [(0, "↻ Verify"), (1, "↻ Repeat")])
+@pytest.mark.parametrize(("more", "word"), [(0, "↻ Verify"), (1, "↻ Repeat")])
 def test_a_result_that_lacks_only_its_verification_asks_for_it(
-    results: Results, alignments: int, word: str
+    results: Results, more: int, word: str
 ) -> None:
-    advice = Advice((), alignments, 3.0, 0.99, meets_target=True, is_accepted=True, verify=True)
+    advice = Advice((), more, 3.0, 0.99, meets_target=True, is_accepted=True, verify=True)
     results = replace(
         results,
         verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")),

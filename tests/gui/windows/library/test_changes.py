@@ -35,7 +35,7 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
     damaged = text(window, "message").splitlines()[1]
     assert damaged.startswith("× Cid, ")
     assert ": alignments/1.npz" in damaged
-    assert text(window, "message").endswith("; Repair copies what is sound")
+    assert text(window, "message").endswith("; select it alone, and Repair copies what is sound")
     choose(window, "Cid")
     press(window, "checkSessions")
     wait_for(qtbot, window, "× Cid, ")  # not first that none is sound

@@ -87,6 +87,17 @@ def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
     np.testing.assert_equal(unverified[1], [np.nan, 8.0])  # each calibration has one symbol
 
 
+def test_the_trend_has_a_line_at_the_newest_target(qtbot: QtBot, tmp_path: Path) -> None:
+    plot = TrendPlot()
+    qtbot.addWidget(plot)
+    entries = [LibraryEntry(tmp_path, (0, 0), target_arcmin=one) for one in (5.0, 8.0, None)]
+    plot.show_calibrations(entries)
+    assert plot._target.getData()[1].tolist() == [8.0, 8.0]
+    assert plot.item.viewRange()[1][1] > 8.0
+    plot.show_calibrations(entries[2:])
+    assert plot._target.getData()[1] is None or not len(plot._target.getData()[1])
+
+
 def test_trials_over_the_target_are_marked(tmp_path: Path) -> None:
     def trials(arcmin: float, target_arcmin: float | None) -> str:
         entry = LibraryEntry(

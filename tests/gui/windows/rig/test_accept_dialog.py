@@ -145,13 +145,14 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     qtbot.addWidget(dialog)
     dialog.show()
     found = part(dialog, QLabel, "acceptedFound")
-    assert "Press Accept" in found.text()
+    assert "Press Check the rig" in found.text()
     part(dialog, QPushButton, "runAcceptance").click()
     assert found.text() == "", "it is pressed"
     part(dialog, QPushButton, "cancel").click()
-    qtbot.waitUntil(lambda: "Press Accept" in found.text(), timeout=30_000)
+    qtbot.waitUntil(lambda: "Press Check the rig" in found.text(), timeout=30_000)
     part(dialog, QPushButton, "runAcceptance").click()
     qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
+    assert part(dialog, QPushButton, "runAcceptance").text() == "Check again"
     table = part(dialog, QTableWidget, "drawn-against-seen")
     QApplication.processEvents()
     assert not part(dialog, Drawing, "drawing").isVisible(), "the numbers need its room"

@@ -66,6 +66,7 @@ def test_it_says_how_to_go_on_and_why_a_rig_cannot_be_used_yet(
     project.save_rig_as(tmp_path / "ours.yaml")
     assert use.isEnabled()
     assert not use.toolTip()
+    assert "ours.yaml; " in said.text(), "what is doubtful or not known stays in sight"
 
 
 def test_no_item_is_broken_in_a_small_window(qtbot: QtBot, project: RigProject) -> None:
