@@ -137,7 +137,7 @@ QUANTITIES = (
 )
 _ANOTHER = tr("Expected error after one more alignment like these")
 _ALONE: Mapping[Eye, str] = {"left": tr("{} left"), "right": tr("{} right")}
-_EYE_DISTANCE = tr("Eye distance")
+_EYE_DISTANCE = tr("Eye distance, solved")
 _EYE_DISTANCE_MEANING = tr("Distance between the two solved eye positions")
 
 

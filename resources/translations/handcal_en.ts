@@ -1425,6 +1425,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Waiting…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Hold the hand still: it becomes the cursor for {}.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1550,10 +1554,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Verified before the alignments changed. Finish, or verify an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Waiting for the look around…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3932,6 +3932,10 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Eye distance, solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>One more alignment</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3957,10 +3961,6 @@ root mean square over the inliers</source>
     </message>
     <message>
         <source>Expected error after one more alignment like these</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Eye distance</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -158,7 +158,7 @@ class PlannedWizard(Wizard):
             "Raise one bare hand {}, palm toward you and fingers a little apart; hold it still."
         ).format(distance(snapshot))
         looks = needs_look(snapshot)
-        awaited = tr("Waiting for the look around…") if looks else _WAITS_FOR_HAND
+        awaited = tr("Waiting…") if looks else _WAITS_FOR_HAND
         return WizardView(
             Step.SHOW_HAND,
             LOOK if looks else text,

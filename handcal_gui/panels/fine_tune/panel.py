@@ -351,7 +351,6 @@ class FineTunePanel(QWidget):
         self._depth.setToolTip(tr("Distance of the target from the eye, in metres"))
         for depth_m in TARGET_DEPTHS_M:
             self._depth.addItem(f"{depth_m:g} m", depth_m)
-        self._depth.setCurrentIndex(len(TARGET_DEPTHS_M) // 2)
         self._depth.currentIndexChanged.connect(self._refresh)
 
     def _lay_out(self) -> None:

@@ -62,7 +62,7 @@ def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
         assert cells(rows, "Iterations")[column] == str(shift.iterations)
         assert f"{eye} eye {error:.1f}′ → {another:.1f}′" in another_text(results, rig)
     assert results.eye_distance_m is not None
-    assert cells(rows, "Eye distance") == (f"{1e3 * results.eye_distance_m:.1f} mm",)
+    assert cells(rows, "Eye distance, solved") == (f"{1e3 * results.eye_distance_m:.1f} mm",)
     assert cells(rows, "Solved from") == (f"2 alignments, {results.method}",)
     assert [row.cells[1] for row in verdict_rows(results)] == [
         results.verdicts[eye].reason for eye in EYES
@@ -101,7 +101,7 @@ def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -
         left, right = cells(rows, label)
         assert left != NOTHING
         assert right == NOTHING
-    assert cells(rows, "Eye distance") == (NOTHING,)
+    assert cells(rows, "Eye distance, solved") == (NOTHING,)
     assert [row.label for row in single_alignment_rows(left_only, rig)] == ["1 left"]
     assert "right" not in another_text(left_only, rig)
 
@@ -124,7 +124,7 @@ def test_a_difference_is_the_other_less_this_one(results: Results, rig: Rig) -> 
     assert cells(rows, "φ2 (mm)")[2] == "+0.00"
     assert cells(rows, "φ3 (mm)")[2] == "−2.00"
     assert cells(rows, "Iterations")[2] == f"−{results.eyes['left'].iterations}"
-    assert cells(rows, "Eye distance")[2] == "+0.0 mm"
+    assert cells(rows, "Eye distance, solved")[2] == "+0.0 mm"
     assert [row.label for row in rows if not any(row.cells)] == ["Left eye", "Right eye"]
 
 
@@ -133,4 +133,4 @@ def test_only_eyes_that_both_solved_are_compared(
 ) -> None:
     labels = [row.label for row in comparison_rows(results, left_only, rig)]
     assert "Left eye" in labels
-    assert not {"Right eye", "Eye distance"} & set(labels)
+    assert not {"Right eye", "Eye distance, solved"} & set(labels)

@@ -31,6 +31,7 @@ from handcal.types import EYES
 from handcal_gui.panels.fine_tune.history import Shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.fine_tune.stream import PERIOD_MS
+from handcal_gui.panels.trials.panel import TrialsPanel
 from tests.gui.helpers import child
 from tests.gui.panels.fine_tune.controls import (
     Show,
@@ -348,3 +349,13 @@ def test_a_panel_that_grows_loses_its_scroll_bar(panel: FineTunePanel, show: Sho
         panel.resize(409, height_px)
         QApplication.processEvents()
     assert area.verticalScrollBar().maximum() == 0
+
+
+def test_the_effect_is_at_first_that_at_the_distance_of_the_first_trials(
+    qtbot: QtBot, panel: FineTunePanel
+) -> None:
+    trials = TrialsPanel()
+    qtbot.addWidget(trials)
+    boxes = (*panel.findChildren(QComboBox), *trials.findChildren(QComboBox))
+    depths = [one for one in boxes if one.accessibleName() == "Distance of the target"]
+    assert [one.currentText() for one in depths] == ["0.4 m", "0.4 m"]
