@@ -137,7 +137,7 @@ QUANTITIES = (
 )
 _ANOTHER = tr("Expected error after one more alignment like these")
 _ALONE: Mapping[Eye, str] = {"left": tr("{} left"), "right": tr("{} right")}
-_EYE_DISTANCE = tr("Eye distance, solved")
+_EYE_DISTANCE = tr("Eye distance")
 _EYE_DISTANCE_MEANING = tr("Distance between the two solved eye positions")
 
 
@@ -152,7 +152,8 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
     rows.insert(
         QUANTITIES.index(EXPECTED_ERROR) + 1, Row(tr("One more alignment"), another, _ANOTHER)
     )
-    rows.append(Row(_EYE_DISTANCE, (eye_distance_text(results),), _EYE_DISTANCE_MEANING))
+    solved = tr("Eye distance, solved")  # as another may be measured
+    rows.append(Row(solved, (eye_distance_text(results),), _EYE_DISTANCE_MEANING))
     if measured := results.measured_eye_distance:
         meaning = tr("Used in the results; {}").format(measured.source)
         rows.append(Row(tr("Eye distance measured"), (str(measured),), meaning))

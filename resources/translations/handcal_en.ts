@@ -3932,6 +3932,10 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Eye distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Eye distance, solved</source>
         <translation type="unfinished"></translation>
     </message>
