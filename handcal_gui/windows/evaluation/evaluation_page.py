@@ -37,7 +37,7 @@ class EvaluationSpec:
     form: Callable[[], EntriesForm]
     """Creates the form for its entries."""
     coming: str = ""
-    """What its results will show, said in their place before there are any."""
+    """Announces what its results will show, in their place before there are any."""
     preparations: tuple[Preparation, ...] = ()
     """Buttons and dialogs that prepare data and devices."""
     note: str = ""

@@ -44,7 +44,7 @@ class ResultsView(QWidget):
     Parameters
     ----------
     coming : str
-        What will be shown here, said while there is no result.
+        Announces what will be shown here, while there is no result.
     """
 
     def __init__(self, coming: str = "", parent: QWidget | None = None) -> None:
