@@ -121,7 +121,7 @@ class PlannedWizard(Wizard):
 
     def view(self, snapshot: Snapshot) -> WizardView:
         """Return the view of a snapshot."""
-        view = self._view(snapshot)
+        view = super().view(snapshot)
         is_former = snapshot.record.facts.former and not snapshot.procedure.alignments
         return replace(view, omitted=_OMITTED) if is_former else view
 

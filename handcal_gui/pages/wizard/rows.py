@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, WizardView
+from handcal_gui.pages.wizard.view import STEPS, Action, Precondition, Step, WizardView
 from handcal_gui.theme import SPACING_PX, colors, icon, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -50,6 +50,7 @@ class StepRail(QWidget):
         for i, (step, label) in enumerate(self._labels.items()):
             is_over = view.main.action is Action.NEXT_WEARER
             is_done = (i < place or is_over) and step not in view.omitted
+            is_done &= view.is_aligned or step is not Step.ALIGN
             mark, color = ("✓ ", colors().good) if is_done else ("", colors().muted)
             if step in view.unearned:
                 mark, color = "– ", colors().warning

@@ -136,6 +136,9 @@ class Wizard:
 
     def view(self, snapshot: Snapshot) -> WizardView:
         """Return the view of a snapshot."""
+        return replace(self._view(snapshot), is_aligned=self._is_complete(snapshot))
+
+    def _view(self, snapshot: Snapshot) -> WizardView:
         match self.step(snapshot):
             case Step.CONNECT:
                 return connect_view(snapshot)

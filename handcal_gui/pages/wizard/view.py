@@ -132,3 +132,5 @@ class WizardView:
     """Earlier steps that were left without what they are for."""
     omitted: frozenset[Step] = frozenset()
     """Steps that this session has not needed so far."""
+    is_aligned: bool = True
+    """False while an eye of the plan has not been aligned."""

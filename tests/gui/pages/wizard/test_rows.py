@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 from PySide6.QtWidgets import QApplication, QLabel
@@ -34,3 +35,13 @@ def test_the_last_step_is_ticked_once_the_session_is_finished(qtbot: QtBot) -> N
         rail.show_step(WizardView(Step.SAVE, "", (), ButtonSpec(action, "On")))
         last.append(rail.findChildren(QLabel)[-1].text())
     assert last == ["▸ Save", "✓ Save"]
+
+
+def test_aligning_is_not_ticked_while_an_eye_is_left_out(qtbot: QtBot) -> None:
+    rail = show(qtbot, StepRail(), 480, 20)
+    view = WizardView(Step.SOLVE, "", (), ButtonSpec(Action.NEXT, "Next"))
+    texts = []
+    for is_aligned in (False, True):
+        rail.show_step(replace(view, is_aligned=is_aligned))
+        texts.append([label.text() for label in rail.findChildren(QLabel)][2:4])
+    assert texts == [["✓ Make cursor", "Align"], ["✓ Make cursor", "✓ Align"]]

@@ -11,6 +11,7 @@ from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
+from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard, is_complete, next_eyes
 from handcal_gui.pages.wizard.view import STEPS, Action, Step
 from tests.gui.views import VERIFIED, Maker, actions, judged
@@ -374,3 +375,13 @@ def test_the_engine_s_actions_are_no_moves(start: Snapshot) -> None:
     with pytest.raises(ValueError, match="engine"):
         Wizard().move(Action.SOLVE, start)
     assert len(STEPS) == 7
+
+
+def test_an_eye_of_the_plan_that_is_not_aligned_leaves_align_without_a_tick(
+    snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
+) -> None:
+    left = aligned(record, alignments[0], ("left",))
+    both = aligned(record, alignments[0], ("left",), ("right",))
+    for wizard in (Wizard("each"), PlannedWizard()):
+        seen = [wizard.view(snapshot(State.SOLVED, record=one)).is_aligned for one in (left, both)]
+        assert seen == [False, True]
