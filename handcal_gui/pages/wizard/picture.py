@@ -23,7 +23,6 @@ from handcal_gui.widgets.result_rows import EYE_NAMES
 
 _BLINK_MS = 800
 _LEAST_PX = 80, 48
-_HIGH_PX = 45 * SPACING_PX
 _ANY_HEIGHT_PX = 16_777_215
 """Qt's largest height of a widget."""
 _ASPECT = 0.8
@@ -188,9 +187,12 @@ class GuidePicture(QWidget):
         width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
         title_px = self._titles["left"].sizeHint().height()
         legend_px = self._legend["hand"].sizeHint().height()
-        # A low window has no room to hold the key apart from the titles below it.
-        self._rows.setSpacing(SPACING_PX // 2 if self.height() > _HIGH_PX else 0)
         fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1]) + legend_px
+        # A low window has no room to hold the key apart from the titles below it.
+        gap_px = SPACING_PX // 2
+        below_px = self.result.sizeHint().height() + SPACING_PX if is_below else 0
+        is_low = self.height() - below_px < fitted_px + gap_px
+        self._rows.setSpacing(0 if is_low else gap_px)
         fitted_px += self._rows.spacing()
         self._both.setMaximumHeight(fitted_px if is_fitted else _ANY_HEIGHT_PX)
 

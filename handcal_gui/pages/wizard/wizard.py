@@ -35,9 +35,10 @@ _COMPARING = {
 }
 """Beside the panels, and in the station, which shows no trials."""
 _NO_TRIALS = tr("Trials are recorded once φ is solved, beside the panels: press F11, then T")
-_RING_PX = {False: 8 * SPACING_PX, True: 16 * SPACING_PX}
-_SENTENCE_SCALE, _ROW_SCALE = {False: 1.2, True: 2.0}, {False: 1.0, True: 1.3}
-"""Size of the ring and scales of texts, in a window with panels and in one without."""
+_RING_PX = 8 * SPACING_PX, 10 * SPACING_PX, 16 * SPACING_PX
+_SENTENCE_SCALE, _ROW_SCALE = (1.2, 1.5, 2.0), (1.0, 1.1, 1.3)
+"""Size of the ring and scales of texts: beside panels, without them in a small window, and in a
+large one."""
 _LARGE_PX, _LARGE_SCALE = (1400, 1100), 1.5
 """Width and height from which the guide has larger texts, and their scale."""
 _LOW_WINDOW = 45.5
@@ -110,7 +111,8 @@ class WizardPanel(QWidget):
         self.picture = GuidePicture()
         self.comparison = ComparisonRow()
         self.comparison.hide()
-        self._is_station = self._is_alone = self._is_large = False
+        self._is_station = self._is_large = False
+        self._room = 0
         self._automatic = Automatic()
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
@@ -181,7 +183,7 @@ class WizardPanel(QWidget):
         """Use the room of a window without panels, or less, and do without the panels."""
         self._is_station = is_station
         self._no_trials.setEnabled(is_station)
-        self._is_alone = is_station and not is_small
+        self._room = (1 if is_small else 2) if is_station else 0
         self._scale_texts()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -212,10 +214,10 @@ class WizardPanel(QWidget):
     def _scale_texts(self) -> None:
         larger = _LARGE_SCALE if self._is_large else 1.0
         for texts, scale in (
-            ([self._sentence], _SENTENCE_SCALE[self._is_alone]),
+            ([self._sentence], _SENTENCE_SCALE[self._room]),
             (
                 [self._preconditions, self._fact, self._note, self.comparison],
-                _ROW_SCALE[self._is_alone],
+                _ROW_SCALE[self._room],
             ),
             ([self.picture.result], 1.0),
         ):
@@ -224,7 +226,7 @@ class WizardPanel(QWidget):
             for text in texts:
                 text.setFont(font)
         self._sentence.setMinimumHeight(2 * self._sentence.fontMetrics().lineSpacing() + 2)
-        self._ring.set_diameter(round(larger * _RING_PX[self._is_alone]))
+        self._ring.set_diameter(round(larger * _RING_PX[self._room]))
 
     def press_main(self) -> None:
         """Press the main button."""
