@@ -29,7 +29,7 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.theme import SPACING_PX, icon
+from handcal_gui.theme import SPACING_PX, heighten_tabs, icon
 from handcal_gui.translation import tr
 
 TITLES = {
@@ -256,7 +256,10 @@ def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
     texts_px = sum(bar.fontMetrics().horizontalAdvance(docks[name].windowTitle()) for name in names)
     room_px = max((docks[name].width() for name in names), default=0)
     has_icons = texts_px + 3 * SPACING_PX * len(names) > room_px
-    bar.setStyleSheet(_ICON_TABS if has_icons else "")
+    if has_icons:
+        bar.setStyleSheet(_ICON_TABS)
+    else:
+        heighten_tabs(bar)
     for i, name in enumerate(names):
         bar.setTabIcon(i, icon(name.replace("_", "-")) if has_icons else QIcon())
     return names if has_icons else []

@@ -21,7 +21,7 @@ from PySide6.QtGui import (
     QPixmap,
 )
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication, QHeaderView, QWidget
+from PySide6.QtWidgets import QApplication, QHeaderView, QTabBar, QTabWidget, QWidget
 
 from handcal.io.resources import resource_path
 
@@ -113,7 +113,7 @@ _LIGHT_SHADES = _Shades(
     button="#fbfbfc",
     text="#1b1f24",
     faint=_LIGHT.muted,
-    disabled="#9299a3",
+    disabled="#858c96",
     accent=_LIGHT.live,
     link=_LIGHT.live,
     box_edge="#b6bcc5",
@@ -127,7 +127,7 @@ _DARK_SHADES = _Shades(
     button="#3a3d43",
     text="#eceef1",
     faint=_DARK.muted,
-    disabled="#7d848d",
+    disabled="#8f969f",
     accent="#2f6fb5",
     link=_DARK.live,
     box_edge="#99a1ab",
@@ -251,6 +251,11 @@ def number_font(scale: float = 1.0) -> QFont:
 def font_px() -> int:
     """Return the size of the program's font in pixels: 12 by default on most systems."""
     return QFontInfo(QGuiApplication.font()).pixelSize()
+
+
+def heighten_tabs(tabs: QTabBar | QTabWidget) -> None:
+    """Give tabs the height of their text: Qt cuts the lowest pixels of those not in front."""
+    tabs.setStyleSheet("QTabBar::tab { height: 2em; }")
 
 
 def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:
