@@ -65,7 +65,7 @@ class RotationPanel(QWidget):
         self._limit_line = self._plot.add_line("red", dashed=True)
         self._angle_line = self._plot.add_line("live")
         self._limit_rad = 0.0
-        self._refused = ("", "")
+        self._refused, self._last = ("", ""), ""
         self._fitted: object = None
         self._lay_out()
 
@@ -73,7 +73,9 @@ class RotationPanel(QWidget):
         """Show the rotation of a snapshot; without a new frame the angle stays."""
         procedure, observation = snapshot.procedure, snapshot.observation
         was = procedure.refused_for  # without an order that may no longer apply
-        self._show_refusals(snapshot.record.refused, f"{was}." if was else procedure.refusal)
+        count, last = snapshot.record.refused, f"{was}." if was else procedure.refusal
+        self._last = last or self._last * bool(count)  # kept when the alignment is confirmed
+        self._show_refusals(count, self._last)
         self._show_limit(procedure.guard_limit_rad)
         is_aligning = procedure.cursor is not None and procedure.state is State.ALIGN
         if self._history and not (is_aligning and procedure.cursor is self._cursor):
@@ -103,7 +105,7 @@ class RotationPanel(QWidget):
         )
         if not is_turned and (angle_rad < _STRAIGHT_RAD or observation.has_changed):
             differs = observation.has_changed
-            word = tr("▲ Shape differs") if differs else tr("✓ Hold still")
+            word = tr("▲ Shape differs") if differs else tr("✓ Straight")
             self._dial.show_angle(angle_rad, self._limit_rad, word, is_refused=differs)
             self._hand.show_turn("")
             self._advice.setText(shape or _STRAIGHT)

@@ -67,7 +67,7 @@ def test_before_a_cursor_it_says_what_it_will_show(panel: RotationPanel, snapsho
 
 @pytest.mark.parametrize(
     ("rotation_deg", "expected"),
-    [((0.5, 0.5, 0.5), "✓ Hold still"), ((1, 8, 2), "✓ Within limit"), ((-9, 0, 4), "▲ Turn back")],
+    [((0.5, 0.5, 0.5), "✓ Straight"), ((1, 8, 2), "✓ Within limit"), ((-9, 0, 4), "▲ Turn back")],
 )
 def test_the_word_says_whether_it_may_be_confirmed(
     panel: RotationPanel, snapshot: Make, rotation_deg: tuple[float, ...], expected: str
@@ -176,7 +176,13 @@ def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapsh
     assert text(panel, "refusals") == "1 confirmation refused. The headset draws something else."
     over = {"refusal": TURNED, "refused_for": "your hand was turned by 18.6°"}
     panel.show_snapshot(snapshot(procedure=over))
-    assert text(panel, "refusals") == "1 confirmation refused. Your hand was turned by 18.6°."
+    told = "1 confirmation refused. Your hand was turned by 18.6°."
+    assert text(panel, "refusals") == told
+    once = replace(record, events=(*record.events, refused[0]))
+    panel.show_snapshot(snapshot(State.ALIGNED, record=once))
+    assert text(panel, "refusals") == told, "confirmed since"
+    panel.show_snapshot(snapshot(record=record))
+    assert text(panel, "refusals") == "No confirmation refused.", "another session"
 
 
 def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:
