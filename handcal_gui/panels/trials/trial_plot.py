@@ -36,8 +36,8 @@ class TrialPlot(Plot):
         self.setToolTip(
             tr(
                 "The error of each trial, the mean over the target's four corners. At each\n"
-                "distance: the mean of the n trials, and one standard deviation (SD) of the\n"
-                "trials above and below it. A single trial has no SD."
+                "distance: the mean of the n trials of both eyes, and one standard deviation (SD)\n"
+                "of the trials above and below it, but not below 0. A single trial has no SD."
             )
         )
         self.item.setXRange(min(TARGET_DEPTHS_M) - _MARGIN_M, max(TARGET_DEPTHS_M) + _MARGIN_M)
@@ -56,7 +56,7 @@ class TrialPlot(Plot):
             errors = [float(trial.error_arcmin.mean()) for trial in seen]
             line.setData(*_unjoined(np.array(at_m), np.array(errors), 1))
         depths_m = sorted({*TARGET_DEPTHS_M, *(one.target_depth_m for one in trials.values())})
-        ticks, marks, lowest, highest = [], [np.empty((0, 2))], 0.0, 1.0
+        ticks, marks, highest = [], [np.empty((0, 2))], 1.0
         for depth_m in depths_m:
             here = [number for number, one in trials.items() if one.target_depth_m == depth_m]
             name = tr("{:g} (n = {})").format(depth_m, len(here)) if trials else f"{depth_m:g}"
@@ -64,13 +64,12 @@ class TrialPlot(Plot):
             if here:
                 spread = trial_spread(trials, here)
                 mean, sd = spread.mean_arcmin, spread.trial_sd_arcmin or 0.0
-                lowest = min(lowest, mean - sd)
                 highest = max(highest, mean + sd, spread.max_arcmin)
                 across = (-_MEAN_HALF_WIDTH_M, _MEAN_HALF_WIDTH_M, 0.0, 0.0)
-                up = (mean, mean, mean - sd, mean + sd)
+                up = (mean, mean, max(mean - sd, 0.0), mean + sd)
                 marks.append(np.column_stack([np.add(depth_m, across), up]))
         self.item.getAxis("bottom").setTicks([ticks])
-        self.item.setYRange(lowest, highest, padding=_PADDING)  # no symbol is cut
+        self.item.setYRange(0.0, highest, padding=_PADDING)  # no symbol is cut
         at_m, up_arcmin = np.vstack(marks).T
         self._mean.setData(*_unjoined(at_m, up_arcmin, 2))
 
