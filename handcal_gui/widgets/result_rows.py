@@ -163,10 +163,12 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
         rows.append(
             Row(tr("Prior"), (learned,), tr("Where eyes are expected before any alignment"))
         )
-    count = pluralize(len(results.alignments), tr("alignment"), tr("alignments"))
-    if not results.alignments:
-        count = pluralize(len(results.fused.verified), tr("verified eye"), tr("verified eyes"))
-    fused = f"{count}, {results.method}"
+    alignments, verified = len(results.alignments), len(results.fused.verified)
+    counts = [
+        pluralize(alignments, tr("alignment"), tr("alignments")) if alignments else "",
+        pluralize(verified, tr("verified eye"), tr("verified eyes")) if verified else "",
+    ]
+    fused = ", ".join([*filter(None, counts), results.method])
     return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
 
 

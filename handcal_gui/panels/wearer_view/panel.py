@@ -124,7 +124,7 @@ class _EyeColumn(QWidget):
         self._title = QLabel(self._name)
         self.canvas = EyeCanvas(self._name)
         self.canvas.setObjectName(f"{eye}-eye")
-        self._now = _ErrorRow(tr("Now"), _ERROR.format(tr("the headset draws it")))
+        self._now = _ErrorRow(tr("Error"), _ERROR.format(tr("the headset draws it")))
         self._before = _ErrorRow(
             tr("Before"), _ERROR.format(tr("drawn before calibration (φ = 0)"))
         )
@@ -147,7 +147,7 @@ class _EyeColumn(QWidget):
         is_known = view is not None and (view.is_true or is_solved) and not message
         # Of a real eye, whose position is only estimated, the solved φ has no error.
         is_predicted = is_solved and view is not None and not view.is_true
-        self._now.set_name(tr("Against solved φ") if is_predicted else tr("Now"))
+        self._now.set_name(tr("Against solved φ") if is_predicted else tr("Error"))
         self._now.show_overlay(view.drawn if view and is_known else None)
         self._before.show_overlay(view.offline if view and is_known else None)
 

@@ -95,6 +95,12 @@ def test_a_result_of_verifications_alone_has_no_numbers_of_a_registration(rig: R
     assert compared["Expected error"][2] == "+0.0′"
 
 
+def test_a_result_names_all_that_it_was_solved_from(results: Results, rig: Rig) -> None:
+    fused = replace(results.fused, verified={"left": VERIFIED})
+    solved_from = cells(result_rows(replace(results, fused=fused), rig), "Solved from")
+    assert solved_from == (f"2 alignments, 1 verified eye, {results.method}",)
+
+
 def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -> None:
     rows = result_rows(left_only, rig)
     for label in ("φ1 (mm)", "Expected error", "One more alignment", "Iterations"):

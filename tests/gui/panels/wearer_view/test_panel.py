@@ -39,7 +39,7 @@ def _texts(panel: WearerViewPanel, eye: Eye) -> list[str]:
     column = _canvas(panel, eye).parentWidget()
     assert column is not None
     texts = [label.text() for label in column.findChildren(QLabel)]
-    return [text for text in texts if text not in ("Now", "Before")]
+    return [text for text in texts if text not in ("Error", "Before")]
 
 
 def _predicted(snapshot: Snapshot) -> dict[Eye, EyeView]:
