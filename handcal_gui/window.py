@@ -113,8 +113,11 @@ class MainWindow(QMainWindow):
         for page in self._pages.values():
             self._stack.addWidget(scrollable(page))
         middle = QWidget()
-        margins = (*3 * (SPACING_PX // 2,), 0)
-        self._middle = vbox(self.banner, (self._stack, 1), on=middle, margins=margins)
+        gap_px = SPACING_PX // 2
+        margins = (*3 * (gap_px,), 2)  # so that no message is on the line of the strip below
+        self._middle = vbox(
+            self.banner, (self._stack, 1), on=middle, margins=margins, spacing=gap_px
+        )
         self.setCentralWidget(middle)
         self._bar = wizard.bar
         self.setStatusBar(BottomStrip(self._bar))
