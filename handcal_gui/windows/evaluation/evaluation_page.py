@@ -208,7 +208,8 @@ class EvaluationPage(QWidget):
             self._button.setText(tr("Run again") if is_again else readiness.button)
         self._found.setVisible(not self.is_busy)  # the progress bar says more
         if finding := self._finding():
-            self._found.show_finding(finding)
+            is_waiting = bool(self._waits_for) and not self._failure
+            self._found.show_finding(finding, is_waiting=is_waiting)
 
     def _finding(self) -> Finding | None:
         """Return the message to show; None to keep the present one."""
@@ -222,6 +223,8 @@ class EvaluationPage(QWidget):
         if (readiness := self._readiness) is None:
             return None
         finding = readiness.finding
+        if not readiness.can_run:
+            finding = replace(finding, health=Health.BROKEN)
         if not self._is_cancelled:
             return finding
         if finding.health is Health.GOOD and not readiness.is_done:  # ready for a new start

@@ -57,3 +57,23 @@ def test_once_done_it_no_longer_says_how_to_start(qtbot: QtBot, window: Evaluati
     window.page.form.enter(output=f"{output}-2")
     qtbot.waitUntil(lambda: run.isEnabled() and run.text() == "Run")
     assert question.text().endswith(" Check the entries, then start at the lower right.")
+
+
+def test_what_forbids_a_run_has_one_sign(qtbot: QtBot, window: EvaluationWindow) -> None:
+    run, found = child(window, QPushButton, "run"), child(window, QLabel, "readinessFound")
+    sign = child(window, QLabel, "readinessHealth")
+    qtbot.waitUntil(run.isEnabled)
+    before = window.entries.users
+    for entries, told in (
+        ({"sessions": "/nowhere"}, "There is no such folder."),
+        ({"output": ""}, "Choose a folder for the results"),
+    ):
+        window.page.form.enter(**{"sessions": before.sessions, "output": before.output, **entries})
+        qtbot.waitUntil(lambda told=told: told in found.text())
+        assert not run.isEnabled()
+        assert sign.accessibleName() == "Problem"
+    window.page.form.enter(output=before.output)
+    qtbot.waitUntil(run.isEnabled)
+    window.page.wait_for("Noise study")
+    assert not run.isEnabled()
+    assert sign.accessibleName() == "Not yet", "it ends by itself"
