@@ -45,6 +45,8 @@ class RigFinding:
     """The expected value; empty if any value is."""
     is_known: bool = True
     """False if the file does not contain it: neither fine nor doubtful."""
+    has_failed: bool = False
+    """True if it is a test that failed, which is worse than doubtful."""
     parts: tuple[RigPart, ...] = ()
     """Parts of the rig from which it was computed; empty if it is not about their values."""
 

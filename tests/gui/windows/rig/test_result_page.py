@@ -69,6 +69,22 @@ def test_it_says_how_to_go_on_and_why_a_rig_cannot_be_used_yet(
     assert "ours.yaml; " in said.text(), "what is doubtful or not known stays in sight"
 
 
+def test_a_failed_acceptance_is_no_mere_doubt(qtbot: QtBot, project: RigProject) -> None:
+    project.use_rig(replace(project.rig, origins=dict.fromkeys(RIG_PARTS, ORIGIN)))
+    project.note_accepted("the rig fails: left", is_passed=False)
+    page = ResultPage(project)
+    qtbot.addWidget(page)
+    assert next(iter(told(page))) == "Acceptance"
+    assert told(page)["Acceptance"][1] == "Failed"
+    said, sign = child(page, QLabel, "savedRigFound"), child(page, QLabel, "savedRigHealth")
+    assert said.text().startswith("1 failed; 4 not known. Save")
+    assert sign.accessibleName() == "Problem"
+    project.note_accepted("the rig passes", is_passed=True)
+    page.enter()
+    assert told(page)["Acceptance"][1] == "Good"
+    assert said.text().startswith("4 not known; none doubtful. Save")
+
+
 def test_no_item_is_broken_in_a_small_window(qtbot: QtBot, project: RigProject) -> None:
     page = show(qtbot, ResultPage(project), 760, 400)
     shown = child(page, QTreeWidget, "rigFindings")
