@@ -235,7 +235,7 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
 
 
 def _not_told(what: str) -> RigFinding:
-    return RigFinding(what, "not in this file", is_known=False)
+    return RigFinding(what, "not known", is_known=False)
 
 
 def _origin_finding(rig: Rig, part: RigPart) -> RigFinding:

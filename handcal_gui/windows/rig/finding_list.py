@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from handcal.rig.report import RigFinding
 from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.translation import tr
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.times import local_time
 
 _ITEM, _FOUND, _EXPECTED = range(3)
@@ -68,7 +69,7 @@ class FindingList(QTreeWidget):
         for one in self._findings:
             expected = "" if one.is_fine else one.expected
             found = _TIME.sub(lambda time: local_time(time[0]), one.found)
-            item = QTreeWidgetItem([one.what, found, expected])
+            item = QTreeWidgetItem([sentence(text) for text in (one.what, found, expected)])
             judged = (doubtful, tr("Doubtful")), (good, tr("Good"))
             sign, word = judged[one.is_fine] if one.is_judged else (QIcon(blank), "")
             if not one.is_known:

@@ -184,7 +184,7 @@ def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: Rig
         (found,) = (row.text(1) for row in rows if row and row.text(0) == "Acceptance")
         return found
 
-    assert acceptance().startswith("not yet")
+    assert acceptance().startswith("Not yet")
     part(page, QPushButton, "acceptRig").click()
     dialog = part(page, AcceptDialog, "acceptDialog")
     part(dialog, QPushButton, "runAcceptance").click()
@@ -200,4 +200,4 @@ def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: Rig
     again = RigProject(ProjectFolder(project.folder.path), RealSenseSettings())
     assert again.acceptance == project.acceptance is not None
     project.use_rig(replace(project.rig, eyes={**project.rig.eyes, "left": left}))
-    assert acceptance().startswith("not yet")
+    assert acceptance().startswith("Not yet")

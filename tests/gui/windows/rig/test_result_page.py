@@ -40,7 +40,7 @@ def test_what_is_of_the_initial_rig_is_named_and_not_ticked(
 ) -> None:
     page = ResultPage(project)
     qtbot.addWidget(page)
-    apart, screen = "Distance of the viewpoints", "left: distance of the virtual screen"
+    apart, screen = "Distance of the viewpoints", "Left: distance of the virtual screen"
     assert told(page)[apart] == ("63 mm, as in the initial rig", "")
     project.use_rig(replace(project.rig, origins={"left": ORIGIN}))
     assert told(page)[apart] == ("63 mm, partly as in the initial rig", "")
@@ -67,6 +67,16 @@ def test_it_says_how_to_go_on_and_why_a_rig_cannot_be_used_yet(
     assert use.isEnabled()
     assert not use.toolTip()
     assert "ours.yaml; " in said.text(), "what is doubtful or not known stays in sight"
+
+
+def test_each_text_begins_with_a_capital_and_no_file_is_named_before_there_is_one(
+    qtbot: QtBot, project: RigProject
+) -> None:
+    page = ResultPage(project)
+    qtbot.addWidget(page)
+    texts = [text for what, (found, _) in told(page).items() for text in (what, found)]
+    assert not [text for text in texts if text[0].islower()]
+    assert told(page)["Headset"] == ("Not known", "Not known")
 
 
 def test_a_failed_acceptance_is_no_mere_doubt(qtbot: QtBot, project: RigProject) -> None:

@@ -187,7 +187,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     rows = [signs.topLevelItem(row) for row in range(signs.topLevelItemCount())]
     told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
     assert told["Depth camera"] == "Not known"
-    assert told["left: display"] == ""
+    assert told["Left: display"] == ""
     assert "Good" not in told.values()
 
 
