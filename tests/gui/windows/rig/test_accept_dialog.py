@@ -145,6 +145,7 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     qtbot.addWidget(dialog)
     dialog.show()
     found = part(dialog, QLabel, "acceptedFound")
+    assert "are on average at most 5′ from those seen" in part(dialog, QLabel, "how").text()
     assert "Press Check the rig" in found.text()
     part(dialog, QPushButton, "runAcceptance").click()
     assert found.text() == "", "it is pressed"
@@ -154,6 +155,9 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
     assert part(dialog, QPushButton, "runAcceptance").text() == "Check again"
     table = part(dialog, QTableWidget, "drawn-against-seen")
+    heads = [table.horizontalHeaderItem(column) for column in range(table.columnCount())]
+    limited = [head.text() for head in heads if head and "5" in head.text()]
+    assert limited == ["Mean, ′ (at most 5)"], "the limit is that of the mean of each pair"
     QApplication.processEvents()
     assert not part(dialog, Drawing, "drawing").isVisible(), "the numbers need its room"
     rows_px = table.viewport().height() / table.rowHeight(0)
