@@ -141,8 +141,9 @@ class DisplayPage(StepPage):
             }
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
-        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display")
-        keys = tr("Ta&ke images…"), tr("Searc&h again")
+        keys = tr("&Take images…"), tr("Find the grid &again")
+        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
+        keys = tr("Ta&ke images…"), tr("Find t&he board again")
         board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
         panels = {tr("Grid on the &display"): grid, tr("Ca&mera pose"): board}
         super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)

@@ -284,7 +284,7 @@ def test_labels_are_words_and_the_name_of_the_rig_is_whole(wizard: RigWizard) ->
     assert [text for text in texts if re.search("T_|→", text)] == []
     wizard.resize(900, 500)
     name = child(wizard, QLabel, "initialRig")
-    assert name.text() == example_rig().name
+    assert name.text() == f"In use: {example_rig().name}"
     assert name.height() >= name.heightForWidth(name.width()) > 0
 
 
