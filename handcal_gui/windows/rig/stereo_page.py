@@ -8,6 +8,7 @@ from functools import partial
 from PySide6.QtWidgets import QWidget
 
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
+from handcal.rig.views import ASKED_VIEWS
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
@@ -18,10 +19,10 @@ from handcal_gui.windows.rig.solve import SolvedPart, solve_stereo
 from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _HINT = tr(
-    "Take 20 or more pairs of simultaneous images of the board: near and far, in all parts of both "
+    "Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both "
     "views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end "
     "in the same number, such as depth07.png and headset07.png."
-)
+).format(ASKED_VIEWS)
 
 
 class StereoPage(StepPage):

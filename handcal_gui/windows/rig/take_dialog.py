@@ -17,7 +17,7 @@ from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.progress import Progress
 from handcal.rig.board import Board, BoardView
 from handcal.rig.choose import ChooseSettings, ViewSelector
-from handcal.rig.views import BoardImage, board_image, coverage
+from handcal.rig.views import ASKED_VIEWS, BoardImage, board_image, coverage
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
@@ -74,7 +74,7 @@ class TakeDialog(QDialog):
         realsense: RealSenseSettings,
         parent: QWidget | None = None,
         sources: Mapping[str, str] = MappingProxyType({}),
-        asked: int = 20,
+        asked: int = ASKED_VIEWS,
         earlier: Sequence[tuple[BoardView, ...]] = (),
         open_source: Callable[..., ViewpointCamera] = open_view_source,
         list_cameras: Callable[[], list[int]] = list_viewpoints,
