@@ -48,24 +48,24 @@ class StereoPage(StepPage):
         form = EntriesForm(
             {
                 "depth_images": (
-                    tr("Depth camera's images"),
+                    tr("&Depth camera's images"),
                     PathField(tr("Depth images"), "folder"),
                 ),
                 "depth_intrinsics": (
-                    tr("Its intrinsics"),
+                    tr("Its in&trinsics"),
                     intrinsics_field(tr("Depth intrinsics")),
                 ),
-                "imager_intrinsics": (tr("Depth imager's intrinsics"), imager),
-                "lens": (tr("Lens"), lens_field()),
+                "imager_intrinsics": (tr("Depth ima&ger's intrinsics"), imager),
+                "lens": (tr("L&ens"), lens_field()),
                 "headset_images": (
-                    tr("Headset camera's images"),
+                    tr("&Headset camera's images"),
                     PathField(tr("Headset images"), "folder"),
                 ),
                 "headset_intrinsics": (
-                    tr("Its intrinsics"),
+                    tr("Its intrinsi&cs"),
                     intrinsics_field(tr("Headset intrinsics")),
                 ),
-                "depth_to_color": (tr("Pose from depth to colour"), pose),
+                "depth_to_color": (tr("Pose &from depth to colour"), pose),
             }
         )
         form.show_entries(project.inputs.stereo)

@@ -34,11 +34,11 @@ class ViewpointPage(StepPage):
         form = EntriesForm(
             {
                 "images": (
-                    tr("Viewpoint camera's images"),
+                    tr("&Viewpoint camera's images"),
                     PathField(tr("Viewpoint images"), "folder"),
                 ),
-                "lens": (tr("Lens"), lens_field()),
-                "intrinsics": (tr("Its intrinsics"), given),
+                "lens": (tr("L&ens"), lens_field()),
+                "intrinsics": (tr("Its in&trinsics"), given),
             }
         )
         form.show_entries(project.inputs.viewpoint)
