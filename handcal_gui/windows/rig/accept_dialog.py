@@ -177,7 +177,8 @@ class AcceptDialog(QDialog):
 
     def _show_state(self) -> None:
         advice = self._need or tr("press Check the rig")
-        self._found.show_finding(Finding("", Health.LIMITED, tr("not accepted yet"), advice))
+        finding = Finding("", Health.LIMITED, tr("not accepted yet"), advice)
+        self._found.show_finding(finding, is_waiting=True)
         self._show_numbers(False)
 
     def _show_numbers(self, is_done: bool) -> None:

@@ -263,4 +263,6 @@ def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
     advice = tr("save the rig file to use it")
     if missing:
         advice = tr("solve these steps, or save the rig file to use it as it is")
+    if failed:
+        advice = tr("do what Acceptance says, and accept the rig again")
     return Finding("", health, text, advice)

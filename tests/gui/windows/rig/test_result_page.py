@@ -87,7 +87,7 @@ def test_a_failed_acceptance_is_no_mere_doubt(qtbot: QtBot, project: RigProject)
     assert next(iter(told(page))) == "Acceptance"
     assert told(page)["Acceptance"][1] == "Failed"
     said, sign = child(page, QLabel, "savedRigFound"), child(page, QLabel, "savedRigHealth")
-    assert said.text().startswith("1 failed; 4 not known. Save")
+    assert said.text().startswith("1 failed; 4 not known. Do what Acceptance says")
     assert sign.accessibleName() == "Problem"
     project.note_accepted("the rig passes", is_passed=True)
     page.enter()
