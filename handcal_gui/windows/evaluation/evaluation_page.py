@@ -202,7 +202,7 @@ class EvaluationPage(QWidget):
         if self.is_busy or is_shown:
             task = self.kept if self.is_busy else tr("Change the entries for another study.")
         elif is_again:
-            task = tr("Change the entries for another run, or run again if the files have changed.")
+            task = tr("Change the entries, or run again if files have changed.")
         self._question.setText(f"{self._question_text} {task}")
         if readiness is not None:
             self._button.setText(tr("Run again") if is_again else readiness.button)

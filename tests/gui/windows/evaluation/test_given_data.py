@@ -50,9 +50,7 @@ def test_once_done_it_no_longer_says_how_to_start(qtbot: QtBot, window: Evaluati
         run.click()
         qtbot.waitUntil(lambda: run.isEnabled() and run.text() == "Run again")
         assert child(window, QLabel, "readinessFound").text() == "Done."
-        assert question.text().endswith(
-            " Change the entries for another run, or run again if the files have changed."
-        )
+        assert question.text().endswith(" Change the entries, or run again if files have changed.")
     output = window.entries.users.output
     window.page.form.enter(output=f"{output}-2")
     qtbot.waitUntil(lambda: run.isEnabled() and run.text() == "Run")
