@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,10 @@ from tests.gui.helpers import child
 
 def _missing(entries: UserEntries) -> str:
     return "" if Path(entries.sessions).is_dir() else "there is no such folder"
+
+
+def _says(label: QLabel, words: str) -> bool:
+    return words in label.text()
 
 
 def _order(entries: UserEntries, _progress: Progress) -> UserTestRun:
@@ -67,7 +72,7 @@ def test_what_forbids_a_run_has_one_sign(qtbot: QtBot, window: EvaluationWindow)
         ({"output": ""}, "Choose a folder for the results"),
     ):
         window.page.form.enter(**{"sessions": before.sessions, "output": before.output, **entries})
-        qtbot.waitUntil(lambda told=told: told in found.text())
+        qtbot.waitUntil(partial(_says, found, told))
         assert not run.isEnabled()
         assert sign.accessibleName() == "Problem"
     window.page.form.enter(output=before.output)
