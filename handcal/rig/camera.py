@@ -22,6 +22,7 @@ from handcal.rig.reprojection import as_transform
 from handcal.rig.uncertainty import ProjectionUncertainty, next_view
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import (
+    ASKED_VIEWS,
     BoardImage,
     Coverage,
     ViewsError,
@@ -207,7 +208,7 @@ def _judge(
     seen_area = coverage(found.values())
     wanting = []
     if len(poses) < settings.good_views:
-        wanting.append(f"{len(poses)} views, {settings.good_views} are better")
+        wanting.append(f"{len(poses)} views, {ASKED_VIEWS} are better")
     if seen_area.share < settings.good_coverage:
         wanting.append(
             f"the board was seen in {100 * seen_area.share:.0f} % of the image only: bring it to "

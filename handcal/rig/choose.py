@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from handcal.rig.board import BoardView
+import cv2
+import numpy as np
+
+from handcal.rig.board import Board, BoardView
 from handcal.rig.views import moved
+
+_NEAR_SHARE, _FAR_SHARE = 1 / 2, 1 / 3
+_TILTED_RAD = np.radians(20.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +82,36 @@ class ViewSelector:
             return "the board was seen like this before: tilt it, or move it elsewhere"
         self._kept.append(first)
         return ""
+
+
+class Variety(NamedTuple):
+    """Numbers of views in which the board is near, far and tilted."""
+
+    near: int
+    far: int
+    tilted: int
+
+
+def variety(found: Iterable[BoardView], board: Board) -> Variety:
+    """Count the views in which the board is near, far and tilted, without the camera's intrinsics.
+
+    Near: seen from the front, the board would be half as wide as the image or more. Far: a third
+    or less. Tilted: its squares are foreshortened as by 20° or more from the line of sight.
+    """
+    width_m = max(board.squares) * board.square_m
+    shares, tilts_rad = [], []
+    for seen in found:
+        H, _ = cv2.findHomography(seen.points_m[:, :2], seen.pixels)
+        if H is None:
+            continue
+        x, y, scale = H @ [*seen.points_m[:, :2].mean(axis=0), 1.0]
+        px_per_m = (H[:2, :2] - np.outer([x, y], H[2, :2]) / scale) / scale
+        most, least = np.linalg.svd(px_per_m, compute_uv=False)
+        shares.append(most * width_m / seen.size[0])
+        tilts_rad.append(np.arccos(least / most))
+    share, tilt_rad = np.array(shares), np.array(tilts_rad)
+    counts = (share >= _NEAR_SHARE, share <= _FAR_SHARE, tilt_rad >= _TILTED_RAD)
+    return Variety(*(int(which.sum()) for which in counts))
 
 
 def _moved_share(a: BoardView, b: BoardView) -> float:

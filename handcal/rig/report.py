@@ -45,6 +45,8 @@ class RigFinding:
     """The expected value; empty if any value is."""
     is_known: bool = True
     """False if the file does not contain it: neither fine nor doubtful."""
+    has_failed: bool = False
+    """True if it is a test that failed, which is worse than doubtful."""
     parts: tuple[RigPart, ...] = ()
     """Parts of the rig from which it was computed; empty if it is not about their values."""
 
@@ -233,7 +235,7 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
 
 
 def _not_told(what: str) -> RigFinding:
-    return RigFinding(what, "not in this file", is_known=False)
+    return RigFinding(what, "not known", is_known=False)
 
 
 def _origin_finding(rig: Rig, part: RigPart) -> RigFinding:

@@ -37,7 +37,14 @@ from handcal.rig.stereo_pairs import (
 )
 from handcal.rig.uncertainty import next_pair
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import BoardImage, ViewsError, WorstView, check_moved, worst_view
+from handcal.rig.views import (
+    ASKED_VIEWS,
+    BoardImage,
+    ViewsError,
+    WorstView,
+    check_moved,
+    worst_view,
+)
 from handcal.types import Float64
 
 
@@ -336,7 +343,7 @@ def _judge(
     known = f"± {np.degrees(angle_sigma):.3f}°, ± {1e3 * shift_sigma:.2f} mm"
     wanting = [why] if why else []
     if len(T_D_B) < settings.good_pairs:
-        wanting.append(f"{len(T_D_B)} pairs, {settings.good_pairs} are better")
+        wanting.append(f"{len(T_D_B)} pairs, {ASKED_VIEWS} are better")
     if spread_rad < settings.good_spread_rad:
         wanting.append(f"the board was tilted by {np.degrees(spread_rad):.0f}° only")
     if angle_sigma > settings.max_angle_sigma_rad or shift_sigma > settings.max_shift_sigma_m:

@@ -21,6 +21,8 @@ from handcal.rig.fit import rms
 from handcal.types import Float64, Intrinsics, UInt8
 
 MAX_VIEWS = 500
+ASKED_VIEWS = 20
+"""Views, or pairs of views, that a step asks for; fewer can be enough for a good verdict."""
 _CELLS = (8, 6)
 _STANDS_OUT = 1.5
 # After so many images in a row with one problem, it is presumed for the next: finding out is slow.

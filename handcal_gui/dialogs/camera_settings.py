@@ -75,7 +75,7 @@ class CameraSettingsDialog(QDialog):
             tr("The RealSense SDK's visual preset; the settings below take precedence."),
         )
         self._exposure = _OwnNumber(
-            tr("Exposure"),
+            tr("Exposure of depth"),
             _number(
                 "exposure",
                 1,
@@ -146,7 +146,7 @@ class CameraSettingsDialog(QDialog):
         for title, field in (
             (tr("&Image size"), self._profile),
             (tr("Depth &preset"), self._preset),
-            (tr("&Exposure"), self._exposure),
+            (tr("&Exposure of depth"), self._exposure),
             (tr("Exposure of colour"), self._whole),
             (tr("&Laser power"), self._laser),
             (tr("Depth filters"), filters),

@@ -84,7 +84,7 @@ def test_camera_then_stereo_then_conversion(
     )
     said = capsys.readouterr().out
     assert f"{dropped} (left out)" in said
-    assert "needs more views: 4 views, 10 are better" in said
+    assert "needs more views: 4 views, 20 are better" in said
     assert read_intrinsics(camera).fx == pytest.approx(CAMERA.fx, rel=0.005)
 
     rig(

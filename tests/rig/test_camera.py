@@ -88,7 +88,7 @@ def test_images_of_a_board_give_the_camera_to_three_thousandths() -> None:
 def test_few_views_are_not_enough() -> None:
     result = calibrate_camera(_views(5))
     assert result.verdict.name == "needs more views"
-    assert "5 views, 10 are better" in result.verdict.reason
+    assert "5 views, 20 are better" in result.verdict.reason
     with pytest.raises(ViewsError, match="2 of 2 images used, at least 3"):
         calibrate_camera(_views(2))
 

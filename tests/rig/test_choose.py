@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
+from handcal.geometry import image_points, rigid, transform
 from handcal.rig.board import Board, BoardView, corners_m
-from handcal.rig.choose import ChooseSettings, ViewSelector
+from handcal.rig.choose import ChooseSettings, ViewSelector, variety
+from handcal.types import Intrinsics
 
 POINTS_M = corners_m(Board())
 IDS = np.arange(len(POINTS_M))
@@ -72,3 +75,26 @@ def test_a_grid_is_kept_as_often_as_asked_for() -> None:
     while not selector.is_done:
         kept += not selector.consider([replace(seen())])
     assert kept == 3
+
+
+def test_views_are_counted_by_distance_and_tilt_without_intrinsics() -> None:
+    """The measured tilts differ from the true ones by less than 5° up to the image's edge."""
+    board = Board(squares=(8, 6))
+    camera = Intrinsics(640, 360, 502.0, 502.0, 319.5, 179.5, (0.0,) * 5)
+    points_m = corners_m(board)
+    centred = rigid(None, -points_m.mean(axis=0))
+    views: dict[tuple[float, float], list[BoardView]] = {}
+    for turn_deg, depth_m in product((0.0, 15.0, 25.0, 40.0), (0.25, 0.40, 0.60)):
+        for side in (-0.25, 0.0, 0.25):
+            facing = rigid([0.0, np.arctan(side), 0.0])  # towards the camera
+            turn = facing @ rigid([0.0, np.radians(turn_deg), 0.0])
+            T_C_B = rigid(None, [side * depth_m, 0.0, depth_m]) @ turn @ centred
+            pixels = image_points(transform(T_C_B, points_m), camera)
+            ids = np.arange(len(points_m))
+            seen = BoardView(points_m, pixels, (camera.width, camera.height), ids, 2.0)
+            views.setdefault((turn_deg, depth_m), []).append(seen)
+    for (turn_deg, depth_m), some in views.items():
+        near, far, tilted = variety(some, board)
+        assert (near, far) == (3 * (depth_m < 0.3), 3 * (depth_m > 0.5))
+        assert tilted == 3 * (turn_deg > 20)
+    assert variety([], board) == (0, 0, 0)

@@ -197,15 +197,19 @@ class EvaluationPage(QWidget):
         is_shown = readiness is not None and readiness.is_done and not self._results.is_empty
         can_run = readiness is not None and readiness.can_run and not self._waits_for
         self._button.setEnabled(can_run and not is_shown)
+        is_again = self._is_done and readiness is not None and not readiness.is_done
         task = tr("Check the entries, then start at the lower right.")
         if self.is_busy or is_shown:
             task = self.kept if self.is_busy else tr("Change the entries for another study.")
+        elif is_again:
+            task = tr("Change the entries, or run again if files have changed.")
         self._question.setText(f"{self._question_text} {task}")
         if readiness is not None:
-            self._button.setText(readiness.button)
+            self._button.setText(tr("Run again") if is_again else readiness.button)
         self._found.setVisible(not self.is_busy)  # the progress bar says more
         if finding := self._finding():
-            self._found.show_finding(finding)
+            is_waiting = bool(self._waits_for) and not self._failure
+            self._found.show_finding(finding, is_waiting=is_waiting)
 
     def _finding(self) -> Finding | None:
         """Return the message to show; None to keep the present one."""
@@ -216,10 +220,13 @@ class EvaluationPage(QWidget):
             return Finding("", Health.LIMITED, found, tr("only one can run at a time"))
         if self._is_done:
             return Finding("", Health.GOOD, tr("Done"))
-        readiness = self._readiness
-        if readiness is None or not self._is_cancelled:
-            return readiness.finding if readiness is not None else None
+        if (readiness := self._readiness) is None:
+            return None
         finding = readiness.finding
+        if not readiness.can_run:
+            finding = replace(finding, health=Health.BROKEN)
+        if not self._is_cancelled:
+            return finding
         if finding.health is Health.GOOD and not readiness.is_done:  # ready for a new start
             return replace(finding, found=tr("Cancelled; the next run starts from the beginning"))
         return replace(finding, found=tr("Cancelled; {}").format(finding.found))

@@ -57,8 +57,9 @@ def make_specs() -> Mapping[str, EvaluationSpec]:
         "methods": EvaluationSpec(
             tr("Method comparison"),
             tr(
-                "Which calibration method is most accurate for the same wearers, and how much "
-                "effort does it require? 100 wearers take about eleven minutes on two cores."
+                "Which calibration method is most accurate for the same simulated wearers, and how "
+                "much effort does it require? 100 simulated wearers take about eleven minutes on "
+                "two cores."
             ),
             StudyEvaluation(method_cases, run_method_comparison),
             _methods_form,

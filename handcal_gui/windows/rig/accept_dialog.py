@@ -46,9 +46,10 @@ from handcal_gui.windows.rig.take_dialog import TakeDialog
 _HOW = tr(
     "For each eye, put the viewpoint camera behind its display. In a dark room, take "
     "images of the grid. Do not move camera or headset: switch the display off, and take images "
-    "of the board with both cameras at {} or more distances, 0.35 to 0.65 m."
-).format(FEWEST_VIEWS)
-_COLUMNS = (tr("Corners"), tr("Mean, ′"), tr("Largest, ′ (at most {:g})").format(LIMIT_ARCMIN))
+    "of the board with both cameras at {} or more distances, 0.35 to 0.65 m. The rig passes if "
+    "the board's corners as drawn are on average at most {:g}′ from those seen."
+).format(FEWEST_VIEWS, LIMIT_ARCMIN)
+_COLUMNS = (tr("Corners"), tr("Mean, ′ (at most {:g})").format(LIMIT_ARCMIN), tr("Largest, ′"))
 _TAKE: dict[Eye, dict[str, str]] = {
     "left": {"grid": tr("Take &grid…"), "board": tr("Take &board…")},
     "right": {"grid": tr("Take g&rid…"), "board": tr("Take bo&ard…")},
@@ -176,7 +177,8 @@ class AcceptDialog(QDialog):
 
     def _show_state(self) -> None:
         advice = self._need or tr("press Check the rig")
-        self._found.show_finding(Finding("", Health.LIMITED, tr("not accepted yet"), advice))
+        finding = Finding("", Health.LIMITED, tr("not accepted yet"), advice)
+        self._found.show_finding(finding, is_waiting=True)
         self._show_numbers(False)
 
     def _show_numbers(self, is_done: bool) -> None:

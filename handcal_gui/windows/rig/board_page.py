@@ -229,7 +229,7 @@ class BoardPage(QWidget):
     def _show_rig(self) -> None:
         rig = self._project.rig
         parts = ", ".join(PART_NAMES[part] for part in rig.origins)
-        self._rig.setText(rig.name)
+        self._rig.setText(tr("In use: {}").format(rig.name))
         self._state.setText(
             tr("Calibrated: {}.").format(parts)
             if parts

@@ -15,7 +15,7 @@ from handcal_gui.translation import tr
 _PLENTY = 6
 """Number of views from which on a cell has its full colour."""
 _WIDTH_PX, _HEIGHT_PX = 160, 96
-_HEAD_PX = 3 * SPACING_PX
+HEAD_PX = 3 * SPACING_PX
 
 
 class CellMap(QWidget):
@@ -33,7 +33,7 @@ class CellMap(QWidget):
         super().__init__()
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
         self.setFixedWidth(_WIDTH_PX + 1)
-        self.setMinimumHeight(_HEIGHT_PX // 2 + _HEAD_PX + 1)
+        self.setMinimumHeight(_HEIGHT_PX // 2 + HEAD_PX + 1)
         self.setMaximumHeight(self.sizeHint().height())
         self._title = title
         self._grid = grid
@@ -45,7 +45,7 @@ class CellMap(QWidget):
 
     def sizeHint(self) -> QSize:
         """Return the size at which the digits are well legible."""
-        return QSize(_WIDTH_PX + 1, _HEIGHT_PX + _HEAD_PX + 1)
+        return QSize(_WIDTH_PX + 1, _HEIGHT_PX + HEAD_PX + 1)
 
     def refresh(self) -> None:
         """Show what has changed."""
@@ -56,16 +56,16 @@ class CellMap(QWidget):
         """Draw the cells below the caption."""
         painter = QPainter(self)
         painter.setPen(self.palette().windowText().color())
-        head = QRectF(0, 0, self.width(), _HEAD_PX)
+        head = QRectF(0, 0, self.width(), HEAD_PX)
         painter.drawText(head, Qt.AlignmentFlag.AlignVCenter, self.caption)
         font = painter.font()
         font.setPointSizeF(0.8 * font.pointSizeF())
         painter.setFont(font)
         columns, rows = self._grid
-        width, height = _WIDTH_PX / columns, (self.height() - _HEAD_PX - 1) / rows
+        width, height = _WIDTH_PX / columns, (self.height() - HEAD_PX - 1) / rows
         for row in range(rows):
             for column in range(columns):
-                cell = QRectF(column * width, row * height + _HEAD_PX, width, height)
+                cell = QRectF(column * width, row * height + HEAD_PX, width, height)
                 painter.fillRect(cell, self.palette().base())
                 painter.setPen(QColor(colors().muted))
                 painter.drawRect(cell)

@@ -125,26 +125,27 @@ class DisplayPage(StepPage):
         )
         form = EntriesForm(
             {
-                "grid_images": (tr("Images of the grid"), PathField(tr("Grid images"), "folder")),
-                "square_px": (tr("Grid squares"), square),
+                "grid_images": (tr("Images of t&he grid"), PathField(tr("Grid images"), "folder")),
+                "square_px": (tr("Grid s&quares"), square),
                 "board_images": (
-                    tr("Images of the board"),
+                    tr("Images o&f the board"),
                     PathField(tr("Board images"), "folder"),
                 ),
-                "tracked": (tr("Poses of the board"), tracked),
-                "stereo": (tr("Stereo calibration"), stereo),
-                "view": (tr("Rendering camera's pose"), view),
-                "distance": (tr("Screen's distance"), distance),
-                "distance_m": (tr("Measured distance"), distance_m),
-                "square_arcmin": (tr("Angle of a square"), arcmin),
-                "nominal_m": (tr("Nominal distance"), nominal),
+                "tracked": (tr("&Poses of the board"), tracked),
+                "stereo": (tr("S&tereo calibration"), stereo),
+                "view": (tr("R&endering camera's pose"), view),
+                "distance": (tr("S&creen's distance"), distance),
+                "distance_m": (tr("Me&asured distance"), distance_m),
+                "square_arcmin": (tr("An&gle of a square"), arcmin),
+                "nominal_m": (tr("Nominal &distance"), nominal),
             }
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
-        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display")
-        keys = tr("Ta&ke images…"), tr("Searc&h again")
+        keys = tr("&Take images…"), tr("Find the grid &again")
+        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
+        keys = tr("Ta&ke images…"), tr("Find t&he board again")
         board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
-        panels = {tr("Grid on the &display"): grid, tr("Ca&mera pose"): board}
+        panels = {tr("Grid on the displa&y"): grid, tr("Ca&mera pose"): board}
         super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
         make_linked(board.hint).linkActivated.connect(self.manual_wanted)
         self._eye: Eye = eye

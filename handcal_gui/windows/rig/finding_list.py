@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from handcal.rig.report import RigFinding
 from handcal_gui.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.translation import tr
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.times import local_time
 
 _ITEM, _FOUND, _EXPECTED = range(3)
@@ -55,24 +56,26 @@ class FindingList(QTreeWidget):
         follow_theme(self, self._refresh)
 
     def show_findings(self, findings: Sequence[RigFinding]) -> None:
-        """Replace the list; doubtful findings come first, then what is not known."""
-        self._findings = tuple(sorted(findings, key=lambda one: (one.is_fine, one.is_known)))
+        """Replace the list; failed and doubtful findings come first, then what is not known."""
+        self._findings = tuple(sorted(findings, key=_urgency))
         self._refresh()
 
     def _refresh(self) -> None:
         self.clear()
         good, doubtful = icon("check", colors().good), icon("warning", colors().warning)
-        unknown = icon("wait", colors().muted)
+        unknown, failed = icon("wait", colors().muted), icon("cross", colors().red)
         blank = QPixmap(self.iconSize())  # or the texts of rows without an icon stand apart
         blank.fill(Qt.GlobalColor.transparent)
         for one in self._findings:
             expected = "" if one.is_fine else one.expected
             found = _TIME.sub(lambda time: local_time(time[0]), one.found)
-            item = QTreeWidgetItem([one.what, found, expected])
+            item = QTreeWidgetItem([sentence(text) for text in (one.what, found, expected)])
             judged = (doubtful, tr("Doubtful")), (good, tr("Good"))
             sign, word = judged[one.is_fine] if one.is_judged else (QIcon(blank), "")
             if not one.is_known:
                 sign, word = unknown, tr("Not known")
+            if one.has_failed:
+                sign, word = failed, tr("Failed")
             item.setIcon(0, sign)
             for column in range(3):
                 item.setToolTip(column, item.text(column))
@@ -96,6 +99,10 @@ class FindingList(QTreeWidget):
             self.header().resizeSection(
                 column, max(needed_px, self.header().sectionSizeHint(column))
             )
+
+
+def _urgency(finding: RigFinding) -> tuple[bool, ...]:
+    return not finding.has_failed, finding.is_fine, finding.is_known
 
 
 class _Wrapped(QStyledItemDelegate):

@@ -66,7 +66,7 @@ class ImagesPanel(QWidget):
         hint: str,
         drawing: str,
         take: str = tr("&Take images…"),
-        again: str = tr("Search &again"),
+        again: str = tr("Find the board &again"),
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -96,6 +96,7 @@ class ImagesPanel(QWidget):
         self._trouble.hide()
         self._again = button("again", again, help_text=tr("Read the folders again"))
         self._take = button("take", take, help_text=tr("Take images with cameras of this computer"))
+        self._again.setEnabled(False)
         self._again.clicked.connect(self._search_again)
         self._take.clicked.connect(self.take_requested)
         self.bar = JobBar(tr("Cancel"))  # without a letter: two panels may search at once
@@ -139,6 +140,7 @@ class ImagesPanel(QWidget):
         if before and before != paths:
             dropped = ()  # they refer to other images
         self._question = question
+        self._again.setEnabled(len(paths) == len(folders))
         self._show((), ())
         if len(paths) == len(folders):
             work: Callable[..., object] = partial(look, paths, board)

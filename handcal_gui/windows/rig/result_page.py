@@ -145,7 +145,8 @@ class ResultPage(QWidget):
         if last is None:
             return RigFinding(what, tr("not yet, or the rig has changed"), is_known=False)
         found = f"{local_time(last.made)}: {last.words}"
-        return RigFinding(what, found, last.is_passed, tr("the rig passes"))
+        passed = last.is_passed
+        return RigFinding(what, found, passed, tr("the rig passes"), has_failed=not passed)
 
     def _confirm_mixed(self) -> bool:
         """Ask before a rig is saved whose parts are not all solved with the present inputs."""
@@ -239,24 +240,29 @@ def _unless_initial(finding: RigFinding, rig: Rig) -> RigFinding:
 
 
 def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
-    """Return how many findings are doubtful or not known, and which parts are not calibrated.
+    """Return how many findings failed, are doubtful or not known, and what is not calibrated.
 
     Its advice says how to go on with a rig that is not saved.
     """
-    doubtful = sum(not one.is_fine for one in findings)
+    failed = sum(one.has_failed for one in findings)
+    doubtful = sum(not one.is_fine for one in findings) - failed
     missing = [part for part in RIG_PARTS if part not in rig.origins]
     unknown = sum(not one.is_known for one in findings) - len(missing)
-    text = tr("no doubtful findings")
-    if doubtful:
-        text = tr("{} of {} findings are doubtful: see Check").format(doubtful, len(findings))
-    if unknown:
-        text += tr("; {} are not known").format(unknown)
-    if missing:
-        text += tr("; not calibrated here, as in the initial rig: {}").format(
-            ", ".join(PART_NAMES[part] for part in missing)
-        )
+    names = ", ".join(PART_NAMES[part] for part in missing)
+    told = {
+        tr("{} failed").format(failed): failed,
+        tr("{} doubtful (see Check)").format(doubtful): doubtful,
+        tr("{} not calibrated here: {}").format(len(missing), names): missing,
+        tr("{} not known").format(unknown): unknown,
+        tr("none doubtful"): not failed and not doubtful,
+    }
+    text = "; ".join(words for words, is_so in told.items() if is_so)
     health = Health.LIMITED if doubtful or unknown or missing else Health.GOOD
+    if failed:
+        health = Health.BROKEN
     advice = tr("save the rig file to use it")
     if missing:
         advice = tr("solve these steps, or save the rig file to use it as it is")
+    if failed:
+        advice = tr("do what Acceptance says, and accept the rig again")
     return Finding("", health, text, advice)

@@ -17,6 +17,7 @@ from handcal.types import EYES, Eye, Float64
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.number_table import Row
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.windows.rig.lens_fields import LENSES
 
 COLUMNS = (tr("Value"), "± σ")
@@ -136,7 +137,11 @@ def rig_rows(rig: Rig) -> tuple[Row, ...]:
 def difference_rows(a: Rig, b: Rig) -> tuple[Row, ...]:
     """Return the differences between two rigs."""
     return tuple(
-        Row(one.name, (_with_unit(one.value, one.unit, 3),), tr("Never negative; 0 if both agree."))
+        Row(
+            sentence(one.name),
+            (_with_unit(one.value, one.unit, 3),),
+            tr("Never negative; 0 if both agree."),
+        )
         for one in compare_rigs(a, b)
     )
 

@@ -14,7 +14,7 @@ from handcal.rig_types import Origin
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import main_button
+from handcal_gui.widgets.fields import main_button, paragraph
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.layouts import hbox, vbox
@@ -25,6 +25,8 @@ from handcal_gui.windows.rig.rows import COLUMNS, LENS_COLUMNS
 from handcal_gui.windows.rig.solve import SolvedPart
 
 HEALTHS = {"good": Health.GOOD, "needs more views": Health.LIMITED, "bad": Health.BROKEN}
+
+_NOT_YET = Finding("", Health.LIMITED, tr("Not solved yet"))
 
 
 class SolveBox(QWidget):
@@ -51,12 +53,13 @@ class SolveBox(QWidget):
         self.bar = JobBar()
         self.bar.failed.connect(self._show_failure)
         self._verdict = FindingLine("verdict")
-        self._worst = FindingLine("worst")
+        self._worst = paragraph("worst")
+        self._worst.setIndent(3 * SPACING_PX)  # below the verdict's text
         self._lenses = NumberTable("lenses", tr("Lens models compared"))
         self.table = NumberTable("numbers", tr("Numbers"))
         self.numbers = QWidget()
         hbox((self.table, 2), (self._lenses, 3), on=self.numbers, spacing=SPACING_PX)
-        self._shown = Finding("", Health.LIMITED, tr("Not solved yet"))
+        self._shown = _NOT_YET
         self._need = ""
         vbox(self._verdict, self._worst, on=self, margins=0, spacing=SPACING_PX // 2)
         self.show_origin(None)
@@ -79,8 +82,7 @@ class SolveBox(QWidget):
     def show_origin(self, origin: Origin | None, outdated: str = "") -> None:
         """Show an earlier result, or that it is outdated; None if there is none."""
         if origin is None or outdated:
-            text = outdated or tr("Not solved yet")
-            self.show_finding(Finding("", Health.LIMITED, text))
+            self.show_finding(Finding("", Health.LIMITED, outdated) if outdated else _NOT_YET)
         else:
             text = tr("Solved {}: {}; {}; RMS {:.3f} px").format(
                 local_time(origin.made), origin.verdict, origin.reason, origin.rms_px
@@ -93,7 +95,8 @@ class SolveBox(QWidget):
         self._shown = finding
         parts = finding.advice.rstrip("."), sentence(self._need)
         advice = ". ".join(part for part in parts if part)
-        self._verdict.show_finding(replace(finding, advice=advice))
+        is_waiting = finding is _NOT_YET
+        self._verdict.show_finding(replace(finding, advice=advice), is_waiting=is_waiting)
 
     def allow(self, need: str, *, is_busy: bool) -> None:
         """Enable the button, unless something is needed first, or being done."""
@@ -112,7 +115,7 @@ class SolveBox(QWidget):
             worst = tr("Worst: {}, {:.2f} px: {}").format(
                 solved.worst.name, solved.worst.rms_px, solved.worst.why
             )
-            self._worst.show_finding(Finding("", Health.LIMITED, worst))
+            self._worst.setText(f"{worst}.")
         self._lenses.show_rows(LENS_COLUMNS, solved.lenses)
         self._lenses.setVisible(bool(solved.lenses))
         self.table.show_rows(COLUMNS, solved.rows)

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QGridLayout, QTabWidget, QWidget
 
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
+from handcal.rig.views import ASKED_VIEWS
 from handcal.rig_types import Origin
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
@@ -135,7 +136,7 @@ class StepPage(QWidget):
         panel: ImagesPanel,
         then: Callable[[], object],
         choose: ChooseSettings | None = None,
-        asked: int = 20,
+        asked: int = ASKED_VIEWS,
     ) -> None:
         """Take images with cameras, one folder for each, and then search them for the board."""
         places = tuple(folders.values())

@@ -8,6 +8,7 @@ from functools import partial
 from PySide6.QtWidgets import QWidget
 
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
+from handcal.rig.views import ASKED_VIEWS
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
@@ -18,10 +19,10 @@ from handcal_gui.windows.rig.solve import SolvedPart, solve_stereo
 from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _HINT = tr(
-    "Take 20 or more pairs of simultaneous images of the board: near and far, in all parts of both "
+    "Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both "
     "views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end "
     "in the same number, such as depth07.png and headset07.png."
-)
+).format(ASKED_VIEWS)
 
 
 class StereoPage(StepPage):
@@ -47,24 +48,24 @@ class StereoPage(StepPage):
         form = EntriesForm(
             {
                 "depth_images": (
-                    tr("Depth camera's images"),
+                    tr("&Depth camera's images"),
                     PathField(tr("Depth images"), "folder"),
                 ),
                 "depth_intrinsics": (
-                    tr("Its intrinsics"),
+                    tr("Its in&trinsics"),
                     intrinsics_field(tr("Depth intrinsics")),
                 ),
-                "imager_intrinsics": (tr("Depth imager's intrinsics"), imager),
-                "lens": (tr("Lens"), lens_field()),
+                "imager_intrinsics": (tr("Depth ima&ger's intrinsics"), imager),
+                "lens": (tr("L&ens"), lens_field()),
                 "headset_images": (
-                    tr("Headset camera's images"),
+                    tr("&Headset camera's images"),
                     PathField(tr("Headset images"), "folder"),
                 ),
                 "headset_intrinsics": (
-                    tr("Its intrinsics"),
+                    tr("Its intrinsi&cs"),
                     intrinsics_field(tr("Headset intrinsics")),
                 ),
-                "depth_to_color": (tr("Pose from depth to colour"), pose),
+                "depth_to_color": (tr("Pose &from depth to colour"), pose),
             }
         )
         form.show_entries(project.inputs.stereo)

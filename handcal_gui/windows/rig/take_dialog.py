@@ -7,7 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import cast
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSize, Signal
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
 
 from handcal.camera.settings import RealSenseSettings
@@ -16,8 +17,8 @@ from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.progress import Progress
 from handcal.rig.board import Board, BoardView
-from handcal.rig.choose import ChooseSettings, ViewSelector
-from handcal.rig.views import BoardImage, board_image, coverage
+from handcal.rig.choose import ChooseSettings, ViewSelector, variety
+from handcal.rig.views import ASKED_VIEWS, BoardImage, board_image, coverage
 from handcal.station.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
@@ -30,9 +31,13 @@ from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.live_images import Images
 from handcal_gui.widgets.sentence import sentence
-from handcal_gui.windows.rig.coverage_map import CoverageMap
+from handcal_gui.windows.rig.coverage_map import HEAD_PX, CoverageMap
 
 _TAKEN = tr("this has been taken already")
+
+_FIRST_SIZE, _FRAME = QSize(1240, 760), QSize(SPACING_PX, 6 * SPACING_PX)
+_MAP_PX = 12 * SPACING_PX
+"""Height of a map: the images need the room, and the digits remain legible."""
 
 
 class TakeDialog(QDialog):
@@ -74,7 +79,7 @@ class TakeDialog(QDialog):
         realsense: RealSenseSettings,
         parent: QWidget | None = None,
         sources: Mapping[str, str] = MappingProxyType({}),
-        asked: int = 20,
+        asked: int = ASKED_VIEWS,
         earlier: Sequence[tuple[BoardView, ...]] = (),
         open_source: Callable[..., ViewpointCamera] = open_view_source,
         list_cameras: Callable[[], list[int]] = list_viewpoints,
@@ -87,6 +92,13 @@ class TakeDialog(QDialog):
         self._is_searching = False
         self._asked, self._seen = asked, list(earlier)
         self._count = with_name(QLabel(), "takenCount")
+        self._kinds = with_name(QLabel(), "takenKinds")
+        self._kinds.setToolTip(
+            tr(
+                "Near: the board would be half as wide as the view or more; far: a third or less. "
+                "Tilted: by 20° or more from the line of sight."
+            )
+        )
         self._maps = tuple(CoverageMap(title) for title in folders)
         self._cameras = LiveCameras(
             tuple(folders),
@@ -129,6 +141,8 @@ class TakeDialog(QDialog):
         self._bar.busy_changed.connect(self._refresh)
         self._bar.failed.connect(self._show_failure)
         self._lay_out()
+        room = QGuiApplication.primaryScreen().availableSize() - _FRAME
+        self.resize(room.boundedTo(_FIRST_SIZE))
         self._refresh()
         self._show_coverage()
         self._bar.run(
@@ -241,7 +255,7 @@ class TakeDialog(QDialog):
         self._show_coverage()
 
     def _show_coverage(self) -> None:
-        """Show how many images of those asked for there are, and what they cover."""
+        """Show how many of the images asked for there are, of which kinds, and what they cover."""
         told = tr("{} of {} usable images")
         if len(self._folders) > 1:
             told = tr("{} of {} usable pairs of images")
@@ -250,6 +264,13 @@ class TakeDialog(QDialog):
         for camera, shown in enumerate(self._maps):
             found = [seen[camera] for seen in searched]
             shown.show_coverage(coverage(found) if found else None)
+        if self._asked < ASKED_VIEWS:  # of a camera that stands still: they need not differ
+            return
+        kinds = variety((seen[0] for seen in searched), self._board)
+        text = tr("{} tilted").format(kinds.tilted)
+        if len(self._folders) > 1:
+            text = tr("{} near, {} far, {} tilted").format(*kinds)
+        self._kinds.setText(text)
 
     @property
     def _show_task(self) -> str:
@@ -269,15 +290,18 @@ class TakeDialog(QDialog):
         self._mains.setCurrentIndex(int(is_shown))
 
     def _lay_out(self) -> None:
-        told = vbox(self._count, self._found, 1, spacing=SPACING_PX)
+        covered = QLabel(tr("Covered so far:"))
+        covered.setMinimumHeight(HEAD_PX)  # beside the captions of the maps
+        count = hbox(self._count, self._kinds, 1, covered, spacing=2 * SPACING_PX)
+        told = vbox(count, self._found, 1, spacing=SPACING_PX)
         others = self._close, self._by_itself
         foot = hbox(*others, (self._bar, 1), self._mains, spacing=SPACING_PX)
-        maps = hbox(*self._maps, 1, spacing=2 * SPACING_PX)
-        covered = vbox(QLabel(tr("Covered by the board so far:")), maps, spacing=0)
+        for one in self._maps:
+            one.setFixedHeight(_MAP_PX)
         vbox(
             self._task,
             (self._cameras, 1),
-            hbox((told, 1), covered, spacing=2 * SPACING_PX),
+            hbox((told, 1), *self._maps, spacing=2 * SPACING_PX),
             foot,
             on=self,
             margins=2 * SPACING_PX,

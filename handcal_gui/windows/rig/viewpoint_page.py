@@ -7,6 +7,7 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
+from handcal.rig.views import ASKED_VIEWS
 from handcal.station.doctor import Finding, Health
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -19,10 +20,10 @@ from handcal_gui.windows.rig.solve_box import HEALTHS
 from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _HINT = tr(
-    "Take 20 or more images of the board with the viewpoint camera, with the focus that it will "
+    "Take {} or more images of the board with the viewpoint camera, with the focus that it will "
     "have behind the display: in all parts of the view up to its edges, tilted by 20° to 45° in "
     "all directions."
-)
+).format(ASKED_VIEWS)
 
 
 class ViewpointPage(StepPage):
@@ -33,11 +34,11 @@ class ViewpointPage(StepPage):
         form = EntriesForm(
             {
                 "images": (
-                    tr("Viewpoint camera's images"),
+                    tr("&Viewpoint camera's images"),
                     PathField(tr("Viewpoint images"), "folder"),
                 ),
-                "lens": (tr("Lens"), lens_field()),
-                "intrinsics": (tr("Its intrinsics"), given),
+                "lens": (tr("L&ens"), lens_field()),
+                "intrinsics": (tr("Its in&trinsics"), given),
             }
         )
         form.show_entries(project.inputs.viewpoint)

@@ -145,7 +145,9 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     qtbot.addWidget(dialog)
     dialog.show()
     found = part(dialog, QLabel, "acceptedFound")
+    assert "are on average at most 5′ from those seen" in part(dialog, QLabel, "how").text()
     assert "Press Check the rig" in found.text()
+    assert part(dialog, QLabel, "acceptedHealth").accessibleName() == "Not yet", "as in Result"
     part(dialog, QPushButton, "runAcceptance").click()
     assert found.text() == "", "it is pressed"
     part(dialog, QPushButton, "cancel").click()
@@ -154,6 +156,9 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     qtbot.waitUntil(lambda: "passes: left" in found.text(), timeout=30_000)
     assert part(dialog, QPushButton, "runAcceptance").text() == "Check again"
     table = part(dialog, QTableWidget, "drawn-against-seen")
+    heads = [table.horizontalHeaderItem(column) for column in range(table.columnCount())]
+    limited = [head.text() for head in heads if head and "5" in head.text()]
+    assert limited == ["Mean, ′ (at most 5)"], "the limit is that of the mean of each pair"
     QApplication.processEvents()
     assert not part(dialog, Drawing, "drawing").isVisible(), "the numbers need its room"
     rows_px = table.viewport().height() / table.rowHeight(0)
@@ -184,7 +189,7 @@ def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: Rig
         (found,) = (row.text(1) for row in rows if row and row.text(0) == "Acceptance")
         return found
 
-    assert acceptance().startswith("not yet")
+    assert acceptance().startswith("Not yet")
     part(page, QPushButton, "acceptRig").click()
     dialog = part(page, AcceptDialog, "acceptDialog")
     part(dialog, QPushButton, "runAcceptance").click()
@@ -200,4 +205,4 @@ def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: Rig
     again = RigProject(ProjectFolder(project.folder.path), RealSenseSettings())
     assert again.acceptance == project.acceptance is not None
     project.use_rig(replace(project.rig, eyes={**project.rig.eyes, "left": left}))
-    assert acceptance().startswith("not yet")
+    assert acceptance().startswith("Not yet")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.report import RigFinding
 from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.views import WorstView
 from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.times import local_time
 from handcal_gui.windows.rig.finding_list import FindingList
@@ -59,6 +60,22 @@ def test_times_are_shown_as_everywhere(qtbot: QtBot) -> None:
     assert row is not None
     assert row.text(1) == f"+0.1 mm (9 views, {local_time('2026-11-26T08:29:24Z')})"
     assert "T08" not in row.text(1)
+
+
+def test_a_step_not_solved_has_a_clock_and_its_worst_image_no_sign(qtbot: QtBot) -> None:
+    box = show(qtbot, SolveBox(), 700, 100)
+    sign, worst = child(box, QLabel, "verdictHealth"), child(box, QLabel, "worst")
+    box.allow("to solve, take images", is_busy=False)
+    assert child(box, QLabel, "verdictFound").text() == "Not solved yet. To solve, take images."
+    assert sign.accessibleName() == "Not yet"
+    view = WorstView("a.png", 0.12, "nothing else about it stands out")
+    box.show_solved(SolvedPart(CalibrationVerdict("good", "as told"), (), {}, worst=view), "")
+    assert sign.accessibleName() == "Good"
+    assert worst.isVisible()
+    assert worst.text() == "Worst: a.png, 0.12 px: nothing else about it stands out."
+    assert not [one for one in box.findChildren(QLabel) if one.isVisible() and one.pixmap()][1:]
+    box.show_origin(None, "solved with other inputs")
+    assert sign.accessibleName() == "Note"
 
 
 def test_the_lenses_compared_are_whole_beside_the_numbers(qtbot: QtBot) -> None:

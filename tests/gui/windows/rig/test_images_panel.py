@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QLabel,
+    QPushButton,
     QStyledItemDelegate,
     QStyleOptionViewItem,
     QTreeWidget,
@@ -186,6 +187,20 @@ def test_results_stand_beside_the_images(full: ImagesPanel) -> None:
     assert item(full, 1).text(0) == "depth-002.png\nWorst: it is blurred"
     assert item(full, 2).text(2) == "–"
     assert item(full, 8).text(0) != "depth-099.png"
+
+
+def test_it_searches_again_only_where_it_has_searched(
+    panel: ImagesPanel, photographs: Any, tmp_path: Path
+) -> None:
+    again = child(panel.buttons, QPushButton, "again")
+    for folders, can_search in (
+        ((), False),
+        ((str(tmp_path),), False),
+        (2 * (str(tmp_path),), True),
+    ):
+        panel.look((*folders, "", "")[:2], photographs.work.board, ())
+        assert again.isEnabled() == can_search
+    assert again.text() == "Find the board &again"
 
 
 def test_folders_are_looked_through_once(qtbot: QtBot, full: ImagesPanel, photographs: Any) -> None:

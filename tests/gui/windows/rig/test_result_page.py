@@ -40,7 +40,7 @@ def test_what_is_of_the_initial_rig_is_named_and_not_ticked(
 ) -> None:
     page = ResultPage(project)
     qtbot.addWidget(page)
-    apart, screen = "Distance of the viewpoints", "left: distance of the virtual screen"
+    apart, screen = "Distance of the viewpoints", "Left: distance of the virtual screen"
     assert told(page)[apart] == ("63 mm, as in the initial rig", "")
     project.use_rig(replace(project.rig, origins={"left": ORIGIN}))
     assert told(page)[apart] == ("63 mm, partly as in the initial rig", "")
@@ -67,6 +67,32 @@ def test_it_says_how_to_go_on_and_why_a_rig_cannot_be_used_yet(
     assert use.isEnabled()
     assert not use.toolTip()
     assert "ours.yaml; " in said.text(), "what is doubtful or not known stays in sight"
+
+
+def test_each_text_begins_with_a_capital_and_no_file_is_named_before_there_is_one(
+    qtbot: QtBot, project: RigProject
+) -> None:
+    page = ResultPage(project)
+    qtbot.addWidget(page)
+    texts = [text for what, (found, _) in told(page).items() for text in (what, found)]
+    assert not [text for text in texts if text[0].islower()]
+    assert told(page)["Headset"] == ("Not known", "Not known")
+
+
+def test_a_failed_acceptance_is_no_mere_doubt(qtbot: QtBot, project: RigProject) -> None:
+    project.use_rig(replace(project.rig, origins=dict.fromkeys(RIG_PARTS, ORIGIN)))
+    project.note_accepted("the rig fails: left", is_passed=False)
+    page = ResultPage(project)
+    qtbot.addWidget(page)
+    assert next(iter(told(page))) == "Acceptance"
+    assert told(page)["Acceptance"][1] == "Failed"
+    said, sign = child(page, QLabel, "savedRigFound"), child(page, QLabel, "savedRigHealth")
+    assert said.text().startswith("1 failed; 4 not known. Do what Acceptance says")
+    assert sign.accessibleName() == "Problem"
+    project.note_accepted("the rig passes", is_passed=True)
+    page.enter()
+    assert told(page)["Acceptance"][1] == "Good"
+    assert said.text().startswith("4 not known; none doubtful. Save")
 
 
 def test_no_item_is_broken_in_a_small_window(qtbot: QtBot, project: RigProject) -> None:

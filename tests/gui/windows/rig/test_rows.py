@@ -41,6 +41,6 @@ def test_the_same_rig_does_not_differ() -> None:
     ours = example_rig()
     theirs = replace(ours, T_H_D=ours.T_H_D @ rigid(None, [0.001, 0.0, 0.0]))
     moved = {row.label: row.cells[0] for row in difference_rows(ours, theirs)}
-    assert moved["depth camera (T_H_D): moved"] == "1.000 mm"
-    assert moved["depth camera (T_H_D): turned"] == "0.000°"
-    assert moved["left: target is drawn elsewhere"].endswith("′")
+    assert moved["Depth camera (T_H_D): moved"] == "1.000 mm"
+    assert moved["Depth camera (T_H_D): turned"] == "0.000°"
+    assert moved["Left: target is drawn elsewhere"].endswith("′")

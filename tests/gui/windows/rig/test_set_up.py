@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.theme import font_px
 from handcal_gui.widgets.drawing import Drawing
+from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.windows.rig.wizard import RigWizard
-from tests.gui.windows.rig.wizard_steps import LEFT
+from tests.gui.helpers import letters
+from tests.gui.windows.rig.wizard_steps import LEFT, RIGHT, STEREO, VIEWPOINT, show_tab
 from tests.helpers import ROOT
 
 
@@ -28,3 +30,13 @@ def test_two_drawings_stand_on_one_line_with_text_as_large_as_the_window_s(
     assert found is not None
     width, height, text = map(float, found.groups())
     assert text * min(left.width() / width, left.height() / height) > 0.95 * font_px()
+
+
+def test_every_input_of_a_step_has_a_letter_of_its_own(qtbot: QtBot, wizard: RigWizard) -> None:
+    for step in (STEREO, VIEWPOINT, LEFT, RIGHT):
+        wizard.show_step(step)
+        show_tab(wizard, "Inputs")
+        (form,) = (one for one in wizard.findChildren(EntriesForm) if one.isVisible())
+        assert all("&" in label.text() for label in form.findChildren(QLabel))
+        found = letters(wizard, is_shown=True)
+        assert len(set(found)) == len(found), (step, found)

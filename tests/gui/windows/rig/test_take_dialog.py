@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,8 +26,9 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.errors import CameraError
-from handcal.rig.choose import ChooseSettings
+from handcal.rig.choose import ALIKE, ChooseSettings
 from handcal_gui.widgets.fields import MainButton
+from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.coverage_map import CoverageMap
@@ -117,10 +119,14 @@ def test_what_is_taken_is_counted_and_what_it_covers_is_shown_at_once(
     maps = dialog.findChildren(CoverageMap)
     assert [one.caption for one in maps] == ["Depth camera: –", "Headset camera: –"]
     assert count() == "0 of 20 usable pairs of images"
+    kinds = child(dialog, QLabel, "takenKinds")
+    assert kinds.text() == "0 near, 0 far, 0 tilted"
     start(qtbot, dialog)
     button(dialog, "takeImage").click()
     qtbot.waitUntil(lambda: "corners" in said(dialog))
     assert count() == "1 of 20 usable pairs of images"
+    assert re.fullmatch(r"[01] near, [01] far, [01] tilted", kinds.text())
+    assert kinds.text() != "0 near, 0 far, 0 tilted", "the board is tilted in it"
     covered = [one.caption for one in maps]
     assert all(caption.endswith(" %") for caption in covered)
     cameras["1"].image = np.full((360, 640, 3), 90, np.uint8)
@@ -129,9 +135,10 @@ def test_what_is_taken_is_counted_and_what_it_covers_is_shown_at_once(
     qtbot.waitUntil(lambda: "Take another" in said(dialog))
     assert count() == "1 of 20 usable pairs of images", "the headset camera's shows no board"
     assert [one.caption for one in maps] == covered
-    dialog.resize(960, 500)  # as on a screen of 960x540
+    dialog.resize(952, 492)  # as on a screen of 960x540, with the window's frame
     QApplication.processEvents()
-    assert dialog.height() == 500
+    assert (dialog.width(), dialog.height()) == (952, 492)
+    assert all(one.height() >= 220 for one in dialog.findChildren(ImageView)), "to judge sharpness"
     foot_px = button(dialog, "takeImage").mapTo(dialog, QPoint()).y()
     for one in maps:
         assert one.isVisible()
@@ -290,4 +297,10 @@ def test_one_camera_takes_images_and_two_take_pairs(
     qtbot.addWidget(one)
     assert child(one, QLabel, "takenCount").text() == "0 of 20 usable images"
     assert child(dialog, QLabel, "takenCount").text() == "0 of 20 usable pairs of images"
+    kinds = [child(shown, QLabel, "takenKinds").text() for shown in (one, dialog)]
+    assert kinds == ["0 tilted", "0 near, 0 far, 0 tilted"]
     one.reject()
+    few = TakeDialog(folders, board, ALIKE, settings, asked=3, list_cameras=lambda: [0])
+    qtbot.addWidget(few)
+    assert not child(few, QLabel, "takenKinds").text(), "the camera stands still"
+    few.reject()
