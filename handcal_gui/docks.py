@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.station.snapshot import Snapshot
+from handcal_gui.keys import native
 from handcal_gui.panels.camera.panel import CameraPanel
 from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
@@ -258,5 +259,7 @@ def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
     has_icons = texts_px + 3 * SPACING_PX * len(names) > room_px
     bar.setStyleSheet(_ICON_TABS if has_icons else "")
     for i, name in enumerate(names):
+        keys = native(f"Ctrl+{list(docks).index(name) + 1}")
+        bar.setTabToolTip(i, f"{docks[name].windowTitle()} ({keys})")
         bar.setTabIcon(i, icon(name.replace("_", "-")) if has_icons else QIcon())
     return names if has_icons else []
