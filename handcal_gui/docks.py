@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QIcon, QKeySequence, QShortcutEvent
+from PySide6.QtGui import QHelpEvent, QIcon, QKeySequence, QShortcutEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QDockWidget,
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QTabBar,
     QTabWidget,
+    QToolTip,
     QWidget,
 )
 
@@ -157,6 +158,18 @@ class PanelLetters(QObject):
         return True
 
 
+class _TabTips(QObject):
+    """Shows the tooltips of a tab bar of docks: Qt shows them only where the tabs do not fit."""
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Show the tooltip of the tab below the mouse."""
+        if isinstance(watched, QTabBar) and isinstance(event, QHelpEvent):
+            text = watched.tabToolTip(watched.tabAt(event.pos()))
+            QToolTip.showText(event.globalPos(), text, watched)
+            return True
+        return super().eventFilter(watched, event)
+
+
 def arrange_docks(window: QMainWindow, docks: Docks, *, is_small: bool) -> None:
     """Arrange the docks around the page, in a small window as tabs beside it."""
     across = Qt.Orientation.Vertical
@@ -252,6 +265,8 @@ def leave_titles_to_tabs(window: QMainWindow, docks: Docks) -> None:
 def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
     """Show icons in place of texts that do not fit; return the names of those docks."""
     bar.setElideMode(Qt.TextElideMode.ElideNone)
+    if not bar.findChildren(_TabTips):
+        bar.installEventFilter(_TabTips(bar))
     named = {dock.windowTitle(): name for name, dock in docks.items()}
     names = [named[bar.tabText(i)] for i in range(bar.count()) if bar.tabText(i) in named]
     texts_px = sum(bar.fontMetrics().horizontalAdvance(docks[name].windowTitle()) for name in names)

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from functools import partial
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QHelpEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
@@ -18,6 +19,7 @@ from PySide6.QtWidgets import (
     QTabBar,
     QTabWidget,
     QToolButton,
+    QToolTip,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -267,4 +269,10 @@ def test_tabs_of_panels_name_their_keys_also_where_they_are_icons(
             for i in range(bar.count())
         }
         assert tabs["Session"] == "Session (Ctrl+8)"
+        [bar] = [one for one in bars if one.isVisible()]
+        place = bar.tabRect(1).center()
+        help_wanted = QHelpEvent(QEvent.Type.ToolTip, place, bar.mapToGlobal(place))
+        QApplication.sendEvent(bar, help_wanted)
+        assert QToolTip.text() == bar.tabToolTip(1)
+        QToolTip.hideText()
         assert all(tip.startswith(f"{text} (Ctrl+") for text, tip in tabs.items())
