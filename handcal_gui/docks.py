@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QIcon, QKeySequence, QShortcutEvent
+from PySide6.QtGui import QHelpEvent, QIcon, QKeySequence, QShortcutEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QDockWidget,
@@ -16,10 +16,12 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QTabBar,
     QTabWidget,
+    QToolTip,
     QWidget,
 )
 
 from handcal.station.snapshot import Snapshot
+from handcal_gui.keys import native
 from handcal_gui.panels.camera.panel import CameraPanel
 from handcal_gui.panels.cloud.panel import CloudPanel
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
@@ -156,6 +158,18 @@ class PanelLetters(QObject):
         return True
 
 
+class _TabTips(QObject):
+    """Shows the tooltips of a tab bar of docks: Qt shows them only where the tabs do not fit."""
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Show the tooltip of the tab below the mouse."""
+        if isinstance(watched, QTabBar) and isinstance(event, QHelpEvent):
+            text = watched.tabToolTip(watched.tabAt(event.pos()))
+            QToolTip.showText(event.globalPos(), text, watched)
+            return True
+        return super().eventFilter(watched, event)
+
+
 def arrange_docks(window: QMainWindow, docks: Docks, *, is_small: bool) -> None:
     """Arrange the docks around the page, in a small window as tabs beside it."""
     across = Qt.Orientation.Vertical
@@ -251,6 +265,8 @@ def leave_titles_to_tabs(window: QMainWindow, docks: Docks) -> None:
 def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
     """Show icons in place of texts that do not fit; return the names of those docks."""
     bar.setElideMode(Qt.TextElideMode.ElideNone)
+    if not bar.findChildren(_TabTips):
+        bar.installEventFilter(_TabTips(bar))
     named = {dock.windowTitle(): name for name, dock in docks.items()}
     names = [named[bar.tabText(i)] for i in range(bar.count()) if bar.tabText(i) in named]
     texts_px = sum(bar.fontMetrics().horizontalAdvance(docks[name].windowTitle()) for name in names)
@@ -261,5 +277,7 @@ def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
     else:
         heighten_tabs(bar)
     for i, name in enumerate(names):
+        keys = native(f"Ctrl+{list(docks).index(name) + 1}")
+        bar.setTabToolTip(i, f"{docks[name].windowTitle()} ({keys})")
         bar.setTabIcon(i, icon(name.replace("_", "-")) if has_icons else QIcon())
     return names if has_icons else []

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
@@ -70,14 +71,27 @@ def export_session(
     """
     formats = [name for name in _ALL if name in settings.formats]
     with Staging(folder) as staging:
-        parts = 1 + len(formats)
-        outcome = load_outcome(record, progress.part(0.0, 1.0 / parts))
+        outcome = load_outcome(record, _part(progress, 0, formats))
         for done, name in enumerate(formats, 1):
-            part = progress.part(done / parts, (done + 1) / parts, _ALL[name].title)
+            part = _part(progress, done, formats)
             part.at(0.0)
             _write(name, outcome, staging.path, folder, settings, part)
         progress.at(1.0, "Moving the files in place")
         return staging.publish([pattern for name in formats for pattern in _ALL[name].patterns])
+
+
+def _part(progress: Progress, done: int, formats: Sequence[Format]) -> Progress:
+    """Return the progress of a part: of solving, then of each format; it tells of which one.
+
+    Solving precedes the first format: its user asked for files, not for another result.
+    """
+    number, parts = max(done, 1), 1 + len(formats)
+    title = f"Exporting {number} of {len(formats)}, {_ALL[formats[number - 1]].title}"
+
+    def report(what: str, share: float) -> None:
+        progress.report(f"{title}: {what[0].lower()}{what[1:]}" if what else title, share)
+
+    return replace(progress, report=report).part(done / parts, (done + 1) / parts)
 
 
 def _write(

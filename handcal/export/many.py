@@ -68,6 +68,9 @@ def _export(
     if not record.is_solvable:
         raise FileError("it has no alignments")
     name = f"{done + 1} of {count}: {record.wearer or path.name}"
-    named = replace(progress, report=lambda what, share: progress.report(f"{name}, {what}", share))
-    part = named.part(done / count, (done + 1) / count)
+
+    def report(what: str, share: float) -> None:
+        progress.report(f"{name}, {what[0].lower()}{what[1:]}", share)
+
+    part = replace(progress, report=report).part(done / count, (done + 1) / count)
     return export_session(record, folder / path.name, settings, part)

@@ -211,6 +211,7 @@ class ConnectDialog(QDialog):
             self._state,
             _heading(tr("Test square, 8 cm at 0.5 m")),
             *self._squares.values(),
+            _heading(tr("Paired headsets")),
             (self._devices, 1),
             self._problem,
             hbox(1, self._close),

@@ -47,7 +47,7 @@ class PairedDevices(QWidget):
         self._table = QTableWidget(0, 2)
         self._table.setObjectName("pairedDevices")
         self._table.setAccessibleName(tr("Paired headsets"))
-        self._table.setHorizontalHeaderLabels([tr("Paired headset"), tr("Device")])
+        self._table.setHorizontalHeaderLabels([tr("Name"), tr("Device")])
         self._table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setTabKeyNavigation(False)
@@ -58,7 +58,10 @@ class PairedDevices(QWidget):
         flat_header(across)
         across.setSectionResizeMode(_NAME, QHeaderView.ResizeMode.Stretch)
         across.setSectionResizeMode(_DEVICE, QHeaderView.ResizeMode.ResizeToContents)
-        self._empty = paragraph("noDevices", tr("No headset is paired yet."))
+        self._empty = paragraph(
+            "noDevices", tr("None yet. Each headset that pairs is listed here.")
+        )
+        self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._rename = button("renameDevice", tr("Rena&me"), tr("Rename the chosen headset"))
         self._revoke = button(
             "revokeDevice",

@@ -21,10 +21,10 @@ from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _ABOUT = tr(
-    "Choose a folder, write one file there, and send it with a bug report. It contains the checks "
-    "of the installation, package versions, and the log, in which wearers' names, your user name "
-    "and the home folder are replaced; nothing from sessions, and camera frames only if you add a "
-    "recording here."
+    "Choose a folder, write one file there, and send it with a bug report to the handcal "
+    "developers. It contains the checks of the installation, package versions, and the log, in "
+    "which wearers' names, your user name and the home folder are replaced; nothing from sessions, "
+    "and camera frames only if you add a recording here."
 )
 _ADVICE = tr("nothing was written; choose another folder or recording, and try again")
 
@@ -53,7 +53,9 @@ class SupportDialog(QDialog):
         self._folder.set_path(str(folder))
         self._folder.setMinimumWidth(45 * SPACING_PX)
         self._frames = PathField(tr("Recording to add"), "either", empty=tr("None"))
-        self._doing = paragraph("supportDoing")
+        self._name = f"handcal-support-{date.today():%Y%m%d}.zip"
+        will = tr("The file {} will be written to the folder.").format(self._name)
+        self._doing = paragraph("supportDoing", will)
         self._said = FindingLine("support")
         self._said.hide()
         self._write = main_button("writeBundle", tr("&Write"))
@@ -80,8 +82,7 @@ class SupportDialog(QDialog):
         """Write the bundle."""
         if self._job is not None:
             return
-        folder = user_path(self._folder.path)
-        output = folder / f"handcal-support-{date.today():%Y%m%d}.zip"
+        output = user_path(self._folder.path) / self._name
         frames = Path(self._frames.path) if self._frames.path else None
         settings = replace(self._settings, frames=frames)
 

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.report.cells import MINUS, with_minus
+from handcal_gui.keys import add_action, native
 from handcal_gui.theme import SPACING_PX, scale_font, set_style
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import show_briefly
@@ -246,6 +247,19 @@ def label_for(field: QWidget, text: str) -> QLabel:
     parts = filter(None, (field, field.focusProxy(), *field.findChildren(QWidget)))
     label.setBuddy(next(one for one in parts if one.focusPolicy() != Qt.FocusPolicy.NoFocus))
     return label
+
+
+def let_keys_choose(box: QComboBox, panel: QWidget, text: str, keys: str) -> None:
+    """Let keys choose the next entry of a list from anywhere in its panel; its tooltip names them.
+
+    After the last entry comes the first.
+    """
+
+    def choose_next() -> None:
+        box.setCurrentIndex((box.currentIndex() + 1) % box.count())
+
+    add_action(panel, text, keys, choose_next)
+    box.setToolTip(f"{box.toolTip()} ({native(keys)})")
 
 
 def make_equally_wide(fields: Iterable[QWidget]) -> None:

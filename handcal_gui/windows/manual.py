@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QModelIndex, QSize, Qt, QTimer, QUrl
-from PySide6.QtGui import QKeyEvent, QTextBlock, QTextCursor, QTextDocument
+from PySide6.QtGui import QAction, QKeyEvent, QTextBlock, QTextCursor, QTextDocument
 from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
@@ -20,10 +20,10 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.io.resources import resource_path
-from handcal_gui.keys import add_action
+from handcal_gui.keys import add_action, native
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import with_name
+from handcal_gui.widgets.fields import button, tool_button, with_name
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
@@ -130,8 +130,16 @@ class Manual(QWidget):
         self._shown: list[Line] = []
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
         self._settle.timeout.connect(self._show_next)
+        back = self._turn(tr("Back"), "←", "Alt+Left", self.page.backward)
+        forward = self._turn(tr("Forward"), "→", "Alt+Right", self.page.forward)
+        self.page.backwardAvailable.connect(back.setEnabled)
+        self.page.forwardAvailable.connect(forward.setEnabled)
+        turns = tool_button(back), tool_button(forward)
+        close = button("manualClose", tr("Cl&ose"))
+        close.clicked.connect(self.close)
+        row = *turns, (self.search, 1), self._count, close
         vbox(
-            hbox((self.search, 1), self._count, spacing=SPACING_PX),
+            hbox(*row, spacing=SPACING_PX),
             self.found,
             (self._lay_out_pages(), 1),
             on=self,
@@ -179,6 +187,13 @@ class Manual(QWidget):
             self.close()
         else:
             super().keyPressEvent(event)
+
+    def _turn(self, text: str, sign: str, keys: str, do: Callable[[], None]) -> QAction:
+        """Return an action that turns to a page shown before, or back."""
+        action = add_action(self, text, keys, do, tooltip=f"{text} ({native(keys)})")
+        action.setIconText(sign)
+        action.setEnabled(False)
+        return action
 
     def _lay_out_pages(self) -> QSplitter:
         label = QLabel(tr("&Contents"))
@@ -255,7 +270,9 @@ class Manual(QWidget):
         self.page.go_to_mark()
 
     def _show_line(self, line: Line) -> None:
-        self.page.setSource(QUrl.fromLocalFile(str(line.page)))
+        url = QUrl.fromLocalFile(str(line.page))
+        url.setFragment(f"line-{line.block}")  # or Back leads from a line past others of its page
+        self.page.setSource(url)
         self.page.go_to(self.page.document().findBlockByNumber(line.block))
 
 

@@ -111,7 +111,10 @@ def test_everything_is_exported_and_told(tmp_path: Path, record: SessionRecord) 
     shares = [share for _, share in told]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
-    assert {what for what, _ in told} > {info.title for info in FORMATS.values()}
+    titles = [f"Exporting {i} of 7, {info.title}" for i, info in enumerate(FORMATS.values(), 1)]
+    whats = {what for what, _ in told}
+    assert whats > set(titles)
+    assert f"{titles[0]}: solving alignment 2 of 2" in whats
     assert np.diff(asked_s).max() < 2.0  # about 0.3 s of work; matplotlib's import takes longest
 
 

@@ -37,7 +37,8 @@ def test_one_that_fails_is_named_and_spares_the_others(paths: list[Path], tmp_pa
     assert not (tmp_path / "out" / "b").exists()
     whats, shares = zip(*shown, strict=True)
     assert all(what.startswith(("1 of 3: ", "2 of 3: ", "3 of 3: ")) for what in whats)
-    assert any(what.startswith("3 of 3: Simulated wearer, ") for what in whats)
+    solving = "3 of 3: Simulated wearer, exporting 1 of 2, Parameters and trials (CSV): solving"
+    assert any(what.startswith(solving) for what in whats)
     assert list(shares) == sorted(shares)
 
 

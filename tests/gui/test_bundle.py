@@ -8,7 +8,7 @@ from importlib.metadata import version
 import pytest
 
 from handcal.sim.process import program_command
-from handcal_gui import bundle
+from handcal_gui import benchmark, bundle
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def test_it_runs_what_is_asked_for(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(sys, "argv", words)
-    monkeypatch.delitem(sys.modules, "handcal_gui.benchmark", raising=False)
+    monkeypatch.delitem(sys.modules, benchmark.__name__)
     with pytest.raises(SystemExit) as ended:
         bundle.main()
     assert not ended.value.code

@@ -30,7 +30,7 @@ from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.fields import plain_message, tool_button
+from handcal_gui.widgets.fields import let_keys_choose, plain_message, tool_button
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
@@ -76,6 +76,7 @@ class CameraPanel(QWidget):
         self._mode.setAccessibleName(tr("Displayed image"))
         self._mode.setToolTip(tr("Show the colour image, the depth image or both"))
         self._mode.addItems(list(Mode))
+        let_keys_choose(self._mode, self, tr("Next displayed image"), "M")
         self._mode.currentTextChanged.connect(lambda text: self._pictures.set_mode(Mode(text)))
         save = QAction(tr("Save image…"), self)
         save.triggered.connect(self._ask_where_to_save)

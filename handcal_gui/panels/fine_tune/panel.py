@@ -31,7 +31,7 @@ from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, sa
 from handcal_gui.panels.fine_tune.stream import Arrival, ShiftStream, find_obstacle
 from handcal_gui.theme import SPACING_PX, follow_theme, icon
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import tool_button
+from handcal_gui.widgets.fields import let_keys_choose, tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.result_rows import EYE_NAMES
 
@@ -302,12 +302,12 @@ class FineTunePanel(QWidget):
         self._both.setCheckable(True)
         self.reset_action = add(
             tr("Reset to solved"),
-            "",
+            "Shift+S",
             tr("Set φ to the one solved from the alignments, used or not"),
         )
         self.reset_action.triggered.connect(lambda: self._reset(self._solved))
         self._reset_offline = add(
-            tr("Reset to offline"), "", tr("Set φ to 0, the offline calibration")
+            tr("Reset to offline"), "Shift+B", tr("Set φ to 0, the offline calibration")
         )
         self._reset_offline.triggered.connect(lambda: self._reset(_OFFLINE))
         self.reset_action.setIconText(tr("Solved"))
@@ -352,6 +352,7 @@ class FineTunePanel(QWidget):
         for depth_m in TARGET_DEPTHS_M:
             self._depth.addItem(f"{depth_m:g} m", depth_m)
         self._depth.currentIndexChanged.connect(self._refresh)
+        let_keys_choose(self._depth, self, tr("Next distance of the target"), "D")
 
     def _lay_out(self) -> None:
         self._against = QLabel()

@@ -26,7 +26,7 @@ from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
-from handcal_gui.widgets.fields import paragraph
+from handcal_gui.widgets.fields import let_keys_choose, paragraph
 from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.number_table import NumberTable
@@ -308,11 +308,13 @@ class TrialsPanel(QWidget):
         self._eyes.addItem(tr("Eyes in turn"), None)
         self._eyes.setCurrentIndex(len(EYES))
         self._eyes.currentIndexChanged.connect(self._choose_eye)
+        let_keys_choose(self._eyes, self, tr("Next choice of the eye"), "E")
         self._depth.setAccessibleName(tr("Distance of the target"))
         self._depth.setToolTip(tr("Distance of the target from the eye, in metres"))
         for depth_m in TARGET_DEPTHS_M:
             self._depth.addItem(f"{depth_m:g} m", depth_m)
         self._depth.currentIndexChanged.connect(self._request_target)
+        let_keys_choose(self._depth, self, tr("Next distance of the target"), "D")
         self._shows_target.setToolTip(
             tr(
                 "Draw the target for this eye, at this distance straight ahead, until a "

@@ -372,7 +372,10 @@ class LibraryWindow(QDialog):
         opening = _pressed_for(self._open, main_button("openSession", self._open.text()))
         counts = hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX)
         shown = label_for(self._kind, tr("S&how"))
-        actions = hbox(1, *buttons, opening, spacing=SPACING_PX)
+        close = button("closeLibrary", tr("C&lose"))
+        close.setAutoDefault(False)
+        close.clicked.connect(self.reject)
+        actions = hbox(close, 1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
             hbox((self._search, 1), shown, self._kind, self._legend, spacing=SPACING_PX),

@@ -26,6 +26,7 @@ from handcal.link.server import HeadsetServer
 from handcal.rig_types import Rig
 from handcal.types import HeadsetIdentity
 from handcal_gui.dialogs.connect import ConnectDialog
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.qr_code import QrCode
 from tests.gui.helpers import child, letters, text
 
@@ -91,6 +92,16 @@ def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog)
     assert not child(dialog, QCheckBox, "squareSeen-left").isEnabled()
     assert len(text(dialog, "digits").replace(" ", "")) == 8
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
+
+
+def test_the_place_of_the_paired_headsets_says_what_will_be_there(dialog: ConnectDialog) -> None:
+    heading = next(one for one in dialog.findChildren(QLabel) if one.text() == "Paired headsets")
+    empty = child(dialog, QLabel, "noDevices")
+    assert empty.isVisible()
+    assert "is listed here" in empty.text()
+    between_px = empty.mapTo(dialog, empty.rect().topLeft()).y() - heading.geometry().bottom()
+    assert 0 < between_px <= 2 * SPACING_PX
+    assert empty.alignment() & Qt.AlignmentFlag.AlignTop
 
 
 def test_enter_keeps_the_code_that_is_being_typed(dialog: ConnectDialog) -> None:

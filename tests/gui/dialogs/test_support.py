@@ -21,9 +21,12 @@ def test_the_dialog_writes_a_bundle(
     dialog = SupportDialog(SupportSettings(tmp_path), tmp_path)
     qtbot.addWidget(dialog)
     dialog.show()
+    assert "to the handcal developers" in text(dialog, "supportAbout")
+    announced = text(dialog, "supportDoing")
     child(dialog, QPushButton, "writeBundle").click()
     qtbot.waitUntil(lambda: "was written" in text(dialog, "supportFound"), timeout=10_000)
-    assert len(list(tmp_path.glob("handcal-support-*.zip"))) == 1
+    [written] = tmp_path.glob("handcal-support-*.zip")
+    assert f"The file {written.name} will be written" in announced
     dialog.stop()
 
 

@@ -7,15 +7,19 @@ from collections.abc import Iterator
 from functools import partial
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QHelpEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QCheckBox,
+    QComboBox,
     QLineEdit,
     QPushButton,
+    QTabBar,
     QTabWidget,
     QToolButton,
+    QToolTip,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -28,6 +32,7 @@ from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.wizard import result_bar
 from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.record_tabs import RecordTabs
 from tests.gui.helpers import button, child, letters
 from tests.gui.views import all_views
 from tests.gui.window.conftest import Maker, press, say
@@ -189,11 +194,85 @@ def test_every_button_of_a_panel_has_a_letter_or_names_its_key(
         begin(program, snapshot, (1920, 1050), **changes)
         for docks in raised(qtbot, program):
             for dock in docks:
-                if dock.objectName() in ("fineTune", "results-panel"):
-                    continue
                 kinds = (QCheckBox, QPushButton, QToolButton)
                 for one in (found for kind in kinds for found in dock.findChildren(kind)):
                     entry = one.parentWidget()
                     told = entry.toolTip() if isinstance(entry, LegendEntry) else one.toolTip()
                     has_key = "&" in one.text() or re.search(r"\(.+\)", told)
                     assert has_key or not one.isVisible(), (one.text(), told)
+
+
+def test_lists_of_panels_name_the_key_that_chooses_their_next_entry(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    begin(program, snapshot, (1920, 1050))
+    window = program.window
+    window.activateWindow()
+    qtbot.waitActive(window)
+    keys = {"trials": [Qt.Key.Key_E, Qt.Key.Key_D], "fine_tune": [Qt.Key.Key_D]}
+    for name, chosen in {"camera": [Qt.Key.Key_M], **keys}.items():
+        window.go_to(name)
+        qtbot.waitUntil(partial(is_in_sight, window.docks[name]))
+        boxes = window.docks[name].findChildren(QComboBox)
+        assert len(boxes) == len(chosen)
+        for box, key in zip(boxes, chosen, strict=True):
+            assert box.toolTip().endswith(f"({key.name.removeprefix('Key_')})")
+            before, seen = box.currentText(), set()
+            for _ in range(box.count()):
+                press(window, key)
+                seen.add(box.currentText())
+            assert len(seen) == box.count()
+            assert box.currentText() == before
+
+
+def test_keys_reset_what_is_fine_tuned(qtbot: QtBot, program: Program, snapshot: Maker) -> None:
+    begin(program, snapshot, (1920, 1050))
+    window, panel = program.window, program.window.panels.fine_tune
+    window.activateWindow()
+    qtbot.waitActive(window)
+    window.go_to("fine_tune")
+    shift = Qt.KeyboardModifier.ShiftModifier
+    for key, is_offline in ((Qt.Key.Key_B, True), (Qt.Key.Key_S, False)):
+        press(window, key, shift)
+        assert [not part.any() for part in panel.shift_m().values()] == [is_offline] * 2
+
+
+def test_ctrl_tab_shows_the_next_tab_of_a_panel(
+    qtbot: QtBot, program: Program, snapshot: Maker
+) -> None:
+    begin(program, snapshot, (1920, 1050))
+    window = program.window
+    window.activateWindow()
+    qtbot.waitActive(window)
+    for name in ("trials", "session"):
+        window.docks[name].raise_()
+        tabs = child(window.docks[name], RecordTabs)
+        tabs.currentWidget().setFocus()
+        for place in (1, 2, 0):
+            press(window, Qt.Key.Key_Tab, Qt.KeyboardModifier.ControlModifier)
+            assert tabs.currentIndex() == place
+
+
+def test_tabs_of_panels_name_their_keys_also_where_they_are_icons(
+    program: Program, snapshot: Maker
+) -> None:
+    for size_px in ((960, 510), (1920, 1050)):
+        begin(program, snapshot, size_px)
+        program.window.reset_layout()
+        QApplication.processEvents()
+        direct = Qt.FindChildOption.FindDirectChildrenOnly
+        bars = program.window.findChildren(QTabBar, options=direct)
+        tabs = {
+            bar.tabText(i): bar.tabToolTip(i)
+            for bar in bars
+            if bar.isVisible()
+            for i in range(bar.count())
+        }
+        assert tabs["Session"] == "Session (Ctrl+8)"
+        [bar] = [one for one in bars if one.isVisible()]
+        place = bar.tabRect(1).center()
+        help_wanted = QHelpEvent(QEvent.Type.ToolTip, place, bar.mapToGlobal(place))
+        QApplication.sendEvent(bar, help_wanted)
+        assert QToolTip.text() == bar.tabToolTip(1)
+        QToolTip.hideText()
+        assert all(tip.startswith(f"{text} (Ctrl+") for text, tip in tabs.items())

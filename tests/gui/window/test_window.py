@@ -155,7 +155,8 @@ def test_every_tab_is_in_sight_and_says_what_it_is(
     }
     for i in range(bar.count()):
         assert bar.tabIcon(i).isNull() != is_small
-        assert bar.tabToolTip(i) == bar.tabText(i)
+        place = 1 + [one.windowTitle() for one in window.docks.values()].index(bar.tabText(i))
+        assert bar.tabToolTip(i) == f"{bar.tabText(i)} (Ctrl+{place})"
     assert not any(arrow.isVisible() for arrow in bar.findChildren(QToolButton))
     assert all(has_title(window, name) == is_small for name in group)
 

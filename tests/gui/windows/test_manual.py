@@ -11,13 +11,14 @@ import pytest
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QImage, QTextDocument
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.theme import SPACING_PX, use_theme
 from handcal_gui.windows import manual_page
 from handcal_gui.windows.excerpts import Excerpts, excerpt, pattern_of
 from handcal_gui.windows.manual import Manual, find_lines, read_lines
+from tests.gui.helpers import child, letters
 from tests.helpers import ROOT
 
 PAGES = sorted((ROOT / "docs").glob("*.md"))
@@ -53,6 +54,61 @@ def test_a_link_leads_to_the_heading_of_another_page_and_back(manual: Manual) ->
     assert manual.page.verticalScrollBar().value() > 0
     manual.page.backward()
     assert manual.page.source().fileName() == "index.md"
+
+
+def test_keys_and_buttons_lead_back_and_forward_after_a_link_and_a_search(
+    qtbot: QtBot, manual: Manual
+) -> None:
+    alt = Qt.KeyboardModifier.AltModifier
+    with qtbot.waitActive(manual):
+        manual.open("docs/guide.md")
+    back, forward = (
+        one
+        for one in manual.findChildren(QToolButton)
+        if one.accessibleName() in ("Back", "Forward")
+    )
+    tips = [one.toolTip() for one in (back, forward)]
+    assert tips == ["Back (Alt+Left)", "Forward (Alt+Right)"]
+    assert not back.isEnabled()
+    assert not forward.isEnabled()
+    manual.page.setSource(manual.page.source().resolved(QUrl("guide.md#calibrate")))
+    before_px = manual.page.verticalScrollBar().value()
+    assert before_px > 0
+    manual.search.setText("target")
+    QTest.keyClick(manual.search, Qt.Key.Key_Return)
+    for _ in range(2):  # to further lines of the same page
+        QTest.keyClick(manual.search, Qt.Key.Key_Return)
+    assert manual.page.source().fileName() == "guide.md"
+    hit_px = manual.page.verticalScrollBar().value()
+    assert hit_px != before_px
+    for _ in range(3):
+        QTest.keyClick(manual.search, Qt.Key.Key_Left, alt)
+    assert manual.page.verticalScrollBar().value() == before_px
+    assert manual.page.extraSelections(), "the words are still searched for"
+    back.click()
+    assert manual.page.verticalScrollBar().value() == 0
+    assert not back.isEnabled()
+    for _ in range(4):
+        QTest.keyClick(manual.page, Qt.Key.Key_Right, alt)
+    assert manual.page.verticalScrollBar().value() == hit_px
+    assert not forward.isEnabled()
+    manual.page.setSource(QUrl("export.md"))
+    assert manual.page.extraSelections()
+    QTest.keyClick(manual.page, Qt.Key.Key_Left, alt)
+    assert manual.page.source().fileName() == "guide.md"
+    assert manual.page.extraSelections()
+
+
+def test_a_button_closes_it_where_the_search_has_words(manual: Manual) -> None:
+    manual.open("docs/guide.md")
+    manual.resize(960, 510)
+    manual.search.setText("nosuchword")
+    QApplication.processEvents()
+    close = child(manual, QPushButton, "manualClose")
+    assert letters(manual) == ["o", "c"]
+    assert manual.search.width() > 300
+    close.click()
+    assert not manual.isVisible()
 
 
 def test_a_picture_is_no_page_and_never_wider_than_the_window(manual: Manual) -> None:

@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
@@ -211,6 +211,18 @@ def test_every_button_has_a_letter_of_its_own(window: LibraryWindow) -> None:
     texts = [one.text() for one in window.findChildren(QPushButton) if one.objectName() != "cancel"]
     letters = [text[text.index("&") + 1].casefold() for text in texts]
     assert len(set(letters)) == len(letters)
+
+
+def test_a_button_closes_it_and_leaves_the_others_their_room(
+    qtbot: QtBot, window: LibraryWindow
+) -> None:
+    window.resize(960, 510)
+    QApplication.processEvents()
+    assert window.width() == 960
+    for one in window.findChildren(QPushButton):
+        assert one.width() >= one.sizeHint().width() or not one.isVisible(), one.text()
+    with qtbot.waitSignal(window.rejected):  # as Esc does
+        child(window, QPushButton, "closeLibrary").click()
 
 
 def test_a_narrow_window_leaves_out_columns_and_cuts_none(
