@@ -168,10 +168,6 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Exposure</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Of the depth image; a frame lasts 33,333 µs.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -205,6 +201,10 @@
     </message>
     <message>
         <source>Size and rate of both depth and colour images.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Exposure of depth</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -244,7 +244,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>&amp;Exposure</source>
+        <source>&amp;Exposure of depth</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -524,15 +524,15 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Paired headset</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Device</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>No headset is paired yet.</source>
+        <source>Name</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>None yet. Each headset that pairs is listed here.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -711,7 +711,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Choose a folder, write one file there, and send it with a bug report. It contains the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced; nothing from sessions, and camera frames only if you add a recording here.</source>
+        <source>Choose a folder, write one file there, and send it with a bug report to the handcal developers. It contains the checks of the installation, package versions, and the log, in which wearers&apos; names, your user name and the home folder are replaced; nothing from sessions, and camera frames only if you add a recording here.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -732,6 +732,10 @@ local network can read them.</source>
     </message>
     <message>
         <source>None</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The file {} will be written to the folder.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -824,6 +828,22 @@ local network can read them.</source>
     </message>
     <message>
         <source>Tab</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alt+Left, Alt+Right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In the manual: go back or forward</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ctrl+Tab</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Show the next tab, while the focus is in one</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2154,6 +2174,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Next displayed image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Save image…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2500,6 +2524,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>Distance of the target from the eye, in metres</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next distance of the target</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2980,11 +3008,11 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>✓ Hold still</source>
+        <source>▲ Shape differs</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>▲ Shape differs</source>
+        <source>✓ Straight</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3239,6 +3267,10 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Next choice of the eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Record the error of the calibrated φ relative to the φ set by hand (T)</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3284,8 +3316,8 @@ and record which fits the hand better. The report says which was which.</source>
     </message>
     <message>
         <source>The error of each trial, the mean over the target&apos;s four corners. At each
-distance: the mean of the n trials, and one standard deviation (SD) of the
-trials above and below it. A single trial has no SD.</source>
+distance: the mean of the n trials of both eyes, and one standard deviation (SD)
+of the trials above and below it, but not below 0. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3353,11 +3385,11 @@ trials above and below it. A single trial has no SD.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Now</source>
+        <source>the headset draws it</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the headset draws it</source>
+        <source>Error</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4380,10 +4412,6 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Which calibration method is most accurate for the same wearers, and how much effort does it require? 100 wearers take about eleven minutes on two cores.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The errors and effort of each method will be shown here, beside published ones.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4429,6 +4457,10 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>The mean error of each solver over rotation and noise will be shown here, and up to where it stays within 4 mm.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Which calibration method is most accurate for the same simulated wearers, and how much effort does it require? 100 simulated wearers take about eleven minutes on two cores.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4609,10 +4641,6 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>The display in front of the camera.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Grid squares</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4808,6 +4836,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>C&amp;lose</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>This folder does not exist. Calibrate a wearer, which creates it, or choose another session folder on the start page.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4957,6 +4989,14 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Line</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Back</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Forward</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5125,6 +5165,14 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Change the entries for another study.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Change the entries, or run again if files have changed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Run again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5508,19 +5556,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Mean, ′</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Accept the rig</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>For each eye, put the viewpoint camera behind its display. In a dark room, take images of the grid. Do not move camera or headset: switch the display off, and take images of the board with both cameras at {} or more distances, 0.35 to 0.65 m.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Largest, ′ (at most {:g})</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5553,6 +5589,18 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Open re&amp;port</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For each eye, put the viewpoint camera behind its display. In a dark room, take images of the grid. Do not move camera or headset: switch the display off, and take images of the board with both cameras at {} or more distances, 0.35 to 0.65 m. The rig passes if the board&apos;s corners as drawn are on average at most {:g}′ from those seen.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Mean, ′ (at most {:g})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Largest, ′</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5740,6 +5788,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>In use: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Calibrated: {}.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5840,10 +5892,6 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Images of the grid</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Grid images</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5853,10 +5901,6 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Board images</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Angle of a square</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5892,23 +5936,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Poses of the board</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Rendering camera&apos;s pose</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Screen&apos;s distance</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Measured distance</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Nominal distance</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5916,15 +5944,55 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Searc&amp;h again</source>
+        <source>Images of t&amp;he grid</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Grid on the &amp;display</source>
+        <source>Images o&amp;f the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Poses of the board</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>S&amp;tereo calibration</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>R&amp;endering camera&apos;s pose</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>S&amp;creen&apos;s distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Me&amp;asured distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>An&amp;gle of a square</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Nominal &amp;distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Find the grid &amp;again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Find t&amp;he board again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Ca&amp;mera pose</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Grid on the displa&amp;y</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5984,6 +6052,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Find the board &amp;again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Images</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6017,10 +6089,6 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>&amp;Take images…</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Search &amp;again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6140,22 +6208,6 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} of {} findings are doubtful: see Check</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>no doubtful findings</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>; {} are not known</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>; not calibrated here, as in the initial rig: {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Save the rig file</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6234,11 +6286,35 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} failed</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} doubtful (see Check)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} not calibrated here: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} not known</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>none doubtful</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>save the rig file to use it</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>solve these steps, or save the rig file to use it as it is</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>do what Acceptance says, and accept the rig again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6434,10 +6510,6 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Take 20 or more pairs of simultaneous images of the board: near and far, in all parts of both views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end in the same number, such as depth07.png and headset07.png.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Depth imager&apos;s intrinsics</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6454,15 +6526,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Depth camera&apos;s images</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Depth images</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Its intrinsics</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6470,7 +6534,27 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Headset camera&apos;s images</source>
+        <source>Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end in the same number, such as depth07.png and headset07.png.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Depth camera&apos;s images</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Its in&amp;trinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Depth ima&amp;ger&apos;s intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>L&amp;ens</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Headset camera&apos;s images</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6478,7 +6562,15 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Its intrinsi&amp;cs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Headset intrinsics</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Pose &amp;from depth to colour</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6510,6 +6602,14 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} tilted</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} near, {} far, {} tilted</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose the cameras and press Show.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6519,6 +6619,10 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Press Take while nothing moves. Close when there are enough.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Near: the board would be half as wide as the view or more; far: a third or less. Tilted: by 20° or more from the line of sight.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6554,7 +6658,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Covered by the board so far:</source>
+        <source>Covered so far:</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6574,15 +6678,15 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Take 20 or more images of the board with the viewpoint camera, with the focus that it will have behind the display: in all parts of the view up to its edges, tilted by 20° to 45° in all directions.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Intrinsics</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Viewpoint camera&apos;s images</source>
+        <source>Take {} or more images of the board with the viewpoint camera, with the focus that it will have behind the display: in all parts of the view up to its edges, tilted by 20° to 45° in all directions.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Viewpoint camera&apos;s images</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
