@@ -104,7 +104,7 @@ class CalibrationController(QObject):
         self._visible: set[object] = set()  # panels
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
-        self._failed_command = self._notes_problem = ""
+        self._failed_command = self._failure = self._notes_problem = ""
         self._shown_ns = self._count = 0  # time of the snapshot shown, and number of those shown
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL_MS)
@@ -218,9 +218,7 @@ class CalibrationController(QObject):
         self._wizard_panel.asked.connect(self.do)
         self._wizard_panel.nudged.connect(self._nudge)
         self._wizard_panel.went_back.connect(self._go_back)
-        self._wizard_panel.step_changed.connect(
-            lambda step: self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
-        )
+        self._wizard_panel.step_changed.connect(self._on_step)
         for name, dock in self._window.docks.items():
             dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
         panels.session.notes_changed.connect(self._save_notes)
@@ -331,6 +329,11 @@ class CalibrationController(QObject):
         self._timer.start()
         self.opened.emit(station.session.path)
 
+    def _on_step(self, step: Step) -> None:
+        self._window.bring_up(_PANELS_OF_STEPS.get(step, ""))
+        if self._failure and self._window.banner.text == self._failure:
+            self._window.banner.clear()  # the action has been taken elsewhere, or is obsolete
+
     def _on_command_done(self, name: str, _answer: object) -> None:
         if name == _SAVING:
             self._notes_problem = ""
@@ -346,6 +349,7 @@ class CalibrationController(QObject):
                 return
             self._notes_problem = text
         self._failed_command = name
+        self._failure = text if name in set(Action) else ""
         self._window.banner.show_message(text)
 
     def _on_doubted(self, name: str, why: str) -> None:

@@ -13,7 +13,9 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal_gui.engine.engine_thread import EngineThread
+from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 
@@ -82,11 +84,14 @@ class Stream:
 
 
 @pytest.fixture
-def stream(
-    qtbot: QtBot, tmp_path: Path, snapshot: MakeSnapshot, monkeypatch: pytest.MonkeyPatch
-) -> Stream:
-    program = Program(PreferencesFile(tmp_path / "preferences.json"))
-    qtbot.addWidget(program.window)
+def program(qtbot: QtBot, tmp_path: Path) -> Program:
+    made = Program(PreferencesFile(tmp_path / "preferences.json"))
+    qtbot.addWidget(made.window)
+    return made
+
+
+@pytest.fixture
+def stream(program: Program, snapshot: MakeSnapshot, monkeypatch: pytest.MonkeyPatch) -> Stream:
     return Stream(program, snapshot, monkeypatch)
 
 
@@ -128,3 +133,20 @@ def test_a_hidden_link_panel_keeps_its_history(stream: Stream) -> None:
     stream.see(0.0)
     assert len(stream.shown["link"]) == 1
     assert not stream.shown["session"]
+
+
+def test_a_failed_action_is_no_longer_told_at_the_next_step(
+    program: Program, snapshot: MakeSnapshot
+) -> None:
+    guide, banner = program.wizard_panel, program.window.banner
+    guide.show_snapshot(snapshot(State.ALIGN))
+    program.live._on_command_failed(Action.CONFIRM, "the hand moves")
+    assert banner.text == "Could not confirm: the hand moves"
+    guide.show_snapshot(snapshot(State.ALIGN))
+    assert banner.text
+    guide.show_snapshot(snapshot(State.ALIGNED))  # confirmed in the headset
+    assert banner.text == ""
+    program.live._on_command_failed(Action.CONFIRM, "the hand moves")
+    banner.show_message("another message")
+    guide.show_snapshot(snapshot(State.ALIGN))
+    assert banner.text == "another message"
