@@ -31,8 +31,14 @@ PICTURE_HELP = tr(
 
 def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
     """Return a picture of two bars for each eye; an after bar is full if the eye is accepted."""
-    bars = tuple(eyes.get(eye) for eye in EYES)
+    bars = tuple(eyes.get(eye) if has_bars(eyes) else None for eye in EYES)
     return _draw(bars, colors(), QGuiApplication.primaryScreen().devicePixelRatio())
+
+
+def has_bars(eyes: Mapping[Eye, EyeOutcome]) -> bool:
+    """Return whether an error of an eye is known: results of the first versions have none."""
+    errors = (error for one in eyes.values() for error in (one.before_arcmin, _after(one)))
+    return any(error is not None for error in errors)
 
 
 def error_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
@@ -47,7 +53,7 @@ def error_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
 
 def picture_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
     """Return the same as text, with what the bars mean; empty if there is no picture."""
-    return f"{error_text(eyes)}\n{PICTURE_HELP}" if eyes else ""
+    return f"{error_text(eyes)}\n{PICTURE_HELP}" if has_bars(eyes) else ""
 
 
 def _after(one: EyeOutcome) -> float | None:

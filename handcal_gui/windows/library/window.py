@@ -29,7 +29,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text, limit_length
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.error_bars import PICTURE_HELP, PICTURE_LEGEND
+from handcal_gui.widgets.error_bars import PICTURE_HELP, PICTURE_LEGEND, has_bars
 from handcal_gui.widgets.fields import (
     button,
     choice,
@@ -156,7 +156,7 @@ class LibraryWindow(QDialog):
         shown = {row.entry.path for row in before.rows}
         made = {row.entry.path for row in contents.rows} - shown if self._is_read else set()
         self._is_read = True
-        self._legend.setVisible(any(row.entry.eyes for row in contents.rows))
+        self._legend.setVisible(any(has_bars(row.entry.eyes) for row in contents.rows))
         if contents.rows != before.rows:
             self._sessions.show_rows(contents.rows)
             self._table.fit_columns()
