@@ -37,7 +37,7 @@ def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
 
 def has_bars(eyes: Mapping[Eye, EyeOutcome]) -> bool:
     """Return whether an error of an eye is known: results of the first versions have none."""
-    errors = (error for one in eyes.values() for error in (one.before_arcmin, _after(one)))
+    errors = (error for one in eyes.values() for error in (one.before_arcmin, after_arcmin(one)))
     return any(error is not None for error in errors)
 
 
@@ -45,7 +45,7 @@ def error_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
     """Return the same as text, a line for each eye."""
     return "\n".join(
         tr("{}: {} before, {} after").format(
-            EYE_NAMES[eye], _arcmin(one.before_arcmin), _arcmin(_after(one))
+            EYE_NAMES[eye], _arcmin(one.before_arcmin), _arcmin(after_arcmin(one))
         )
         for eye, one in eyes.items()
     )
@@ -56,7 +56,8 @@ def picture_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
     return f"{error_text(eyes)}\n{PICTURE_HELP}" if has_bars(eyes) else ""
 
 
-def _after(one: EyeOutcome) -> float | None:
+def after_arcmin(one: EyeOutcome) -> float | None:
+    """Return the error after the calibration, and after its verification if there was one."""
     return one.expected_arcmin if one.remaining_arcmin is None else one.remaining_arcmin
 
 
@@ -79,7 +80,7 @@ def _draw(eyes: tuple[EyeOutcome | None, ...], now: Colors, ratio: float) -> QPi
         top = 1.0 + i * (2 * _BAR_PX + 4)
         painter.fillRect(_bar(one.before_arcmin, top), QColor(now.muted))
         shade = QColor(getattr(now, VERDICT_COLORS.get(cast(VerdictName, one.verdict), "muted")))
-        after = _bar(_after(one), top + _BAR_PX + 1)
+        after = _bar(after_arcmin(one), top + _BAR_PX + 1)
         if one.verdict == "accept":
             painter.fillRect(after, shade)
         else:

@@ -60,7 +60,6 @@ from handcal_gui.windows.library.tasks import (
 )
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of, trend_text
 
-_TREND_PX = 20 * SPACING_PX
 _TASK = tr(
     "Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them."
 )
@@ -106,7 +105,7 @@ class LibraryWindow(QDialog):
         self._legend = with_name(QLabel(PICTURE_LEGEND), "legend", help_text=PICTURE_HELP)
         self._count = paragraph("count", tr("Reading {}…").format(folder))
         self._trend = TrendPlot()
-        self._trend.setMinimumHeight(_TREND_PX)
+        self._trend.setMinimumHeight(20 * SPACING_PX)
         self._trend_title = paragraph("trendTitle")
         self._message = paragraph("message")
         self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -187,11 +186,9 @@ class LibraryWindow(QDialog):
         self._delete.setEnabled(is_free and bool(chosen))
         self._refresh_undo()
         shown, total = len(self._sessions.shown), len(self._sessions.rows)
-        count = (
-            pluralize(total, tr("session"), tr("sessions"))
-            if shown == total
-            else tr("{} of {} sessions").format(shown, total)
-        )
+        count = pluralize(total, tr("session"), tr("sessions"))
+        if shown != total:
+            count = tr("{} of {} sessions").format(shown, total)
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
         if self._is_read:
             self._table.show_reason(self._contents.is_missing)
@@ -214,6 +211,7 @@ class LibraryWindow(QDialog):
         self._undo.setVisible(bool(text))
         self._undo.setEnabled(bool(text) and not self._jobs.is_busy)
         self._change_text.setText(text)
+        self._change_text.setVisible(bool(text))  # or it halves the line of the count
 
     def _show_trend(self, wearer: str) -> None:
         found = calibrations_of(wearer, [row.entry for row in self._sessions.rows])
@@ -350,7 +348,8 @@ class LibraryWindow(QDialog):
         self._change_text = ElidedLabel()
         self._change_text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         below = QWidget()
-        vbox(self._trend_title, (self._trend, 1), on=below, margins=0, spacing=0)
+        title = hbox((self._trend_title, 1), self._table.left_out, spacing=SPACING_PX)
+        vbox(title, (self._trend, 1), on=below, margins=0, spacing=0)
         halves = QSplitter(Qt.Orientation.Vertical)
         halves.addWidget(self._table)
         halves.addWidget(below)
@@ -370,16 +369,14 @@ class LibraryWindow(QDialog):
         )
         # Enter in the search opens the first session that it finds.
         opening = _pressed_for(self._open, main_button("openSession", self._open.text()))
-        counts = hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX)
         shown = label_for(self._kind, tr("S&how"))
-        actions = hbox(1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
             hbox((self._search, 1), shown, self._kind, self._legend, spacing=SPACING_PX),
             (halves, 1),
-            counts,
+            hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX),
             self._said,
-            actions,
+            hbox(1, *buttons, opening, spacing=SPACING_PX),
             on=self,
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,

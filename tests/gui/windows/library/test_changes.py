@@ -44,9 +44,9 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
     qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
     assert (folder / "cid-repaired").is_dir()
     assert not Session.open(folder / "cid-repaired").damaged
-    states = [row[8] for row in rows(window)]
+    states = [row[9] for row in rows(window)]
     assert states.count("Unfinished, repaired copy") == 1
-    state = table(window).model().index(states.index("Damaged, has a copy"), 8)
+    state = table(window).model().index(states.index("Damaged, has a copy"), 9)
     assert "Repaired in cid-repaired" in state.data(Qt.ItemDataRole.ToolTipRole)
     assert [entry.path.name for entry in window.chosen] == ["cid-repaired"]
 
