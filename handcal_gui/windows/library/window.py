@@ -45,7 +45,7 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.result_rows import NOTHING
 from handcal_gui.widgets.session_rows import RESUME_HELP
-from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel
+from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel, is_damaged
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
     Change,
@@ -95,6 +95,7 @@ class LibraryWindow(QDialog):
         self._folder = folder
         self._contents = Contents()
         self._changes: list[Change] = [()]
+        self._found_damaged: set[Path] = set()  # by the last check, which reads more
         self._is_read = False
         self._sessions = SessionsModel()
         self._search = with_name(QLineEdit(), "search", tr("Search"))
@@ -182,7 +183,8 @@ class LibraryWindow(QDialog):
         self._show_folder.setEnabled(len(chosen) == 1)
         self._copy.setEnabled(bool(chosen))
         self._check.setEnabled(is_free and bool(chosen))
-        self._repair.setEnabled(is_free and len(chosen) == 1)
+        damaged = [one for one in readable if is_damaged(one) or one.path in self._found_damaged]
+        self._repair.setEnabled(is_free and len(chosen) == len(damaged) == 1)
         self._delete.setEnabled(is_free and bool(chosen))
         self._refresh_undo()
         shown, total = len(self._sessions.shown), len(self._sessions.rows)
@@ -234,7 +236,8 @@ class LibraryWindow(QDialog):
         self.export_requested.emit([entry.path for entry in self.chosen])
 
     def _check_chosen(self) -> None:
-        self._start(partial(check_sessions, [entry.path for entry in self.chosen]))
+        self._found_damaged.clear()
+        self._start(partial(check_sessions, [one.path for one in self.chosen], self._found_damaged))
 
     def _repair_chosen(self) -> None:
         self._start(partial(repair_beside, self.chosen[0].path))
@@ -323,7 +326,7 @@ class LibraryWindow(QDialog):
             tr("&Check"), "", self._check_chosen, tr("Read every file of the selected sessions")
         )
         self._repair = self._act(
-            tr("Re&pair"), "", self._repair_chosen, tr("Copy what is sound to a new session")
+            tr("Re&pair"), "", self._repair_chosen, tr("Copy what is sound of a damaged session")
         )
         self._delete = self._act(
             tr("&Delete"), "Del", self._delete_chosen, tr("Delete the selected sessions (Del)")
