@@ -220,9 +220,10 @@ class SeparateWindows(QObject):
             opened[0].raise_()
             opened[0].activateWindow()
             return opened[0]
+        self._start.keep_entries(self._current)
         entries = self._current.now.evaluation
         if not entries.users.sessions:
-            users = replace(entries.users, sessions=self._start.new.settings.sessions)
+            users = replace(entries.users, sessions=self._current.now.station.sessions)
             entries = replace(entries, users=users)
         window = EvaluationWindow(make_specs(), entries, self._window)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -281,6 +282,8 @@ class SeparateWindows(QObject):
         self._current.change(export=settings, export_folder=str(folder))
 
     def _remember_evaluation(self, entries: EvaluationEntries) -> None:
+        if entries.users.sessions == self._current.now.station.sessions:  # which may be changed
+            entries = replace(entries, users=replace(entries.users, sessions=""))
         self._current.change(evaluation=entries)
 
 

@@ -31,15 +31,21 @@ PICTURE_HELP = tr(
 
 def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
     """Return a picture of two bars for each eye; an after bar is full if the eye is accepted."""
-    bars = tuple(eyes.get(eye) for eye in EYES)
+    bars = tuple(eyes.get(eye) if has_bars(eyes) else None for eye in EYES)
     return _draw(bars, colors(), QGuiApplication.primaryScreen().devicePixelRatio())
+
+
+def has_bars(eyes: Mapping[Eye, EyeOutcome]) -> bool:
+    """Return whether an error of an eye is known: results of the first versions have none."""
+    errors = (error for one in eyes.values() for error in (one.before_arcmin, after_arcmin(one)))
+    return any(error is not None for error in errors)
 
 
 def error_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
     """Return the same as text, a line for each eye."""
     return "\n".join(
         tr("{}: {} before, {} after").format(
-            EYE_NAMES[eye], _arcmin(one.before_arcmin), _arcmin(_after(one))
+            EYE_NAMES[eye], _arcmin(one.before_arcmin), _arcmin(after_arcmin(one))
         )
         for eye, one in eyes.items()
     )
@@ -47,10 +53,11 @@ def error_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
 
 def picture_text(eyes: Mapping[Eye, EyeOutcome]) -> str:
     """Return the same as text, with what the bars mean; empty if there is no picture."""
-    return f"{error_text(eyes)}\n{PICTURE_HELP}" if eyes else ""
+    return f"{error_text(eyes)}\n{PICTURE_HELP}" if has_bars(eyes) else ""
 
 
-def _after(one: EyeOutcome) -> float | None:
+def after_arcmin(one: EyeOutcome) -> float | None:
+    """Return the error after the calibration, and after its verification if there was one."""
     return one.expected_arcmin if one.remaining_arcmin is None else one.remaining_arcmin
 
 
@@ -73,7 +80,7 @@ def _draw(eyes: tuple[EyeOutcome | None, ...], now: Colors, ratio: float) -> QPi
         top = 1.0 + i * (2 * _BAR_PX + 4)
         painter.fillRect(_bar(one.before_arcmin, top), QColor(now.muted))
         shade = QColor(getattr(now, VERDICT_COLORS.get(cast(VerdictName, one.verdict), "muted")))
-        after = _bar(_after(one), top + _BAR_PX + 1)
+        after = _bar(after_arcmin(one), top + _BAR_PX + 1)
         if one.verdict == "accept":
             painter.fillRect(after, shade)
         else:

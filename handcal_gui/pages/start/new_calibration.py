@@ -32,7 +32,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import limit_length
 from handcal_gui.widgets.fields import button, main_button, paragraph, with_name
 from handcal_gui.widgets.key_cap import KeyCap
-from handcal_gui.widgets.layouts import hbox, keep_space, scrollable, vbox
+from handcal_gui.widgets.layouts import fit_soon, hbox, keep_space, scrollable, vbox
 from handcal_gui.widgets.sentence import sentence
 
 Check = Callable[[StationSettings, str, Progress], Mapping[Part, Finding]]
@@ -82,7 +82,7 @@ class NewCalibration(Card):
         self.setObjectName("newCalibration")
         self._key = pairing_key
         self._starting: str | None = None
-        self._is_opening = False
+        self._is_opening = self._is_low = False
         self._wearer = with_name(QComboBox(), "wearer", tr("Wearer's name or code"))
         name = QLineEdit(placeholderText=tr("Name or code"))
         limit_length(name, MAX_WEARER_CHARACTERS)
@@ -175,9 +175,10 @@ class NewCalibration(Card):
         self.check()
 
     def fit(self, *, is_low: bool) -> None:
-        """Leave out the text that only greets, and set the form closer, where height is scarce."""
-        self.hint.setVisible(not is_low)
+        """Set the form closer where height is scarce, and leave out the hint if it has no room."""
+        self._is_low = is_low
         self._form.fit(is_low=is_low)
+        self._fit_soon.start()
 
     def check(self) -> None:
         """Check the station with the settings shown, unless it may be in use or being opened.
@@ -293,6 +294,15 @@ class NewCalibration(Card):
             and (new is None or (is_here and not isinstance(new, QAbstractButton)))
         )
 
+    def _fit_hint(self) -> None:
+        """Show the hint in a low page only where the form then needs no scrolling."""
+        area = self._scrolled
+        hint_px = self.hint.heightForWidth(self.contentsRect().width() - 4 * SPACING_PX)
+        hint_px += SPACING_PX // 2
+        room_px = area.viewport().height() + (0 if self.hint.isHidden() else hint_px)
+        form_px = self._form.heightForWidth(area.viewport().width())
+        self.hint.setVisible(not self._is_low or form_px + hint_px <= room_px)
+
     def _drop_blanks(self, typed: str) -> None:
         """Take no blanks before a name: the space bar pressed the former page's button."""
         if typed != typed.lstrip():
@@ -317,7 +327,10 @@ class NewCalibration(Card):
         last = hbox(
             (self._problem, 1), self._cancel, self._start_key, self._button, spacing=SPACING_PX
         )
-        form = scrollable(self._form)
+        self._scrolled = form = scrollable(self._form)
+        self._fit_soon = fit_soon(self._fit_hint, self)
+        self._form.changed.connect(self._fit_soon.start)
+        form.verticalScrollBar().rangeChanged.connect(lambda *_: self._fit_soon.start())
         # Or the page around it would scroll, and hide the button.
         form.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self.body.addWidget(form, 1)

@@ -23,6 +23,7 @@ from handcal_gui.widgets.error_bars import (
     PICTURE_LEGEND,
     PICTURE_PX,
     error_bars,
+    has_bars,
     picture_text,
 )
 from handcal_gui.widgets.fields import button, paragraph, plain_tooltip, with_name
@@ -83,7 +84,7 @@ class SessionList(QWidget):
     def show_entries(self, entries: Sequence[Entry]) -> None:
         """Replace the entries, keeping the selection if it is still listed and none is newer."""
         before, self._entries = {entry.path for entry in self._entries}, entries
-        has_pictures = any(entry.eyes for entry in entries)
+        has_pictures = any(has_bars(entry.eyes) for entry in entries)
         kept = self._list.currentItem()
         kept_path = kept.data(Qt.ItemDataRole.UserRole) if kept is not None else None
         newest = next((entry.path for entry in entries if entry.is_enabled), None)

@@ -23,6 +23,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
+from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.record_tabs import RecordTabs
@@ -82,7 +83,7 @@ class SessionPanel(QWidget):
             "alignments",
             tr("Alignments"),
             ALIGNMENT_COLUMNS,
-            tr("Confirmed alignments appear here"),
+            tr("Confirmed alignments appear here once they are written"),
         )
         self._alignments.delete_requested.connect(partial(self.delete_requested.emit, "alignment"))
         self._trials = RecordTable(
@@ -94,6 +95,8 @@ class SessionPanel(QWidget):
         self._trials.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
         self._notes = NotesEditor()
         self._notes.changed.connect(self.notes_changed)
+        self._unwritten = paragraph("unwritten")
+        self._unwritten.hide()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
             lambda deletion: self.restore_requested.emit(deletion.kind, deletion.number)
@@ -110,6 +113,11 @@ class SessionPanel(QWidget):
         results = snapshot.procedure.results
         if snapshot.record is not self._record or results is not self._results:
             self.show_record(snapshot.record, results)
+        left = snapshot.procedure.alignments.keys() - snapshot.record.alignments.keys()
+        count = len(left) if snapshot.not_stored else 0
+        held = pluralize(count, tr("alignment"), tr("alignments"))
+        self._unwritten.setText(tr("{} not written yet.").format(held))
+        self._unwritten.setVisible(bool(count))
 
     def show_record(self, record: SessionRecord, results: Results | None) -> None:
         """Show a session.
@@ -127,6 +135,7 @@ class SessionPanel(QWidget):
         if before is None or trials_id(before) != trials_id(record):
             self._trials.show_rows(trial_rows(record))
         self._notes.show_saved(record.path, record.notes)
+        self._unwritten.hide()
         self._refresh()
 
     def set_read_only(self, is_read_only: bool) -> None:
@@ -221,7 +230,7 @@ class SessionPanel(QWidget):
         keep_space(self._strip.button)
         buttons = self._strip.button, (QWidget(), 1), self._open_folder, self._inspect, self._export
         row = hbox(*buttons, spacing=SPACING_PX)
-        parts = form, (self._tabs, 1), self._strip, row
+        parts = form, (self._tabs, 1), self._unwritten, self._strip, row
         vbox(*parts, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 

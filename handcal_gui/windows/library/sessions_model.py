@@ -14,11 +14,11 @@ from PySide6.QtCore import (
     Qt,
 )
 
-from handcal.session.library import LibraryEntry
+from handcal.session.library import EyeOutcome, LibraryEntry
 from handcal.types import EYES, VerdictName
 from handcal_gui.theme import number_font
 from handcal_gui.translation import tr
-from handcal_gui.widgets.error_bars import error_bars, error_text, picture_text
+from handcal_gui.widgets.error_bars import after_arcmin, error_bars, error_text, picture_text
 from handcal_gui.widgets.fields import plain_tooltip
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
@@ -34,6 +34,12 @@ FILTERS: Mapping[Filter, str] = {
 }
 _Index: TypeAlias = QModelIndex | QPersistentModelIndex
 _NO_INDEX = QModelIndex()
+_Kind: TypeAlias = Literal["before", "found", "after"]
+_KINDS: Mapping[_Kind, Callable[[EyeOutcome], float | None]] = {
+    "before": lambda one: one.before_arcmin,
+    "found": lambda one: one.found_arcmin,
+    "after": after_arcmin,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +61,9 @@ def is_accepted(entry: LibraryEntry) -> bool:
     return bool(entry.eyes) and all(one.verdict == "accept" for one in entry.eyes.values())
 
 
-def worst_arcmin(entry: LibraryEntry, kind: Literal["found", "expected"]) -> float | None:
+def worst_arcmin(entry: LibraryEntry, kind: _Kind) -> float | None:
     """Return the error of the worse eye; None unless it is known of every solved eye."""
-    outcomes = entry.eyes.values()
-    errors = [one.found_arcmin if kind == "found" else one.expected_arcmin for one in outcomes]
+    errors = [_KINDS[kind](one) for one in entry.eyes.values()]
     known = [error for error in errors if error is not None]
     return max(known) if known and len(known) == len(errors) else None
 
@@ -76,25 +81,33 @@ def _state(entry: LibraryEntry) -> str:
 
 
 def _verdicts(entry: LibraryEntry) -> str:
+    is_over = _is_over_target(entry)
     words = {
-        eye: VERDICT_WORDS.get(cast(VerdictName, one.verdict), one.verdict)
+        eye: tr("⚠ Accept")
+        if is_over and one.verdict == "accept"
+        else VERDICT_WORDS.get(cast(VerdictName, one.verdict), one.verdict)
         for eye, one in entry.eyes.items()
     }
     if len(words) == len(EYES) and len(set(words.values())) == 1:
-        return words[EYES[0]]
-    return ", ".join(f"{EYE_NAMES[eye].split()[0]} {word}" for eye, word in words.items()) or (
-        NOTHING if entry.problem else tr("Not solved")
-    )
+        said = words[EYES[0]]
+    else:
+        each = ", ".join(f"{EYE_NAMES[eye].split()[0]} {word}" for eye, word in words.items())
+        said = each or (NOTHING if entry.problem else tr("Not solved"))
+    return tr("{}, trials over {:g}′").format(said, entry.target_arcmin) if is_over else said
 
 
-def _errors(kind: Literal["found", "expected"]) -> Callable[[LibraryEntry], str]:
+def _is_over_target(entry: LibraryEntry) -> bool:
+    """Return whether the mean of the trials is over the lab's target."""
+    mean_arcmin, target_arcmin = entry.trials_arcmin, entry.target_arcmin
+    return mean_arcmin is not None and target_arcmin is not None and mean_arcmin > target_arcmin
+
+
+def _errors(kind: _Kind) -> Callable[[LibraryEntry], str]:
     def text(entry: LibraryEntry) -> str:
-        errors = [
-            entry.eyes[eye].found_arcmin if kind == "found" else entry.eyes[eye].expected_arcmin
-            for eye in EYES
-            if eye in entry.eyes
-        ]
-        return " / ".join(NOTHING if one is None else f"{one:.1f}" for one in errors) or NOTHING
+        if not entry.eyes:
+            return NOTHING
+        errors = (_KINDS[kind](entry.eyes[eye]) if eye in entry.eyes else None for eye in EYES)
+        return " / ".join(NOTHING if one is None else f"{one:.1f}" for one in errors)
 
     return text
 
@@ -102,11 +115,8 @@ def _errors(kind: Literal["found", "expected"]) -> Callable[[LibraryEntry], str]
 def _trials(entry: LibraryEntry) -> str:
     if entry.trials_arcmin is None:
         return NOTHING
-    mean_arcmin, target_arcmin = entry.trials_arcmin, entry.target_arcmin
-    if target_arcmin is not None and mean_arcmin > target_arcmin:
-        said = tr("⚠ {:.1f}, over {:g} (n = {})")
-        return said.format(mean_arcmin, target_arcmin, entry.trials)
-    return tr("{:.1f} (n = {})").format(mean_arcmin, entry.trials)
+    said = tr("⚠ {:.1f} (n = {})") if _is_over_target(entry) else tr("{:.1f} (n = {})")
+    return said.format(entry.trials_arcmin, entry.trials)
 
 
 def _known_first(value: float | None) -> float:
@@ -135,7 +145,22 @@ COLUMNS = (
         lambda e: e.headset or NOTHING,
         lambda e: e.headset,
     ),
-    _Column(tr("Verdict"), tr("Of the newest results"), _verdicts, _verdicts),
+    _Column(
+        tr("Verdict"),
+        tr("Of the newest results; ⚠ the mean over all trials is over the lab's target"),
+        _verdicts,
+        _verdicts,
+    ),
+    _Column(
+        tr("Before ′\nleft / right"),
+        tr(
+            "Error expected without the calibration, left / right, in arcminutes:\n"
+            "the grey bars of the small picture"
+        ),
+        _errors("before"),
+        lambda e: _known_first(worst_arcmin(e, "before")),
+        is_number=True,
+    ),
     _Column(
         tr("Found ′\nleft / right"),
         tr(
@@ -147,10 +172,13 @@ COLUMNS = (
         is_number=True,
     ),
     _Column(
-        tr("Expected ′\nleft / right"),
-        tr("Error that is left, as expected from all that is known, left / right, in arcminutes"),
-        _errors("expected"),
-        lambda e: _known_first(worst_arcmin(e, "expected")),
+        tr("After ′\nleft / right"),
+        tr(
+            "Error that is left, as expected from all that is known, left / right, in arcminutes:\n"
+            "the coloured bars of the small picture"
+        ),
+        _errors("after"),
+        lambda e: _known_first(worst_arcmin(e, "after")),
         is_number=True,
     ),
     _Column(
@@ -167,8 +195,12 @@ COLUMNS = (
     ),
     _Column(tr("State"), tr("Check lists what is damaged; Repair copies the rest"), _state, _state),
 )
-SPARED = (3, 2, 7)
-"""Columns that are left out of a narrow window, in this order: headset, rig, trials."""
+NAMES = (2, 0)
+"""Columns with names that are cut in a narrow window, in this order: rig, wearer."""
+SPARED = (3, 5, 8, 2)
+"""Columns left out where that is not enough, in this order: headset, before, trials, rig."""
+_TOLD = (2, 3, 8)
+"""Columns that each tooltip contains; it has the error before in a line of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,7 +337,7 @@ def _tooltip(row: SessionRow, column: int) -> str:
     copy = tr("Repaired in {}").format(entry.repaired_as) if entry.repaired_as else ""
     spared = (
         f"{COLUMNS[i].title}: {row.texts[i]}"
-        for i in SPARED
+        for i in _TOLD
         if i != column and row.texts[i] != NOTHING
     )
     errors = (error_text if column else picture_text)(entry.eyes)

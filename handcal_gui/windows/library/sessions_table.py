@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 from handcal.session.library import LibraryEntry
 from handcal_gui.theme import SPACING_PX, flat_header, number_font
 from handcal_gui.translation import tr
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.windows.library.sessions_model import COLUMNS, SPARED, SessionsModel
+from handcal_gui.windows.library.sessions_model import COLUMNS, NAMES, SPARED, SessionsModel
 
 _MOST_SHOWN_PX = 300
-_WEARER = 0
 _LEAST_CHARACTERS = 12
 """That are shown of a name that is cut."""
 
@@ -29,6 +29,11 @@ class SessionsTable(QTableView):
     Parameters
     ----------
     sessions : SessionsModel
+
+    Attributes
+    ----------
+    left_out : ElidedLabel
+        Names the columns that the window is too narrow for.
     """
 
     def __init__(self, sessions: SessionsModel) -> None:
@@ -36,6 +41,8 @@ class SessionsTable(QTableView):
         self._sessions = sessions
         self._kept: set[Path] = set()
         self._first_row = 0
+        self.left_out = with_name(ElidedLabel(), "leftOut")
+        self.left_out.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         with_name(self, "sessionTable", tr("Sessions"))
         self.setModel(sessions)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -108,20 +115,32 @@ class SessionsTable(QTableView):
         self._reason.setVisible(bool(reason))
 
     def fit_columns(self) -> None:
-        """Show columns whole, as many as fit; of the wearers, names that are long are cut."""
+        """Show columns whole, as many as fit; names that are long are cut."""
         for number in SPARED:
             self.showColumn(number)  # a hidden title has no width
         wanted_px = {
             number: min(self._width_px(number), _MOST_SHOWN_PX) for number in range(len(COLUMNS))
         }
+        least_px = self._least_px()
+        spare_px = {number: max(wanted_px[number] - least_px, 0) for number in NAMES}
         excess_px = sum(wanted_px.values()) - self.viewport().width()
+        hidden = []
         for number in SPARED:
-            if excess_px > 0:
+            if excess_px > sum(spare_px.values()):
                 self.hideColumn(number)
+                hidden.append(number)
                 excess_px -= wanted_px[number]
-        wanted_px[_WEARER] -= max(min(excess_px, wanted_px[_WEARER] - self._least_px()), 0)
+                spare_px.pop(number, None)
+        for number in filter(spare_px.get, NAMES):
+            cut_px = min(max(excess_px, 0), spare_px[number])
+            wanted_px[number] -= cut_px
+            excess_px -= cut_px
         for number, width_px in wanted_px.items():
             self.setColumnWidth(number, width_px)
+        titles = (COLUMNS[number].title.partition("\n")[0] for number in sorted(hidden))
+        self.left_out.setText(
+            tr("In a wider window also: {}").format(", ".join(titles)) if hidden else ""
+        )
 
     def _keep_chosen(self) -> None:
         chosen = self.chosen
@@ -140,7 +159,8 @@ class SessionsTable(QTableView):
         text_px = QFontMetrics(font).horizontalAdvance(self._sessions.longest_text(column))
         picture_px = PICTURE_PX.width() + SPACING_PX if column == 0 else 0
         title_px = self.horizontalHeader().sectionSizeHint(column)
-        return max(text_px + picture_px + 2 * SPACING_PX, title_px)
+        apart_px = (3 if COLUMNS[column].is_number else 2) * SPACING_PX
+        return max(text_px + picture_px + apart_px, title_px)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give the columns the room there is."""

@@ -54,9 +54,17 @@ def read_contents(folder: Path, known: Collection[LibraryEntry]) -> Contents:
     return Contents(rows, deleted, last, is_missing=not os.path.isdir(folder))
 
 
-def check_sessions(paths: Sequence[Path], progress: Progress) -> str:
-    """Read every file of some sessions; return which are damaged, as a message."""
-    sound, lines = _each(paths, _require_sound, tr("Checking {}"), progress)
+def check_sessions(paths: Sequence[Path], found_damaged: set[Path], progress: Progress) -> str:
+    """Read every file of some sessions; return which are damaged, as a message and in a set."""
+
+    def check(path: Path) -> None:
+        try:
+            _require_sound(path)
+        except FileError:
+            found_damaged.add(path)
+            raise
+
+    sound, lines = _each(paths, check, tr("Checking {}"), progress)
     count = pluralize(sound, tr("session"), tr("sessions"))
     said = tr("✓ {} sound, every file read.").format(count)
     return _with_lines(said if sound or not lines else "", lines)
@@ -83,12 +91,12 @@ def repair_beside(path: Path, progress: Progress) -> str:
     """Copy what is sound of a damaged session to a new one beside it; return a message."""
     progress.at(0.0, tr("Repairing {}").format(path.name))
     if check_session(path).state == "sound":
-        return tr("{} is sound: there is nothing to repair.").format(path.name)
+        return tr("{} is sound: there is nothing to repair.").format(_name_of(path))
     output = _free(path.with_name(f"{path.name}-repaired"))
     made = repair_session(path, output)
     kept = pluralize(len(made.alignments), tr("alignment"), tr("alignments"))
-    return tr("{}: a copy with {} and {}.").format(
-        output.name, kept, pluralize(len(made.trials), tr("trial"), tr("trials"))
+    return tr("{} repaired: a copy with {} and {}.").format(
+        _name_of(path), kept, pluralize(len(made.trials), tr("trial"), tr("trials"))
     )
 
 

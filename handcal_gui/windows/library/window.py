@@ -29,7 +29,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text, limit_length
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.error_bars import PICTURE_HELP, PICTURE_LEGEND
+from handcal_gui.widgets.error_bars import PICTURE_HELP, PICTURE_LEGEND, has_bars
 from handcal_gui.widgets.fields import (
     button,
     choice,
@@ -45,7 +45,7 @@ from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.result_rows import NOTHING
 from handcal_gui.widgets.session_rows import RESUME_HELP
-from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel
+from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel, is_damaged
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.tasks import (
     Change,
@@ -60,7 +60,6 @@ from handcal_gui.windows.library.tasks import (
 )
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of, trend_text
 
-_TREND_PX = 20 * SPACING_PX
 _TASK = tr(
     "Select a session and open it, or several, with Ctrl or Shift, to export, check or delete them."
 )
@@ -96,6 +95,7 @@ class LibraryWindow(QDialog):
         self._folder = folder
         self._contents = Contents()
         self._changes: list[Change] = [()]
+        self._found_damaged: set[Path] = set()  # by the last check, which reads more
         self._is_read = False
         self._sessions = SessionsModel()
         self._search = with_name(QLineEdit(), "search", tr("Search"))
@@ -106,7 +106,7 @@ class LibraryWindow(QDialog):
         self._legend = with_name(QLabel(PICTURE_LEGEND), "legend", help_text=PICTURE_HELP)
         self._count = paragraph("count", tr("Reading {}…").format(folder))
         self._trend = TrendPlot()
-        self._trend.setMinimumHeight(_TREND_PX)
+        self._trend.setMinimumHeight(20 * SPACING_PX)
         self._trend_title = paragraph("trendTitle")
         self._message = paragraph("message")
         self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -156,7 +156,7 @@ class LibraryWindow(QDialog):
         shown = {row.entry.path for row in before.rows}
         made = {row.entry.path for row in contents.rows} - shown if self._is_read else set()
         self._is_read = True
-        self._legend.setVisible(any(row.entry.eyes for row in contents.rows))
+        self._legend.setVisible(any(has_bars(row.entry.eyes) for row in contents.rows))
         if contents.rows != before.rows:
             self._sessions.show_rows(contents.rows)
             self._table.fit_columns()
@@ -183,15 +183,14 @@ class LibraryWindow(QDialog):
         self._show_folder.setEnabled(len(chosen) == 1)
         self._copy.setEnabled(bool(chosen))
         self._check.setEnabled(is_free and bool(chosen))
-        self._repair.setEnabled(is_free and len(chosen) == 1)
+        damaged = [one for one in readable if is_damaged(one) or one.path in self._found_damaged]
+        self._repair.setEnabled(is_free and len(chosen) == len(damaged) == 1)
         self._delete.setEnabled(is_free and bool(chosen))
         self._refresh_undo()
         shown, total = len(self._sessions.shown), len(self._sessions.rows)
-        count = (
-            pluralize(total, tr("session"), tr("sessions"))
-            if shown == total
-            else tr("{} of {} sessions").format(shown, total)
-        )
+        count = pluralize(total, tr("session"), tr("sessions"))
+        if shown != total:
+            count = tr("{} of {} sessions").format(shown, total)
         selected = tr(", {} selected").format(len(chosen)) if chosen else ""
         if self._is_read:
             self._table.show_reason(self._contents.is_missing)
@@ -214,6 +213,7 @@ class LibraryWindow(QDialog):
         self._undo.setVisible(bool(text))
         self._undo.setEnabled(bool(text) and not self._jobs.is_busy)
         self._change_text.setText(text)
+        self._change_text.setVisible(bool(text))  # or it halves the line of the count
 
     def _show_trend(self, wearer: str) -> None:
         found = calibrations_of(wearer, [row.entry for row in self._sessions.rows])
@@ -236,7 +236,8 @@ class LibraryWindow(QDialog):
         self.export_requested.emit([entry.path for entry in self.chosen])
 
     def _check_chosen(self) -> None:
-        self._start(partial(check_sessions, [entry.path for entry in self.chosen]))
+        self._found_damaged.clear()
+        self._start(partial(check_sessions, [one.path for one in self.chosen], self._found_damaged))
 
     def _repair_chosen(self) -> None:
         self._start(partial(repair_beside, self.chosen[0].path))
@@ -325,7 +326,7 @@ class LibraryWindow(QDialog):
             tr("&Check"), "", self._check_chosen, tr("Read every file of the selected sessions")
         )
         self._repair = self._act(
-            tr("Re&pair"), "", self._repair_chosen, tr("Copy what is sound to a new session")
+            tr("Re&pair"), "", self._repair_chosen, tr("Copy what is sound of a damaged session")
         )
         self._delete = self._act(
             tr("&Delete"), "Del", self._delete_chosen, tr("Delete the selected sessions (Del)")
@@ -350,7 +351,8 @@ class LibraryWindow(QDialog):
         self._change_text = ElidedLabel()
         self._change_text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         below = QWidget()
-        vbox(self._trend_title, (self._trend, 1), on=below, margins=0, spacing=0)
+        title = hbox((self._trend_title, 1), self._table.left_out, spacing=SPACING_PX)
+        vbox(title, (self._trend, 1), on=below, margins=0, spacing=0)
         halves = QSplitter(Qt.Orientation.Vertical)
         halves.addWidget(self._table)
         halves.addWidget(below)
@@ -370,19 +372,17 @@ class LibraryWindow(QDialog):
         )
         # Enter in the search opens the first session that it finds.
         opening = _pressed_for(self._open, main_button("openSession", self._open.text()))
-        counts = hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX)
         shown = label_for(self._kind, tr("S&how"))
         close = button("closeLibrary", tr("C&lose"))
         close.setAutoDefault(False)
         close.clicked.connect(self.reject)
-        actions = hbox(close, 1, *buttons, opening, spacing=SPACING_PX)
         vbox(
             paragraph("libraryTask", _TASK),
             hbox((self._search, 1), shown, self._kind, self._legend, spacing=SPACING_PX),
             (halves, 1),
-            counts,
+            hbox((self._count, 1), (self._change_text, 1), self._undo, spacing=SPACING_PX),
             self._said,
-            actions,
+            hbox(close, 1, *buttons, opening, spacing=SPACING_PX),
             on=self,
             margins=2 * SPACING_PX,
             spacing=SPACING_PX,

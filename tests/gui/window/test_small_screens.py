@@ -9,7 +9,14 @@ from typing import Literal
 import numpy as np
 import pytest
 from PySide6.QtCore import QObject, QPoint, QRect
-from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QScrollArea, QTabWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QTabWidget,
+    QToolButton,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
@@ -235,6 +242,21 @@ def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
         for area in window.findChildren(QScrollArea):
             if area.isVisible():
                 assert scrolled_px(area) == [0, 0], page
+
+
+@pytest.mark.parametrize("size_px", SMALL_PX)
+def test_the_start_page_says_what_to_do_wherever_there_is_room(
+    qtbot: QtBot, program: Program, size_px: tuple[int, int]
+) -> None:
+    page = program.start
+    program.window.resize(*size_px)
+    hint, fold = page.new.hint, child(page, QToolButton, "advanced")
+    qtbot.waitUntil(hint.isVisible)
+    if size_px == SMALL_PX[0]:
+        fold.click()
+        qtbot.waitUntil(hint.isHidden)  # the form needs its height
+        fold.click()
+        qtbot.waitUntil(hint.isVisible)
 
 
 @EACH_TEXT

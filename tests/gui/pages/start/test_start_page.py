@@ -199,6 +199,23 @@ def test_each_letter_leads_to_one_place(
     assert len(set(found)) == len(found) >= 22
 
 
+@pytest.mark.parametrize("camera", [Health.GOOD, Health.BROKEN])
+def test_the_letter_of_a_fix_leads_to_one_place(
+    qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], camera: Health
+) -> None:
+    inspector.healths.update(camera=camera, rig=Health.BROKEN)
+    page = open_page(source="realsense", rig="/nowhere.yaml")
+    qtbot.waitUntil(lambda: button(page, "rigFix").isVisible())
+    found = letters(page, is_shown=True)
+    assert len(set(found)) == len(found)
+    is_first = camera is Health.GOOD
+    assert [button(page, name).text() for name in ("rigFix", "headsetFix")] == [
+        "Use the exa&mple" if is_first else "Use the example",
+        "Use a networ&k headset",
+    ]
+    assert "m" in found
+
+
 def test_the_next_wearer_finds_everything_as_it_was(open_page: Callable[..., StartPage]) -> None:
     page = open_page(source="realsense", headset="network", port=50_001)
     QTest.keyClicks(wearer(page), "Ada")

@@ -60,6 +60,22 @@ def test_shows_the_session_of_a_snapshot(
     assert cell(alignments, 0, 3) == "–", "the results are gone"
 
 
+def test_an_alignment_that_is_not_written_yet_is_told(
+    panel: SessionPanel, snapshot: Callable[..., Snapshot], record: SessionRecord
+) -> None:
+    told = child(panel, QLabel, "unwritten")
+    first = dict([*record.alignments.items()][:1])
+    confirmed = {"alignments": record.alignments}
+    stored = replace(record, alignments=first)
+    seen = snapshot(State.SOLVED, record=stored, procedure=confirmed)
+    panel.show_snapshot(seen)
+    assert not told.isVisible()
+    panel.show_snapshot(replace(seen, not_stored="cannot write"))
+    assert (told.text(), told.isVisible()) == ("1 alignment not written yet.", True)
+    panel.show_snapshot(snapshot(State.SOLVED))
+    assert not told.isVisible()
+
+
 def test_an_unchanged_session_is_not_shown_again(
     panel: SessionPanel, snapshot: Callable[..., Snapshot], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -48,3 +49,21 @@ def test_the_start_page_leads_to_evaluations(qtbot: QtBot, tmp_path: Path) -> No
     program.window.close()
     assert not window.isVisible()
     assert file.load()[0].evaluation.noise.seed == 11
+
+
+def test_the_user_test_proposes_the_session_folder_in_use(qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "config").mkdir()
+    program = Program(PreferencesFile(tmp_path / "config" / "preferences.json"))
+    qtbot.addWidget(program.window)
+    for name in ("demonstration", "other"):
+        station = replace(program.preferences.station, sessions=str(tmp_path / name))
+        program._current.change(station=station)  # as a start does, which leaves the page behind
+        window = program.windows.evaluate()
+        assert window.entries.users.sessions == str(tmp_path / name)
+        window.close()
+    window = program.windows.evaluate()
+    window.show_page("users")
+    window.page.form.enter(sessions=str(tmp_path / "chosen"))
+    window.close()
+    assert program.windows.evaluate().entries.users.sessions == str(tmp_path / "chosen")
+    program.window.close()

@@ -22,7 +22,8 @@ PATIENCE_MS = 10_000
 
 
 def results(verdict: str, expected: float, measured: float | None = None) -> dict[str, Any]:
-    one: dict[str, Any] = {"verdict": verdict, "benefit": {"after_arcmin": expected}}
+    benefit = {"without_arcmin": 20.0, "after_arcmin": expected}
+    one: dict[str, Any] = {"verdict": verdict, "benefit": benefit}
     if measured is not None:
         one["measured_arcmin"] = [2.0 * measured, measured]
     return {"version": 2, "eyes": {"left": one, "right": one}}

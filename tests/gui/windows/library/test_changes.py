@@ -40,22 +40,40 @@ def test_check_names_the_damage_and_repair_copies_the_rest(
     press(window, "checkSessions")
     wait_for(qtbot, window, "× Cid, ")  # not first that none is sound
     press(window, "repairSession")
-    wait_for(qtbot, window, "cid-repaired: a copy with 0 alignments")
+    wait_for(qtbot, window, "Cid, ")
+    wait_for(qtbot, window, " repaired: a copy with 0 alignments")
     qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
     assert (folder / "cid-repaired").is_dir()
     assert not Session.open(folder / "cid-repaired").damaged
-    states = [row[8] for row in rows(window)]
+    states = [row[9] for row in rows(window)]
     assert states.count("Unfinished, repaired copy") == 1
-    state = table(window).model().index(states.index("Damaged, has a copy"), 8)
+    state = table(window).model().index(states.index("Damaged, has a copy"), 9)
     assert "Repaired in cid-repaired" in state.data(Qt.ItemDataRole.ToolTipRole)
     assert [entry.path.name for entry in window.chosen] == ["cid-repaired"]
 
 
-def test_a_sound_session_is_not_copied(qtbot: QtBot, window: LibraryWindow, folder: Path) -> None:
-    choose(window, "Bea")
+def test_only_a_damaged_session_is_repaired(
+    qtbot: QtBot, window: LibraryWindow, folder: Path
+) -> None:
+    repair = child(window, QPushButton, "repairSession")
+    for wearer, is_damaged in (("Cid", True), ("Bea", False)):
+        choose(window, wearer)
+        assert repair.isEnabled() is is_damaged
+    file = folder / "bea" / "alignments" / "1.npz"
+    sound = file.read_bytes()
+    file.write_bytes(b"nonsense")  # the library does not read again what has the same journal
+    press(window, "checkSessions")
+    wait_for(qtbot, window, "Repair copies what is sound")
+    qtbot.waitUntil(repair.isEnabled, timeout=PATIENCE_MS)
+    file.write_bytes(sound)
     press(window, "repairSession")
-    wait_for(qtbot, window, "bea is sound: there is nothing to repair.")
+    wait_for(qtbot, window, " is sound: there is nothing to repair.")
+    assert text(window, "message").startswith("Bea, ")
     assert not (folder / "bea-repaired").exists()
+    press(window, "checkSessions")
+    wait_for(qtbot, window, "✓ 1 session sound")
+    qtbot.waitUntil(child(window, QPushButton, "checkSessions").isEnabled, timeout=PATIENCE_MS)
+    assert not repair.isEnabled()
 
 
 def test_what_was_deleted_together_is_restored_together_by_name(

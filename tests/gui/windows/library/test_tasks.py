@@ -13,7 +13,9 @@ def test_messages_name_a_few_of_many_sessions(tmp_path: Path) -> None:
     for path in paths:
         path.mkdir()
         (path / "journal.jsonl").write_text("nonsense\n")
-    *lines, last = check_sessions(paths, Progress()).splitlines()
+    damaged: set[Path] = set()
+    *lines, last = check_sessions(paths, damaged, Progress()).splitlines()
+    assert damaged == {*paths}
     assert len(lines) == 8
     assert lines[0].startswith(f"× s-0: {paths[0] / 'journal.jsonl'} does not begin as the journal")
     assert lines[0].endswith("; make it readable, or restore it from a backup")

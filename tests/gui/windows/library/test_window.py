@@ -15,10 +15,18 @@ from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushB
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
-from handcal.session.library import LibraryEntry, delete_session, read_library
+from handcal.session.library import EyeOutcome, LibraryEntry, delete_session, read_library
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
-from handcal_gui.windows.library.sessions_model import FILTERS, SessionsModel, make_row
+from handcal.types import EYES
+from handcal_gui.widgets.error_bars import PICTURE_LEGEND, error_text
+from handcal_gui.windows.library.sessions_model import (
+    COLUMNS,
+    FILTERS,
+    NAMES,
+    SessionsModel,
+    make_row,
+)
 from handcal_gui.windows.library.sessions_table import SessionsTable
 from handcal_gui.windows.library.trend_plot import TrendPlot, calibrations_of
 from handcal_gui.windows.library.window import LibraryWindow
@@ -41,10 +49,10 @@ from tests.gui.windows.library.conftest import (
 def test_the_newest_is_first_and_measured_is_not_expected(window: LibraryWindow) -> None:
     assert wearers(window) == ["Cid", "Bea", "Ada", "Ada"]
     newer, older = rows(window)[2:]
-    assert older[4:9] == ["✓ Accept", "8.0 / 8.0", "9.0 / 9.0", "–", "Finished"]
-    assert newer[5:7] == ["– / –", "8.0 / 8.0"]
+    assert older[4:] == ["✓ Accept", "20.0 / 20.0", "8.0 / 8.0", "4.0 / 4.0", "–", "Finished"]
+    assert newer[5:8] == ["20.0 / 20.0", "– / –", "8.0 / 8.0"]
     assert rows(window)[0][4] == "Not solved"
-    assert rows(window)[0][8] == "Damaged: 1 part"
+    assert rows(window)[0][9] == "Damaged: 1 part"
 
 
 def test_the_bars_have_a_key_while_there_are_any(
@@ -69,10 +77,10 @@ def test_search_filter_and_sorting(window: LibraryWindow) -> None:
         kinds.setCurrentIndex(kinds.findData(kind))
         assert len(rows(window)) == expected[kind]
     kinds.setCurrentIndex(0)
-    header = table(window).model().headerData(5, Qt.Orientation.Horizontal)
+    header = table(window).model().headerData(6, Qt.Orientation.Horizontal)
     assert header == "Found ′\nleft / right"
-    table(window).sortByColumn(5, Qt.SortOrder.AscendingOrder)  # those not verified follow
-    assert rows(window)[0][5] == "8.0 / 8.0"  # not what is expected to be left of it
+    table(window).sortByColumn(6, Qt.SortOrder.AscendingOrder)  # those not verified follow
+    assert rows(window)[0][6] == "8.0 / 8.0"  # not what is expected to be left of it
 
 
 def test_the_trend_of_one_wearer(window: LibraryWindow) -> None:
@@ -98,16 +106,63 @@ def test_the_trend_has_a_line_at_the_newest_target(qtbot: QtBot, tmp_path: Path)
     assert plot._target.getData()[1] is None or not len(plot._target.getData()[1])
 
 
-def test_trials_over_the_target_are_marked(tmp_path: Path) -> None:
-    def trials(arcmin: float, target_arcmin: float | None) -> str:
+def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_path: Path) -> None:
+    def said(arcmin: float, target_arcmin: float | None, *verdicts: str) -> tuple[str, str]:
         entry = LibraryEntry(
-            tmp_path, (0, 0), trials=2, trials_arcmin=arcmin, target_arcmin=target_arcmin
+            tmp_path,
+            (0, 0),
+            trials=2,
+            trials_arcmin=arcmin,
+            target_arcmin=target_arcmin,
+            eyes=dict(zip(EYES, (EyeOutcome(one, 20, 5, None) for one in verdicts), strict=False)),
         )
-        return make_row(entry).texts[7]
+        row = make_row(entry)
+        return row.texts[4], row.texts[8]
 
-    assert trials(10.4, 8.0) == "⚠ 10.4, over 8 (n = 2)"
-    assert trials(7.9, 8.0) == "7.9 (n = 2)"
-    assert trials(10.4, None) == "10.4 (n = 2)"  # of an older version
+    both = "accept", "accept"
+    assert said(10.4, 8.0, *both) == ("⚠ Accept, trials over 8′", "⚠ 10.4 (n = 2)")
+    assert said(7.9, 8.0, *both) == ("✓ Accept", "7.9 (n = 2)")
+    assert said(10.4, None, *both) == ("✓ Accept", "10.4 (n = 2)")  # of an older version
+    assert said(10.4, 8.0, "accept", "repeat")[0] == (
+        "Left ⚠ Accept, Right ↻ Repeat, trials over 8′"
+    )
+    assert said(10.4, 8.0)[0] == "Not solved, trials over 8′"
+
+
+def test_sessions_whose_trials_contradict_the_verdict_are_found_and_stand_together(
+    tmp_path: Path,
+) -> None:
+    accepted = dict.fromkeys(EYES, EyeOutcome("accept", 20, 5, None))
+    model = SessionsModel()
+    model.show_rows(
+        [
+            make_row(
+                LibraryEntry(
+                    tmp_path / f"{i}",
+                    (0, 0),
+                    eyes=accepted,
+                    trials=1,
+                    trials_arcmin=arcmin,
+                    target_arcmin=8.0,
+                )
+            )
+            for i, arcmin in enumerate((7, 9, 7, 9))
+        ]
+    )
+    model.search("", "accepted")
+    model.sort(4)
+    assert [row.texts[4][0] for row in model.shown] == [*"⚠⚠✓✓"]
+
+
+def test_the_bars_and_the_columns_use_the_same_words_and_numbers() -> None:
+    titles = [column.title.partition(" ′")[0] for column in COLUMNS]
+    assert "error before, after" in PICTURE_LEGEND
+    assert titles[5:8] == ["Before", "Found", "After"]
+    verified = EyeOutcome("accept", 20.0, 10.0, 5.0, 8.0)
+    one = make_row(LibraryEntry(Path("a"), (0, 0), eyes={"left": verified}))
+    assert one.texts[5:8] == ("20.0 / –", "8.0 / –", "5.0 / –")  # of the left eye
+    assert error_text(one.entry.eyes) == "Left eye: 20.0′ before, 5.0′ after"
+    assert all(column.tooltip for column in COLUMNS)
 
 
 def test_search_and_kind_show_their_keys(window: LibraryWindow) -> None:
@@ -122,7 +177,7 @@ def test_numbers_stand_apart_from_the_text_of_the_next_column(window: LibraryWin
     assert all(
         model.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.TextAlignmentRole)
         & centre
-        for column in (5, 6, 7)
+        for column in (5, 6, 7, 8)
     )
 
 
@@ -225,23 +280,33 @@ def test_a_button_closes_it_and_leaves_the_others_their_room(
         child(window, QPushButton, "closeLibrary").click()
 
 
-def test_a_narrow_window_leaves_out_columns_and_cuts_none(
+def test_a_narrow_window_names_the_columns_left_out_and_cuts_only_names(
     qtbot: QtBot, window: LibraryWindow, folder: Path
 ) -> None:
     repair_session(folder / "cid", folder / "cid-repaired")
     window.reload()
     qtbot.waitUntil(lambda: len(rows(window)) == 5, timeout=PATIENCE_MS)
-    assert "Damaged, has a copy" in [row[8] for row in rows(window)]
+    assert "Damaged, has a copy" in [row[9] for row in rows(window)]
     across = table(window).horizontalHeader()
     for width_px in (800, 960, 1600):
         window.resize(width_px, 510)
         assert across.length() <= table(window).viewport().width()
         for column in range(across.count()):
-            if not across.isSectionHidden(column):
+            if not (across.isSectionHidden(column) or column in NAMES):
                 assert across.sectionSize(column) >= table(window).sizeHintForColumn(column)
+        hidden = [COLUMNS[i].title for i in range(across.count()) if across.isSectionHidden(i)]
+        named = text(window, "leftOut").removeprefix("In a wider window also: ").split(", ")
+        assert [one for one in named if one] == [one.partition("\n")[0] for one in hidden]
+        assert across.isSectionHidden(2) is (width_px == 800), "the rig's name is cut before"
     assert not across.hiddenSectionCount()
     tip = table(window).model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
     assert "Rig: Example" in tip
+
+
+def test_the_count_has_the_line_to_itself(window: LibraryWindow) -> None:
+    window.resize(960, 510)
+    QGuiApplication.processEvents()
+    assert child(window, QLabel, "count").width() > 900 // 2
 
 
 def test_few_calls_of_python_draw_and_choose_many_sessions(
@@ -295,8 +360,9 @@ def test_long_names_are_cut_and_nothing_else(window: LibraryWindow) -> None:
     for width_px in (900, 1600):
         window.resize(width_px, 600)
         assert across.length() <= table(window).viewport().width()
-        for column in (1, 4, 5, 6, 7):
+        for column in (1, 4, 6, 7, 8, 9):
             assert across.sectionSize(column) >= table(window).sizeHintForColumn(column)
+    assert across.sectionSize(5) >= table(window).sizeHintForColumn(5)
     assert across.sectionSize(2) >= table(window).sizeHintForColumn(2)  # the rig: room for all
 
 
