@@ -1333,6 +1333,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Use the exa&amp;mple</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Calibrate a rig</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1350,10 +1354,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Use the virtual headset</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Use the example</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3086,7 +3086,7 @@ A change discards the results: solve again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Confirmed alignments appear here</source>
+        <source>Confirmed alignments appear here once they are written</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3103,6 +3103,10 @@ A change discards the results: solve again.</source>
     </message>
     <message>
         <source>Ex&amp;port…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} not written yet.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4283,15 +4287,47 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>⚠ Accept</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Not solved</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>⚠ {:.1f}, over {:g} (n = {})</source>
+        <source>{}, trials over {:g}′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Of the newest results; ⚠ the mean over all trials is over the lab&apos;s target</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Before ′
+left / right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error expected without the calibration, left / right, in arcminutes:
+the grey bars of the small picture</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>After ′
+left / right</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error that is left, as expected from all that is known, left / right, in arcminutes:
+the coloured bars of the small picture</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>{:.1f} (n = {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>⚠ {:.1f} (n = {})</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4315,10 +4351,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Of the newest results</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Found ′
 left / right</source>
         <translation type="unfinished"></translation>
@@ -4329,18 +4361,9 @@ in arcminutes; – was not verified</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Expected ′
-left / right</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all trials
 of the session, also of a calibration that was then repeated, and their number.
 ⚠ over the lab&apos;s target: look at the trials; if φ was set well by hand, calibrate again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Error that is left, as expected from all that is known, left / right, in arcminutes</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4832,6 +4855,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Copy what is sound of a damaged session</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>S&amp;how</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4845,6 +4872,10 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>No session matches. Search for something else, or choose All sessions.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In a wider window also: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4888,7 +4919,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{}: a copy with {} and {}.</source>
+        <source>{} repaired: a copy with {} and {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4945,10 +4976,6 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>&amp;Check</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Copy what is sound to a new session</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
