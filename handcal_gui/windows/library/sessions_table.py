@@ -19,7 +19,8 @@ from handcal_gui.widgets.layouts import vbox
 from handcal_gui.windows.library.sessions_model import COLUMNS, NAMES, SPARED, SessionsModel
 
 _MOST_SHOWN_PX = 300
-_LEAST_CHARACTERS = 12
+_TRIALS = 8
+_LEAST_CHARACTERS = 7
 """That are shown of a name that is cut."""
 
 
@@ -121,8 +122,7 @@ class SessionsTable(QTableView):
         wanted_px = {
             number: min(self._width_px(number), _MOST_SHOWN_PX) for number in range(len(COLUMNS))
         }
-        least_px = self._least_px()
-        spare_px = {number: max(wanted_px[number] - least_px, 0) for number in NAMES}
+        spare_px = {number: max(wanted_px[number] - self._least_px(number), 0) for number in NAMES}
         excess_px = sum(wanted_px.values()) - self.viewport().width()
         hidden = []
         for number in SPARED:
@@ -137,7 +137,7 @@ class SessionsTable(QTableView):
             excess_px -= cut_px
         for number, width_px in wanted_px.items():
             self.setColumnWidth(number, width_px)
-        titles = (COLUMNS[number].title.partition("\n")[0] for number in sorted(hidden))
+        titles = (COLUMNS[number].title.split(" ′")[0] for number in sorted(hidden))
         self.left_out.setText(
             tr("In a wider window also: {}").format(", ".join(titles)) if hidden else ""
         )
@@ -149,23 +149,28 @@ class SessionsTable(QTableView):
             rows = (row for row, one in enumerate(self._sessions.shown) if one.entry is chosen[0])
             self._first_row = next(rows)
 
-    def _least_px(self) -> int:
-        """Return the least width of a name."""
-        return self.fontMetrics().averageCharWidth() * _LEAST_CHARACTERS + 2 * SPACING_PX
+    def _least_px(self, column: int) -> int:
+        """Return the least width of a column of names."""
+        name_px = self.fontMetrics().averageCharWidth() * _LEAST_CHARACTERS
+        return name_px + _picture_px(column) + 2 * SPACING_PX
 
     def _width_px(self, column: int) -> int:
         """Return the width of a column by its longest text: Qt would measure every cell."""
         font = number_font() if COLUMNS[column].is_number else self.font()
         text_px = QFontMetrics(font).horizontalAdvance(self._sessions.longest_text(column))
-        picture_px = PICTURE_PX.width() + SPACING_PX if column == 0 else 0
         title_px = self.horizontalHeader().sectionSizeHint(column)
-        apart_px = (3 if COLUMNS[column].is_number else 2) * SPACING_PX
-        return max(text_px + picture_px + apart_px, title_px)
+        # The trials fill their column, and the text of the next one would touch them.
+        apart_px = (3 if column == _TRIALS else 2) * SPACING_PX
+        return max(text_px + _picture_px(column) + apart_px, title_px)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give the columns the room there is."""
         super().resizeEvent(event)
         self.fit_columns()
+
+
+def _picture_px(column: int) -> int:
+    return PICTURE_PX.width() + SPACING_PX if column == 0 else 0
 
 
 def _runs(rows: Sequence[int]) -> Iterator[tuple[int, int]]:
