@@ -19,7 +19,8 @@ from handcal_gui.widgets.layouts import vbox
 from handcal_gui.windows.library.sessions_model import COLUMNS, NAMES, SPARED, SessionsModel
 
 _MOST_SHOWN_PX = 300
-_LEAST_CHARACTERS = 8
+_TRIALS = 8
+_LEAST_CHARACTERS = 7
 """That are shown of a name that is cut."""
 
 
@@ -158,7 +159,8 @@ class SessionsTable(QTableView):
         font = number_font() if COLUMNS[column].is_number else self.font()
         text_px = QFontMetrics(font).horizontalAdvance(self._sessions.longest_text(column))
         title_px = self.horizontalHeader().sectionSizeHint(column)
-        apart_px = (3 if COLUMNS[column].is_number else 2) * SPACING_PX
+        # The trials fill their column, and the text of the next one would touch them.
+        apart_px = (3 if column == _TRIALS else 2) * SPACING_PX
         return max(text_px + _picture_px(column) + apart_px, title_px)
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QFontMetrics, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
@@ -19,6 +20,7 @@ from handcal.session.library import EyeOutcome, LibraryEntry, delete_session, re
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import EYES
+from handcal_gui.theme import number_font
 from handcal_gui.widgets.error_bars import PICTURE_LEGEND, error_text
 from handcal_gui.windows.library.sessions_model import (
     COLUMNS,
@@ -129,26 +131,14 @@ def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_pa
     assert said(10.4, 8.0)[0] == "Not solved, trials over 8′"
 
 
-def test_sessions_whose_trials_contradict_the_verdict_are_found_and_stand_together(
-    tmp_path: Path,
-) -> None:
+def test_sessions_whose_trials_contradict_the_verdict_are_found_and_stand_together() -> None:
     accepted = dict.fromkeys(EYES, EyeOutcome("accept", 20, 5, None))
     model = SessionsModel()
-    model.show_rows(
-        [
-            make_row(
-                LibraryEntry(
-                    tmp_path / f"{i}",
-                    (0, 0),
-                    eyes=accepted,
-                    trials=1,
-                    trials_arcmin=arcmin,
-                    target_arcmin=8.0,
-                )
-            )
-            for i, arcmin in enumerate((7, 9, 7, 9))
-        ]
+    entries = (
+        LibraryEntry(Path(f"{arcmin}"), (0, 0), eyes=accepted, trials=1, trials_arcmin=arcmin)
+        for arcmin in (7.0, 9.0, 6.0, 10.0)
     )
+    model.show_rows([make_row(replace(one, target_arcmin=8.0)) for one in entries])
     model.search("", "accepted")
     model.sort(4)
     assert [row.texts[4][0] for row in model.shown] == [*"⚠⚠✓✓"]
@@ -179,6 +169,15 @@ def test_numbers_stand_apart_from_the_text_of_the_next_column(window: LibraryWin
         & centre
         for column in (5, 6, 7, 8)
     )
+
+
+def test_trials_stand_apart_from_the_state(window: LibraryWindow) -> None:
+    window.resize(1600, 600)
+    one = LibraryEntry(Path("a"), (0, 0), trials=222, trials_arcmin=111.1)
+    window._sessions.show_rows([make_row(one)])
+    child(window, SessionsTable).fit_columns()
+    text_px = QFontMetrics(number_font()).horizontalAdvance("111.1 (n = 222)")
+    assert table(window).columnWidth(8) - text_px >= 24
 
 
 def test_buttons_fit_the_choice(window: LibraryWindow) -> None:
