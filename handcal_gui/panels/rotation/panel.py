@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal.register.guard import turn_advice
+from handcal.session.record import SessionRecord
 from handcal.station.hands import PlacedHand
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import Observation, State
@@ -38,6 +39,14 @@ _TAKEN = tr("The alignment is confirmed.")
 _NO_HAND = tr("Hold the hand in view of the camera.")
 _NO_IMAGE = tr("The camera gives no image; the message below the guide says why.")
 _STRAIGHT = tr("The hand is rotated like the cursor.")
+_REASONS = {
+    "turned": tr("Last: hand turned."),
+    "moved": tr("Last: moved too fast."),
+    "shape changed": tr("Last: shape changed."),
+    "no hand": tr("Last: no hand."),
+    "drawn otherwise": tr("Last: drawn otherwise."),
+}
+"""Reasons of the journal."""
 
 
 class RotationPanel(QWidget):
@@ -65,7 +74,7 @@ class RotationPanel(QWidget):
         self._limit_line = self._plot.add_line("red", dashed=True)
         self._angle_line = self._plot.add_line("live")
         self._limit_rad = 0.0
-        self._refused, self._last = ("", ""), ""
+        self._refused = ("", "")
         self._fitted: object = None
         self._lay_out()
 
@@ -73,9 +82,8 @@ class RotationPanel(QWidget):
         """Show the rotation of a snapshot; without a new frame the angle stays."""
         procedure, observation = snapshot.procedure, snapshot.observation
         was = procedure.refused_for  # without an order that may no longer apply
-        count, last = snapshot.record.refused, f"{was}." if was else procedure.refusal
-        self._last = last or self._last * bool(count)  # kept when the alignment is confirmed
-        self._show_refusals(count, self._last)
+        last = f"{was}." if was else procedure.refusal or _last_reason(snapshot.record)
+        self._show_refusals(snapshot.record.refused, last)
         self._show_limit(procedure.guard_limit_rad)
         is_aligning = procedure.cursor is not None and procedure.state is State.ALIGN
         if self._history and not (is_aligning and procedure.cursor is self._cursor):
@@ -180,6 +188,12 @@ class RotationPanel(QWidget):
             margins=SPACING_PX,
             spacing=SPACING_PX // 2,
         )
+
+
+def _last_reason(record: SessionRecord) -> str:
+    """Return the reason of a session's last refusal; empty if there is none."""
+    reasons = [str(one.data.get("reason")) for one in record.events if one.name == "refused"]
+    return _REASONS.get(reasons[-1], "") if reasons else ""
 
 
 def _text_label(name: str, scale: float = 1.0, least_lines: int = 2) -> QLabel:

@@ -176,13 +176,11 @@ def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapsh
     assert text(panel, "refusals") == "1 confirmation refused. The headset draws something else."
     over = {"refusal": TURNED, "refused_for": "your hand was turned by 18.6°"}
     panel.show_snapshot(snapshot(procedure=over))
-    told = "1 confirmation refused. Your hand was turned by 18.6°."
-    assert text(panel, "refusals") == told
-    once = replace(record, events=(*record.events, refused[0]))
-    panel.show_snapshot(snapshot(State.ALIGNED, record=once))
-    assert text(panel, "refusals") == told, "confirmed since"
-    panel.show_snapshot(snapshot(record=record))
-    assert text(panel, "refusals") == "No confirmation refused.", "another session"
+    assert text(panel, "refusals") == "1 confirmation refused. Your hand was turned by 18.6°."
+    events = [replace(refused[0], data={"reason": why}) for why in ("turned", "moved")]
+    confirmed = replace(record, events=(*record.events, *events))
+    panel.show_snapshot(snapshot(State.ALIGNED, record=confirmed))
+    assert text(panel, "refusals") == "2 confirmations refused. Last: moved too fast."
 
 
 def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:
