@@ -10,6 +10,7 @@ from PySide6.QtGui import (
     QColor,
     QImage,
     QPainter,
+    QResizeEvent,
     QTextBlock,
     QTextCharFormat,
     QTextCursor,
@@ -21,6 +22,7 @@ from PySide6.QtWidgets import QTextBrowser, QTextEdit, QWidget
 from handcal_gui.theme import colors, follow_theme, is_dark
 from handcal_gui.translation import tr
 from handcal_gui.widgets.drawing import themed_drawing
+from handcal_gui.widgets.layouts import fit_soon
 from handcal_gui.widgets.opening import open_path
 
 FULL_SIZE = tr("Full size")
@@ -49,6 +51,8 @@ class ManualPage(QTextBrowser):
         self.setObjectName("manualPage")
         self.setOpenExternalLinks(True)
         self._words: re.Pattern[str] | None = None
+        self._pictures: set[QUrl] = set()
+        self._fit_soon = fit_soon(self._fit_pictures, self)
         self.anchorClicked.connect(self._open_picture)
         follow_theme(self, self._load_again)
 
@@ -93,6 +97,7 @@ class ManualPage(QTextBrowser):
         target = self.source().resolved(url)
         if target.isLocalFile() and not target.path().endswith(_PAGES):
             return  # a picture or a folder would replace the page
+        self._pictures.clear()
         super().doSetSource(url, type)
         self.mark(self._words)
         heading = url.fragment(QUrl.ComponentFormattingOption.FullyDecoded)
@@ -126,7 +131,20 @@ class ManualPage(QTextBrowser):
         if is_dark() and not is_drawing:
             image = _dimmed(image)
         image.setDevicePixelRatio(image.width() / width_px)
+        self._pictures.add(QUrl(name))
         return image
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Reduce the pictures of a page that has become too narrow for them."""
+        super().resizeEvent(event)
+        if self.horizontalScrollBar().maximum() > 0:
+            self._fit_soon.start()
+
+    def _fit_pictures(self) -> None:
+        kind = QTextDocument.ResourceType.ImageResource.value
+        for name in tuple(self._pictures):
+            self.document().addResource(kind, name, self.loadResource(kind, name))
+        self.document().markContentsDirty(0, self.document().characterCount())
 
     def _open_picture(self, link: QUrl) -> None:
         target = self.source().resolved(link)

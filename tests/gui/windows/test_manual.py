@@ -216,6 +216,17 @@ def test_a_small_window_shows_the_contents_beside_pages_that_fit(
     assert manual.page.width() > 400
 
 
+def test_pictures_are_reduced_with_the_window(qtbot: QtBot, manual: Manual) -> None:
+    manual.resize(1300, 700)
+    manual.open("docs/guide.md")
+    qtbot.waitUntil(lambda: manual.page.width() > 800)
+    marked = manual.page.textCursor().position()
+    manual.resize(700, 482)
+    qtbot.waitUntil(lambda: manual.page.width() < 600)
+    qtbot.waitUntil(lambda: manual.page.horizontalScrollBar().maximum() == 0)
+    assert manual.page.textCursor().position() == marked
+
+
 def test_the_titles_are_shown_whole(manual: Manual) -> None:
     manual.resize(1000, 400)
     manual.open("docs/commands.md")
