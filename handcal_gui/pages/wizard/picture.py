@@ -184,7 +184,8 @@ class GuidePicture(QWidget):
         is_below = not self.is_result_beside and not self.result.isHidden()
         is_fitted = is_below and self._aspect > 0.0
         shown = sum(not column.isHidden() for column in self._columns.values())
-        width_px = (self.width() - SPACING_PX * (shown - 1)) / max(shown, 1)
+        both_px = self.width() / (2 if self.is_result_beside else 1)
+        width_px = (both_px - SPACING_PX * (shown - 1)) / max(shown, 1)
         title_px = self._titles["left"].sizeHint().height()
         legend_px = self._legend["hand"].sizeHint().height()
         fitted_px = title_px + max(round(self._aspect * width_px), _LEAST_PX[1]) + legend_px

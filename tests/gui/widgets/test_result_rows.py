@@ -96,7 +96,7 @@ def test_a_result_of_verifications_alone_has_no_numbers_of_a_registration(rig: R
 
 
 def test_a_result_names_all_that_it_was_solved_from(results: Results, rig: Rig) -> None:
-    fused = replace(results.fused, verified={"left": VERIFIED})
+    fused = replace(results.fused, verified={"left": ()})
     solved_from = cells(result_rows(replace(results, fused=fused), rig), "Solved from")
     assert solved_from == (f"2 alignments, 1 verified eye, {results.method}",)
 

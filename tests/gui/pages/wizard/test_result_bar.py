@@ -73,6 +73,15 @@ def test_the_result_stands_beside_the_eyes_in_a_low_wide_window(
     eye = next(one for one in picture.findChildren(EyeCanvas) if one.isVisible())
     qtbot.waitUntil(lambda: eye.height() > 150)
     assert picture.result.x() > eye.width()
+    picture.resize(944, 300)
+    key = child(picture, LegendEntry, "legend-hand")
+    title = picture._titles["left"]
+
+    def gap_px() -> int:
+        bottom = key.mapTo(picture, key.rect().bottomLeft()).y()
+        return title.mapTo(picture, title.rect().topLeft()).y() - bottom - 1
+
+    qtbot.waitUntil(lambda: gap_px() >= SPACING_PX // 2)
 
 
 @pytest.mark.parametrize("size_px", [(650, 700), (1580, 690)])  # of 1600x1000, with panels or not
