@@ -203,7 +203,7 @@ def test_each_letter_leads_to_one_place(
 def test_the_letter_of_a_fix_leads_to_one_place(
     qtbot: QtBot, inspector: Inspector, open_page: Callable[..., StartPage], camera: Health
 ) -> None:
-    inspector.healths |= {"camera": camera, "rig": Health.BROKEN}
+    inspector.healths["camera"], inspector.healths["rig"] = camera, Health.BROKEN
     page = open_page(source="realsense", rig="/nowhere.yaml")
     qtbot.waitUntil(lambda: button(page, "rigFix").isVisible())
     found = letters(page, is_shown=True)
