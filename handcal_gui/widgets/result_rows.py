@@ -163,12 +163,11 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
         rows.append(
             Row(tr("Prior"), (learned,), tr("Where eyes are expected before any alignment"))
         )
-    alignments, verified = len(results.alignments), len(results.fused.verified)
-    counts = [
-        pluralize(alignments, tr("alignment"), tr("alignments")) if alignments else "",
-        pluralize(verified, tr("verified eye"), tr("verified eyes")) if verified else "",
-    ]
-    fused = ", ".join([*filter(None, counts), results.method])
+    count = pluralize(len(results.alignments), tr("alignment"), tr("alignments"))
+    verified = pluralize(len(results.fused.verified), tr("verified eye"), tr("verified eyes"))
+    if results.alignments and results.fused.verified:
+        rows.append(Row(tr("Corrected by"), (verified,), tr("Verifications, fused with the rest")))
+    fused = f"{count if results.alignments else verified}, {results.method}"
     return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
 
 

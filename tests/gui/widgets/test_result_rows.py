@@ -97,8 +97,9 @@ def test_a_result_of_verifications_alone_has_no_numbers_of_a_registration(rig: R
 
 def test_a_result_names_all_that_it_was_solved_from(results: Results, rig: Rig) -> None:
     fused = replace(results.fused, verified={"left": ()})
-    solved_from = cells(result_rows(replace(results, fused=fused), rig), "Solved from")
-    assert solved_from == (f"2 alignments, 1 verified eye, {results.method}",)
+    rows = result_rows(replace(results, fused=fused), rig)
+    assert cells(rows, "Corrected by") == ("1 verified eye",)
+    assert cells(rows, "Solved from") == (f"2 alignments, {results.method}",)
 
 
 def test_an_eye_that_took_no_part_has_no_numbers(left_only: Results, rig: Rig) -> None:
