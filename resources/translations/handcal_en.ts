@@ -2988,6 +2988,26 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Last: hand turned.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last: moved too fast.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last: shape changed.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last: no hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last: drawn otherwise.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Rotation history</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4017,6 +4037,14 @@ root mean square over the inliers</source>
     </message>
     <message>
         <source>Where eyes are expected before any alignment</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Corrected by</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verifications, fused with the rest</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
