@@ -100,6 +100,13 @@ def press(widget: QWidget | None) -> None:
         widget.showPopup()
 
 
+def keep_focus_off_clicked_buttons(window: QWidget) -> None:
+    """Keep the keyboard focus where it is when a button of a window is clicked."""
+    for button in window.findChildren(QAbstractButton):
+        if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+
+
 class NoAltLetters(QObject):
     """Keeps Alt with a letter that leads nowhere from being typed into the field with the focus.
 

@@ -18,7 +18,6 @@ from PySide6.QtGui import (
     QResizeEvent,
 )
 from PySide6.QtWidgets import (
-    QAbstractButton,
     QApplication,
     QDockWidget,
     QMainWindow,
@@ -40,7 +39,7 @@ from handcal_gui.docks import (
     share_room,
     widen_page,
 )
-from handcal_gui.keys import press
+from handcal_gui.keys import keep_focus_off_clicked_buttons, press
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.pages.wizard.action_bar import BottomStrip
 from handcal_gui.pages.wizard.wizard import WizardPanel
@@ -115,9 +114,8 @@ class MainWindow(QMainWindow):
         middle = QWidget()
         gap_px = SPACING_PX // 2
         margins = (*3 * (gap_px,), 2)  # so that no message is on the line of the strip below
-        self._middle = vbox(
-            self.banner, (self._stack, 1), on=middle, margins=margins, spacing=gap_px
-        )
+        pages = (self._stack, 1)
+        self._middle = vbox(self.banner, pages, on=middle, margins=margins, spacing=gap_px)
         self.setCentralWidget(middle)
         self._bar = wizard.bar
         self.setStatusBar(BottomStrip(self._bar))
@@ -130,8 +128,7 @@ class MainWindow(QMainWindow):
             dock.visibilityChanged.connect(self._titles_timer.start)
             dock.dockLocationChanged.connect(self._titles_timer.start)
             dock.topLevelChanged.connect(self._own_layout)
-        self._is_own, self._least_px = False, inf
-        self._was_small = False
+        self._is_own, self._was_small, self._least_px = False, False, inf
         self._share_soon = fit_soon(self._fit_panels, self)
         self._share_soon.setInterval(_SETTLED_MS)
         self._layouts: dict[Page, QByteArray] = {}
@@ -143,7 +140,7 @@ class MainWindow(QMainWindow):
             arrange_docks(self, self._docks, is_small=is_small)
             self._default_layouts[is_small] = self.saveState(_SHARED)
         self._make_menus()
-        self._keep_focus_off_clicked_buttons()
+        keep_focus_off_clicked_buttons(self)
         self.show_page("start")
         follow_theme(self, partial(draw_title_buttons, self._docks))
 
@@ -401,9 +398,3 @@ class MainWindow(QMainWindow):
         arrangement: Arrangement = "panels" if self._arrangement == "station" else "station"
         self.use_arrangement(arrangement)
         self.arrangement_changed.emit(arrangement)
-
-    def _keep_focus_off_clicked_buttons(self) -> None:
-        """Keep the keyboard focus where it is when a button is clicked."""
-        for button in self.findChildren(QAbstractButton):
-            if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
-                button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
