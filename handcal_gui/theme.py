@@ -56,7 +56,7 @@ _LIGHT = Colors(
     live="#1f6fd6",
     cursor="#8f690c",
     red="#820d0d",
-    good="#2b7c4b",
+    good="#297848",
     warning="#96610f",
     left="#20686a",
     right="#8e3fa8",
@@ -339,7 +339,8 @@ def _palette(shades: _Shades) -> QPalette:
     for role in (roles.Text, roles.WindowText, roles.ButtonText, roles.ToolTipText):
         palette.setColor(role, QColor(shades.text))
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(shades.disabled))
-    palette.setColor(QPalette.ColorGroup.Disabled, roles.PlaceholderText, QColor(shades.disabled))
+    for role in (roles.PlaceholderText, roles.Highlight):  # with this, sliders are filled
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(shades.disabled))
     return palette
 
 

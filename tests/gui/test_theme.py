@@ -12,13 +12,14 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QSlider, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.types import Float64
 from handcal_gui.theme import colors, follow_theme, icon, is_dark, use_theme
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.residual_scale import OUTLIER, residual_ramp
+from tests.gui.helpers import show
 
 
 @pytest.fixture
@@ -72,6 +73,20 @@ def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
     for theme in ("dark", "light", "contrast"):
         use_theme(theme)
         qtbot.waitUntil(follows)
+
+
+@pytest.mark.usefixtures("themes")
+@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
+def test_a_locked_slider_is_grey(qtbot: QtBot, theme: Literal["light", "dark", "contrast"]) -> None:
+    use_theme(theme)
+    slider = show(qtbot, QSlider(Qt.Orientation.Horizontal), 200, 30)
+    slider.setValue(50)
+    saturations = []
+    for is_enabled in (True, False):
+        slider.setEnabled(is_enabled)
+        saturations.append(slider.grab().toImage().pixelColor(40, 15).hslSaturation())
+    assert saturations[0] > 90
+    assert saturations[1] < 40
 
 
 def test_an_icon_takes_a_colour_with_a_meaning(qtbot: QtBot) -> None:
