@@ -171,6 +171,8 @@ def _group(action: QAction) -> tuple[str, str]:
     parent = action.parent()
     while isinstance(parent, QWidget):
         if isinstance(parent, QDockWidget):
+            if action.shortcutContext() is Qt.ShortcutContext.WindowShortcut:
+                return tr("Guide"), _IN_CALIBRATION
             return parent.windowTitle(), _IN_PANEL
         if parent.objectName() == "wizard":
             return tr("Guide"), _IN_CALIBRATION

@@ -70,6 +70,7 @@ class CameraPanel(QWidget):
         self._status = _Status()
         self._freeze = QAction(tr("Freeze"), self, checkable=True, autoRepeat=False)
         self._freeze.setToolTip(tr("Freeze the image (F)"))
+        self._freeze.setWhatsThis(tr("Freeze the camera's image"))
         self._freeze.setShortcut("F")
         self._freeze.setIconText(tr("Freeze (F)"))
         self._mode = QComboBox()

@@ -81,7 +81,9 @@ def test_help_lists_every_key_of_an_action(program: Program) -> None:
         ("Fine-tune", "Shift+S", "Reset to solved"),
         ("Trials", "E", "Next choice of the eye"),
         ("Guide", "Shift+Left", "Move the outline far left"),
-        ("Camera", "F", "Freeze"),
+        ("Camera", "M", "Next displayed image"),
+        ("Guide", "F", "Freeze the camera's image"),
+        ("Guide", "T", "Record trial"),
         ("Hand cloud", "+, =", "Zoom in"),
         ("Fine-tune", "1", "Step of 0.1 mm"),
     ):

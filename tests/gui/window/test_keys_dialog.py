@@ -45,7 +45,8 @@ def test_headings_say_where_keys_work(dialog: KeysDialog) -> None:
     assert "Space" in shown["Window: works everywhere"]
     assert {"H", "Ctrl+P"} <= {*shown["Guide: works during a calibration"]}
     assert "F11" in shown["View: a menu; works everywhere"]
-    assert "F" in shown["Camera: a panel; works while it has the keyboard focus"]
+    assert {"F", "T"} <= {*shown["Guide: works during a calibration"]}, "of a panel, but anywhere"
+    assert "M" in shown["Camera: a panel; works while it has the keyboard focus"]
 
 
 def test_esc_also_closes_windows_and_each_button_has_a_letter(dialog: KeysDialog) -> None:
