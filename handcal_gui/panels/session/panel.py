@@ -97,6 +97,8 @@ class SessionPanel(QWidget):
         self._notes.changed.connect(self.notes_changed)
         self._unwritten = paragraph("unwritten")
         self._unwritten.hide()
+        self._single = ElidedLabel()
+        self._single.setText(tr("φ of each alignment alone; the result is in Results"))
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
             lambda deletion: self.restore_requested.emit(deletion.kind, deletion.number)
@@ -160,6 +162,7 @@ class SessionPanel(QWidget):
 
     def _refresh(self) -> None:
         record = self._record
+        self._show_note()
         self._open_folder.setEnabled(record is not None)
         self._inspect.setEnabled(record is not None and bool(record.alignments))
         self._export.setEnabled(record is not None)
@@ -178,6 +181,11 @@ class SessionPanel(QWidget):
         self._strip.show_deletions([] if self._is_read_only else deletions(record))
         self._tabs.setTabText(0, tr("Alignments ({})").format(len(record.alignments)))
         self._tabs.setTabText(1, tr("Trials ({})").format(len(record.trials)))
+
+    def _show_note(self) -> None:
+        """Explain the numbers of alignments while they are in sight."""
+        has_any = self._record is not None and bool(self._record.alignments)
+        self._single.setVisible(has_any and self._tabs.currentWidget() is self._alignments)
 
     def _show_eye_distance(self, stored: EyeDistance | None) -> None:
         is_told = stored is not None and stored.source == "headset"
@@ -230,7 +238,8 @@ class SessionPanel(QWidget):
         keep_space(self._strip.button)
         buttons = self._strip.button, (QWidget(), 1), self._open_folder, self._inspect, self._export
         row = hbox(*buttons, spacing=SPACING_PX)
-        parts = form, (self._tabs, 1), self._unwritten, self._strip, row
+        self._tabs.currentChanged.connect(self._show_note)
+        parts = form, (self._tabs, 1), self._unwritten, self._single, self._strip, row
         vbox(*parts, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 

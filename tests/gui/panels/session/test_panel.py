@@ -60,7 +60,24 @@ def test_shows_the_session_of_a_snapshot(
     assert cell(alignments, 0, 3) == "–", "the results are gone"
 
 
-def test_an_alignment_that_is_not_written_yet_is_told(
+def test_the_numbers_of_alignments_are_explained_while_they_are_shown(
+    panel: SessionPanel, record: SessionRecord
+) -> None:
+    note = "φ of each alignment alone; the result is in Results"
+    shown = [one for one in panel.findChildren(QLabel) if one.text() == note]
+    panel.show_record(record, None)
+    tabs = child(panel, QTabWidget)
+    seen = []
+    for tab in range(3):
+        tabs.setCurrentIndex(tab)
+        seen.append(shown[0].isVisible())
+    assert seen == [True, False, False]
+    tabs.setCurrentIndex(0)
+    panel.show_record(replace(record, alignments={}), None)
+    assert not shown[0].isVisible()
+
+
+def test_alignments_that_are_not_written_yet_are_counted(
     panel: SessionPanel, snapshot: Callable[..., Snapshot], record: SessionRecord
 ) -> None:
     told = child(panel, QLabel, "unwritten")
