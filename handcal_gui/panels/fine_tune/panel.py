@@ -52,7 +52,7 @@ _MOVES: dict[int, tuple[int, int]] = {
 """Axis and direction of φ, opposite to the picture's, which moves in the key's direction."""
 _ARRIVALS = {
     Arrival.SENDING: ("wait", tr("Sending to the headset…")),
-    Arrival.ARRIVED: ("check", tr("In the headset. Keys: ← → ↑ ↓, PgUp, PgDn, E")),
+    Arrival.ARRIVED: ("check", tr("In the headset. ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")),
     Arrival.LATE: ("warning", tr("Not acknowledged by the headset; see Link")),
 }
 _NO_SESSION = tr("Fine-tuning starts with a session.")
@@ -156,7 +156,7 @@ class FineTunePanel(QWidget):
         arrival = self._stream.arrival
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
         if self._is_editable() and arrival is Arrival.ARRIVED and not self._has_keys():
-            sign, text = "fine-tune", tr("Click here, or Ctrl+6: keys ← → ↑ ↓, PgUp, PgDn, E")
+            sign, text = "fine-tune", tr("Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")
         self._show_status(sign, text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

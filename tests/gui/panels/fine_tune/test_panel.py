@@ -56,7 +56,7 @@ def test_shows_what_the_headset_renders_with(
     for eye in EYES:
         solved_mm = 1e3 * results.eyes[eye].shift_m
         np.testing.assert_allclose(fields_mm(panel, eye), solved_mm, atol=0.005)
-    assert status(panel) == "In the headset. Keys: ← → ↑ ↓, PgUp, PgDn, E"
+    assert status(panel) == "In the headset. ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye"
     assert field(panel, "left", 1).isEnabled()
 
 
@@ -164,14 +164,14 @@ def test_the_panel_says_that_a_click_gives_it_the_arrow_keys(
     other.setFocus()
     qtbot.waitUntil(other.hasFocus)
     show()
-    assert status(panel) == "Click here, or Ctrl+6: keys ← → ↑ ↓, PgUp, PgDn, E"
+    assert status(panel) == "Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye"
     show(State.ALIGN)
-    assert "Click here" not in status(panel)
+    assert "Ctrl+6" not in status(panel)
     panel.activateWindow()
     panel.setFocus()
     qtbot.waitUntil(panel.hasFocus)
     show()
-    assert "Click here" not in status(panel)
+    assert "Ctrl+6" not in status(panel)
 
 
 @pytest.mark.parametrize(
