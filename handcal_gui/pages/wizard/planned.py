@@ -208,11 +208,12 @@ class PlannedWizard(Wizard):
 
     def _ask_to_verify(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         eye = planned.eyes[0]
+        text = tr("Keep the hand up and still, to measure the error of the {} eye.")
+        if len(set(self.usable_eyes) - snapshot.procedure.verifications.keys()) > 1:
+            text = tr("Keep the hand up and still, to measure the error of each eye, first the {}.")
         return WizardView(
             Step.VERIFY,
-            tr("Keep the hand up and still, to measure the error of the {} eye.").format(
-                EYE_WORDS[eye]
-            ),
+            text.format(EYE_WORDS[eye]),
             (hand_found(snapshot), hand_still(snapshot), *eyes_accepted(snapshot)),
             self._take_step(
                 tr("Verify the {} eye").format(EYE_WORDS[eye]),
@@ -314,12 +315,12 @@ def _drawn_otherwise(snapshot: Snapshot) -> str:
         return ""
     names = [one.name for one in snapshot.record.events]
     set_by = [name for name in names if name in (WENT_BACK, SessionEvent.FINE_TUNED)]
-    which = tr("a fine-tuned one")
+    which = tr("a fine-tuned φ")
     if set_by[-2:-1] == [WENT_BACK]:  # which records φ like a fine-tuning
         is_offline = not any(drawn_m[eye].any() for eye in solved_m)
-        which = tr("the offline calibration's") if is_offline else tr("an earlier one")
+        which = tr("the offline calibration's φ") if is_offline else tr("an earlier φ")
     former_m = procedure.former_shift_m
     can_return = all(eye in former_m and (former_m[eye] == solved_m[eye]).all() for eye in solved_m)
     how = tr("Press G to return.") if can_return else tr("Reset φ in Fine-tune to return.")
-    found = tr("The headset draws with a different φ from this result's: {}.").format(which)
+    found = tr("The headset draws with {}, which is saved and exported.").format(which)
     return f"{found} {how}"

@@ -233,11 +233,15 @@ class Wizard:
         )
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
+            text = tr("Raise the hand and hold it still, to measure the error of the {} eye.")
+            if len(unverified) > 1:
+                text = tr(
+                    "Raise the hand and hold it still, to measure the error of each eye, first the "
+                    "{}."
+                )
             return WizardView(
                 Step.VERIFY,
-                tr("Raise the hand and hold it still, to measure the error of the {} eye.").format(
-                    EYE_WORDS[eye]
-                ),
+                text.format(EYE_WORDS[eye]),
                 (hand_found(snapshot), hand_still(snapshot), *preconditions),
                 ButtonSpec(
                     Action.VERIFY,

@@ -224,28 +224,30 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
     assert wizard.view(as_solved).fact == ""
     back = {eye: np.array([0.009, 0.0, 0.0]) for eye in EYES}
     gone_back = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=back)
-    assert "different φ" in wizard.view(gone_back).fact
+    assert "saved and exported" in wizard.view(gone_back).fact
     fine_tuned, went_back = SessionEvent.FINE_TUNED, WENT_BACK
     zero = {eye: np.zeros(3) for eye in EYES}
-    for names, drawn_m, former_m, said in (
-        ([fine_tuned], back, zero, "a fine-tuned one. Reset φ in Fine-tune to return."),
-        ([went_back, fine_tuned], back, rendered, "an earlier one. Press G to return."),
-        ([went_back, fine_tuned], zero, rendered, "the offline calibration's. Press G to return."),
+    for names, drawn_m, former_m, which, how in (
+        ([fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
+        ([went_back, fine_tuned], back, rendered, "an earlier φ", "Press G"),
+        ([went_back, fine_tuned], zero, rendered, "the offline calibration's φ", "Press G"),
         (
             [went_back, fine_tuned],
             zero,
             back,
-            "the offline calibration's. Reset φ in Fine-tune to return.",
+            "the offline calibration's φ",
+            "Reset φ in Fine-tune",
         ),
-        ([went_back, fine_tuned, fine_tuned], back, zero, "a fine-tuned one. Reset φ in"),
+        ([went_back, fine_tuned, fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
     ):
         events = (*done.record.events, *(Event(99, "", name, {}) for name in names))
         shifts_m = {"applied_shift_m": drawn_m, "former_shift_m": former_m}
         seen = planned_snapshot(snapshot, StepName.DONE, **shifts_m)
         seen = replace(seen, record=replace(seen.record, events=events))
-        assert said in wizard.view(seen).fact
+        said = f"The headset draws with {which}, which is saved and exported. {how} to return."
+        assert wizard.view(seen).fact == said
         wizard.move(Action.NEXT, seen)
-        assert said in wizard.view(seen).fact, "at the last step, too"
+        assert wizard.view(seen).fact == said, "at the last step, too"
         wizard = begun(snapshot)
 
 
@@ -279,3 +281,14 @@ def test_a_held_plan_does_not_say_that_the_next_cursor_follows(snapshot: Maker) 
     assert wizard.view(cursor).sentence.endswith("follows at once.")
     wizard.is_held = True
     assert wizard.view(cursor).sentence.startswith("Keep the hand up, and make the next cursor")
+
+
+def test_the_first_verification_says_that_the_other_eye_follows(snapshot: Maker) -> None:
+    wizard = begun(snapshot)
+    texts = [
+        wizard.view(
+            planned_snapshot(snapshot, StepName.VERIFY, verifications=verified)
+        ).sentence.partition("error of ")[2]
+        for verified in ({}, {"left": VERIFIED["left"]})
+    ]
+    assert texts == ["each eye, first the left.", "the left eye."]
