@@ -40,7 +40,7 @@ class ResidualsTab(QWidget):
         self._choice.currentIndexChanged.connect(self._show_chosen)
         self._map = ResidualMap()
         note = QLabel(
-            tr("The hand as seen from the eye; × marks points without a partner (outliers).")
+            tr("The hand as seen from the eye; a magenta × is a point without a partner (outlier).")
         )
         note.setWordWrap(True)
         vbox(self._choice, (self._map, 1), note, on=self, spacing=SPACING_PX)
