@@ -1481,6 +1481,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Keep the hand up and still, to measure the error of each eye, first the {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Not every eye has been verified. Finish as it is, or verify an eye.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1501,15 +1505,19 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>a fine-tuned one</source>
+        <source>a fine-tuned φ</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>the offline calibration&apos;s</source>
+        <source>the offline calibration&apos;s φ</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>an earlier one</source>
+        <source>an earlier φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The headset draws with {}, which is saved and exported.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1518,10 +1526,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Reset φ in Fine-tune to return.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The headset draws with a different φ from this result&apos;s: {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1806,6 +1810,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Align &amp;right eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Raise the hand and hold it still, to measure the error of each eye, first the {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2162,6 +2170,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Freeze the camera&apos;s image</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Freeze (F)</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2423,15 +2435,15 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>In the headset. ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Not acknowledged by the headset; see Link</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Fine-tuning starts with a session.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Click here, or Ctrl+6: keys ← → ↑ ↓, PgUp, PgDn, E</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2483,7 +2495,7 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>In the headset. Keys: ← → ↑ ↓, PgUp, PgDn, E</source>
+        <source>Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2936,7 +2948,7 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The hand as seen from the eye; × marks points without a partner (outliers).</source>
+        <source>The hand as seen from the eye; a magenta × is a point without a partner (outlier).</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3115,6 +3127,10 @@ A change discards the results: solve again.</source>
     </message>
     <message>
         <source>Recorded trials appear here</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ of each alignment alone; the result is in Results</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
