@@ -36,8 +36,8 @@ _GRID_HINT = tr(
 )
 _BOARD_HINT = tr(
     "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
-    "through it while the headset tracks the board. Save in one JSON file for each image its name "
-    'and the board\'s pose in the headset rig: <a href="{}">its contents</a>.'
+    "through it while the headset tracks the board. Save one JSON file with the name of each "
+    'image and the pose of its board in the headset rig: <a href="{}">its contents</a>.'
 ).format("docs/rig-guide.md#left-and-right-display")
 
 

@@ -252,8 +252,8 @@ def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
     told = {
         tr("{} failed").format(failed): failed,
         tr("{} doubtful (see Check)").format(doubtful): doubtful,
-        tr("{} not calibrated here: {}").format(len(missing), names): missing,
-        tr("{} not known").format(unknown): unknown,
+        tr("{} not calibrated by handcal: {}").format(len(missing), names): missing,
+        tr("{} not known or not made").format(unknown): unknown,
         tr("none doubtful"): not failed and not doubtful,
     }
     text = "; ".join(words for words, is_so in told.items() if is_so)

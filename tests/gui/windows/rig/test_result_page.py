@@ -76,7 +76,7 @@ def test_each_text_begins_with_a_capital_and_no_file_is_named_before_there_is_on
     qtbot.addWidget(page)
     texts = [text for what, (found, _) in told(page).items() for text in (what, found)]
     assert not [text for text in texts if text[0].islower()]
-    assert told(page)["Headset"] == ("Not known", "Not known")
+    assert told(page)["Headset"] == ("Not known: the headset itself reports it", "Not known")
 
 
 def test_a_failed_acceptance_is_no_mere_doubt(qtbot: QtBot, project: RigProject) -> None:
@@ -87,12 +87,12 @@ def test_a_failed_acceptance_is_no_mere_doubt(qtbot: QtBot, project: RigProject)
     assert next(iter(told(page))) == "Acceptance"
     assert told(page)["Acceptance"][1] == "Failed"
     said, sign = child(page, QLabel, "savedRigFound"), child(page, QLabel, "savedRigHealth")
-    assert said.text().startswith("1 failed; 4 not known. Do what Acceptance says")
+    assert said.text().startswith("1 failed; 4 not known or not made. Do what Acceptance says")
     assert sign.accessibleName() == "Problem"
     project.note_accepted("the rig passes", is_passed=True)
     page.enter()
     assert told(page)["Acceptance"][1] == "Good"
-    assert said.text().startswith("4 not known; none doubtful. Save")
+    assert said.text().startswith("4 not known or not made; none doubtful. Save")
 
 
 def test_no_item_is_broken_in_a_small_window(qtbot: QtBot, project: RigProject) -> None:
