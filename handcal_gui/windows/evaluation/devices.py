@@ -21,7 +21,8 @@ def pairing_problem() -> str:
         is_paired = bool(Pairings.read(pairing_file()).all)
     except HandcalError as error:
         return str(error)
-    return "" if is_paired else tr("no headset is paired; pair one with Connect a headset")
+    how = tr("no headset is paired; pair one with Connect a headset in the File menu")
+    return "" if is_paired else how
 
 
 @contextmanager
