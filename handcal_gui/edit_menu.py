@@ -51,7 +51,8 @@ def add_edit_menu(window: MainWindow, find: Callable[[], object]) -> None:
         for due in (menu.aboutToShow, again.timeout):
             due.connect(partial(_show_target, window, entry, name))
     menu.addSeparator()
-    window.add_action("Edit", tr("&Find in sessions…"), "Ctrl+F", find)
+    found = window.add_action("Edit", tr("&Find in sessions…"), "Ctrl+F", find)
+    found.setWhatsThis(tr("Find in sessions; in a window with a search field, go there"))
 
 
 def _trigger(window: MainWindow, name: str) -> None:

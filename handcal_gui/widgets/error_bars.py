@@ -22,6 +22,7 @@ _SCALE_ARCMIN = 30.0
 
 
 PICTURE_LEGEND = tr("Bars: error before, after; left eye above")
+LIBRARY_LEGEND = tr("Bars: expected error before, after; left eye above")
 PICTURE_HELP = tr(
     "Bars of the small picture: the left eye above the right one, each with its error before\n"
     "the calibration (grey) and after it (coloured; full if the eye is accepted). The whole\n"

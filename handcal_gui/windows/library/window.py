@@ -29,7 +29,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text, limit_length
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.error_bars import PICTURE_HELP, PICTURE_LEGEND, has_bars
+from handcal_gui.widgets.error_bars import LIBRARY_LEGEND, PICTURE_HELP, has_bars
 from handcal_gui.widgets.fields import (
     button,
     choice,
@@ -103,7 +103,7 @@ class LibraryWindow(QDialog):
         self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
         self._table = SessionsTable(self._sessions)
-        self._legend = with_name(QLabel(PICTURE_LEGEND), "legend", help_text=PICTURE_HELP)
+        self._legend = with_name(QLabel(LIBRARY_LEGEND), "legend", help_text=PICTURE_HELP)
         self._count = paragraph("count", tr("Reading {}…").format(folder))
         self._trend = TrendPlot()
         self._trend.setMinimumHeight(20 * SPACING_PX)

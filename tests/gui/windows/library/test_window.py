@@ -21,7 +21,7 @@ from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import EYES
 from handcal_gui.theme import number_font
-from handcal_gui.widgets.error_bars import PICTURE_LEGEND, error_text
+from handcal_gui.widgets.error_bars import LIBRARY_LEGEND, error_text
 from handcal_gui.windows.library.sessions_model import (
     COLUMNS,
     FILTERS,
@@ -61,7 +61,10 @@ def test_the_bars_have_a_key_while_there_are_any(
     qtbot: QtBot, window: LibraryWindow, folder: Path
 ) -> None:
     key = child(window, QLabel, "legend")
-    assert (key.text(), key.isVisible()) == ("Bars: error before, after; left eye above", True)
+    assert (key.text(), key.isVisible()) == (
+        "Bars: expected error before, after; left eye above",
+        True,
+    )
     for name in ("ada-1", "ada-2", "bea"):
         delete_session(folder / name)
     window.reload()
@@ -146,7 +149,7 @@ def test_sessions_whose_trials_contradict_the_verdict_are_found_and_stand_togeth
 
 def test_the_bars_and_the_columns_use_the_same_words_and_numbers() -> None:
     titles = [column.title.partition(" ′")[0] for column in COLUMNS]
-    assert "error before, after" in PICTURE_LEGEND
+    assert "error before, after" in LIBRARY_LEGEND
     assert titles[5:8] == ["Before", "Found", "After"]
     verified = EyeOutcome("accept", 20.0, 10.0, 5.0, 8.0)
     one = make_row(LibraryEntry(Path("a"), (0, 0), eyes={"left": verified}))
