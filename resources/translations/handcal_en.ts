@@ -1929,6 +1929,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Find in sessions; in a window with a search field, go there</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>both eyes</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5571,10 +5575,6 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>no headset is paired; pair one with Connect a headset</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Evaluations</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5987,10 +5987,6 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board. Save in one JSON file for each image its name and the board&apos;s pose in the headset rig: &lt;a href=&quot;{}&quot;&gt;its contents&lt;/a&gt;.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Measured distance of the virtual screen, in metres.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6016,6 +6012,10 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Images of t&amp;he grid</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Leave the camera in its place and switch the display off. Take 8 or more images of the board through it while the headset tracks the board. Save one JSON file with the name of each image and the pose of its board in the headset rig: &lt;a href=&quot;{}&quot;&gt;its contents&lt;/a&gt;.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6365,11 +6365,11 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} not calibrated here: {}</source>
+        <source>{} not calibrated by handcal: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} not known</source>
+        <source>{} not known or not made</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6945,6 +6945,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Bars: expected error before, after; left eye above</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Bars of the small picture: the left eye above the right one, each with its error before
 the calibration (grey) and after it (coloured; full if the eye is accepted). The whole
 width is {:.0f}′.</source>
@@ -7054,6 +7058,10 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>handcal hit an unexpected error ({}: {}). Everything captured is saved; restart the program if it no longer works, and report it with Help &gt; Support bundle.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>no headset is paired; pair one with Connect a headset in the File menu</source>
         <translation type="unfinished"></translation>
     </message>
 </context>
