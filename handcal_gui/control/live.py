@@ -98,9 +98,7 @@ class CalibrationController(QObject):
         self._is_watching = self._is_plan_held = False
         self._conditions = Conditions()
         panels = window.panels
-        self._turns: deque[Panel] = deque(
-            (panels.cloud, panels.rotation, panels.wearer_view, wizard_panel.picture)
-        )
+        self._turns: deque[Panel] = deque((panels.cloud, panels.wearer_view, wizard_panel.picture))
         self._visible: set[object] = set()  # panels
         # Numbers of commands: the wizard's last one, and those in the snapshot shown.
         self._doing = self._shown = 0
@@ -247,7 +245,9 @@ class CalibrationController(QObject):
         self._snapshot = snapshot
         panels = self._window.panels
         # Even while hidden: they may be used before the next snapshot, or have a history.
-        always = panels.fine_tune, panels.trials, panels.link
+        always: set[object] = {panels.fine_tune, panels.trials, panels.link}
+        # The guide and the rotation panel advise the same: they never show different frames.
+        always |= {panels.rotation} & self._visible
         # Panels that are slow to paint take turns, so that the window never waits for all of them.
         self._wizard_panel.show_snapshot(snapshot)
         # Otherwise, on a slow computer, some panels would never have a turn.
@@ -258,9 +258,7 @@ class CalibrationController(QObject):
         turns = [one for one in self._turns if one is picture or one in self._visible]
         for panel in (*panels.all(), picture):
             is_due = panel is turns[0] if panel in self._turns else panel in self._visible
-            is_guidance = panel is panels.rotation and panel in self._visible
-            is_due &= shows
-            if panel in always or is_due or (is_guidance and self._conditions.is_slow):
+            if panel in always or (is_due and shows):
                 panel.show_snapshot(snapshot)
         self._window.banner.show_condition(condition)
         wizard = self._wizard_panel.wizard

@@ -103,7 +103,7 @@ def test_on_a_slow_computer_panels_show_every_second_of_them(stream: Stream) -> 
     counts = {name: len(shown) for name, shown in stream.shown.items()}
     assert len(stream.polled) == 16
     assert counts["camera"] == counts["results"] == 8
-    assert counts["cloud"] == counts["wearer_view"] == 2
+    assert {counts["cloud"], counts["wearer_view"]} <= {2, 3}
     assert counts["rotation"] == 16, "guidance comes first"
 
 
@@ -113,6 +113,7 @@ def test_thirty_frames_a_second_are_shown_and_the_last_by_every_panel(stream: St
         stream.polled.clear()
         moving = [stream.see(0.01 * i) for i in range(12)]
         assert stream.polled == moving[::every]
+        assert stream.shown["rotation"][-len(stream.polled) :] == stream.polled, "as the guide"
         still = [stream.see(0.2) for _ in range(4 * every)]
         for name, shown in stream.shown.items():
             assert shown[-1] in still, name
