@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from handcal.register.benefit import expected_error_arcmin
@@ -169,6 +169,11 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
         rows.append(Row(tr("Corrected by"), (verified,), tr("Verifications, fused with the rest")))
     fused = f"{count if results.alignments else verified}, {results.method}"
     return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
+
+
+def eyes_text(eyes: Sequence[Eye]) -> str:
+    """Return the name of one eye, or of both."""
+    return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
 
 
 def verdict_word(results: Results, eye: Eye) -> str:

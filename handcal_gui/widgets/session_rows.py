@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +13,12 @@ from handcal.report.cells import signed
 from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
-from handcal.types import EYES, Eye
+from handcal.types import EYES
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.record_table import RecordColumn
-from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, eyes_text
 from handcal_gui.widgets.times import local_time
 
 _PHI = tr(
@@ -132,7 +132,7 @@ def alignment_rows(record: SessionRecord, results: Results | None) -> dict[int, 
         measured = ("\n".join(lines) for lines in (*phi, rms, inliers))
         rows[number] = (
             str(number),
-            _eyes_text(alignment.eyes),
+            eyes_text(alignment.eyes),
             f"{angle_deg:.1f}",
             *(text or NOTHING for text in measured),
             local_time(times[number], _CLOCK),
@@ -206,8 +206,3 @@ def _spread_cells(spread: TrialSpread) -> tuple[str, ...]:
         f"{spread.median_arcmin:.1f}",
         f"{spread.max_arcmin:.1f}",
     )
-
-
-def _eyes_text(eyes: Sequence[Eye]) -> str:
-    """Return the name of one eye, or of both."""
-    return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
