@@ -44,6 +44,7 @@ from handcal_gui.pages.wizard.view import (
     WizardView,
 )
 from handcal_gui.translation import tr
+from handcal_gui.widgets.result_rows import eyes_text
 from handcal_gui.widgets.sentence import sentence
 
 _STEPS = {
@@ -311,7 +312,8 @@ def _drawn_otherwise(snapshot: Snapshot) -> str:
     if results is None or procedure.state is not State.APPLIED:
         return ""
     solved_m = results.rendered_shift_m
-    if all((drawn_m[eye] == solved_m[eye]).all() for eye in solved_m):
+    others = [eye for eye in solved_m if (drawn_m[eye] != solved_m[eye]).any()]
+    if not others:
         return ""
     names = [one.name for one in snapshot.record.events]
     set_by = [name for name in names if name in (WENT_BACK, SessionEvent.FINE_TUNED)]
@@ -322,5 +324,5 @@ def _drawn_otherwise(snapshot: Snapshot) -> str:
     former_m = procedure.former_shift_m
     can_return = all(eye in former_m and (former_m[eye] == solved_m[eye]).all() for eye in solved_m)
     how = tr("Press G to return.") if can_return else tr("Reset φ in Fine-tune to return.")
-    found = tr("The headset draws with {}, which is saved and exported.").format(which)
-    return f"{found} {how}"
+    found = tr("{}: drawn, saved and exported with {}; the verdict is on the solved φ.")
+    return f"{found.format(eyes_text(others), which)} {how}"

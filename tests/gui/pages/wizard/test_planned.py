@@ -225,6 +225,10 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
     back = {eye: np.array([0.009, 0.0, 0.0]) for eye in EYES}
     gone_back = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=back)
     assert "saved and exported" in wizard.view(gone_back).fact
+    one = planned_snapshot(
+        snapshot, StepName.DONE, applied_shift_m={**rendered, "left": back["left"]}
+    )
+    assert wizard.view(one).fact.startswith("Left eye: drawn, saved and exported with")
     fine_tuned, went_back = SessionEvent.FINE_TUNED, WENT_BACK
     zero = {eye: np.zeros(3) for eye in EYES}
     for names, drawn_m, former_m, which, how in (
@@ -244,7 +248,10 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
         shifts_m = {"applied_shift_m": drawn_m, "former_shift_m": former_m}
         seen = planned_snapshot(snapshot, StepName.DONE, **shifts_m)
         seen = replace(seen, record=replace(seen.record, events=events))
-        said = f"The headset draws with {which}, which is saved and exported. {how} to return."
+        said = (
+            f"Both eyes: drawn, saved and exported with {which}; the verdict is on the solved φ. "
+            f"{how} to return."
+        )
         assert wizard.view(seen).fact == said
         wizard.move(Action.NEXT, seen)
         assert wizard.view(seen).fact == said, "at the last step, too"
