@@ -33,6 +33,7 @@ _DIMMED = 0.25
 """Share of the light that a picture of the light window loses on a dark page."""
 _MARKED = 0.3
 """Opacity of the ground of the words searched for."""
+_SETTLED_MS = 100
 _PAGES = (".md", ".py", ".proto")
 _PICTURE = re.compile(r"^!\[.+\]\((\S+\.png)\)$", re.MULTILINE)
 _DIRECTIVE = re.compile(r"^::: (\S+)$", re.MULTILINE)
@@ -53,6 +54,7 @@ class ManualPage(QTextBrowser):
         self._words: re.Pattern[str] | None = None
         self._pictures: set[QUrl] = set()
         self._fit_soon = fit_soon(self._fit_pictures, self)
+        self._fit_soon.setInterval(_SETTLED_MS)
         self.anchorClicked.connect(self._open_picture)
         follow_theme(self, self._load_again)
 
@@ -97,7 +99,6 @@ class ManualPage(QTextBrowser):
         target = self.source().resolved(url)
         if target.isLocalFile() and not target.path().endswith(_PAGES):
             return  # a picture or a folder would replace the page
-        self._pictures.clear()
         super().doSetSource(url, type)
         self.mark(self._words)
         heading = url.fragment(QUrl.ComponentFormattingOption.FullyDecoded)
@@ -116,6 +117,7 @@ class ManualPage(QTextBrowser):
         """
         path = Path(self.source().resolved(QUrl(name)).toLocalFile())
         if kind == QTextDocument.ResourceType.MarkdownResource.value and path.is_file():
+            self._pictures.clear()  # of the page before
             return markdown_of(path)
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
@@ -135,9 +137,9 @@ class ManualPage(QTextBrowser):
         return image
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Reduce the pictures of a page that has become too narrow for them."""
+        """Give the pictures the page's new width, once it has stopped changing: they take 0.1 s."""
         super().resizeEvent(event)
-        if self.horizontalScrollBar().maximum() > 0:
+        if event.size().width() != event.oldSize().width():
             self._fit_soon.start()
 
     def _fit_pictures(self) -> None:

@@ -216,14 +216,22 @@ def test_a_small_window_shows_the_contents_beside_pages_that_fit(
     assert manual.page.width() > 400
 
 
-def test_pictures_are_reduced_with_the_window(qtbot: QtBot, manual: Manual) -> None:
+def test_pictures_have_the_width_of_the_window(qtbot: QtBot, manual: Manual) -> None:
+    def pictures_px() -> float:
+        return manual.page.document().idealWidth()
+
     manual.resize(1300, 700)
     manual.open("docs/guide.md")
     qtbot.waitUntil(lambda: manual.page.width() > 800)
+    wide_px = pictures_px()
+    manual.page.setSource(QUrl("guide.md#keys"))  # of the same page: nothing is loaded
     marked = manual.page.textCursor().position()
     manual.resize(700, 482)
     qtbot.waitUntil(lambda: manual.page.width() < 600)
     qtbot.waitUntil(lambda: manual.page.horizontalScrollBar().maximum() == 0)
+    assert pictures_px() < 600
+    manual.resize(1300, 700)
+    qtbot.waitUntil(lambda: pictures_px() == wide_px)
     assert manual.page.textCursor().position() == marked
 
 
