@@ -31,7 +31,7 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.theme import SPACING_PX, heighten_tabs, icon
+from handcal_gui.theme import SPACING_PX, heighten_tabs, icon, set_style
 from handcal_gui.translation import tr
 
 TITLES = {
@@ -273,7 +273,7 @@ def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
     room_px = max((docks[name].width() for name in names), default=0)
     has_icons = texts_px + 3 * SPACING_PX * len(names) > room_px
     if has_icons:
-        bar.setStyleSheet(_ICON_TABS)
+        set_style(bar, _ICON_TABS)
     else:
         heighten_tabs(bar)
     for i, name in enumerate(names):

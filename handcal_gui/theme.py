@@ -21,7 +21,7 @@ from PySide6.QtGui import (
     QPixmap,
 )
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication, QHeaderView, QTabBar, QTabWidget, QWidget
+from PySide6.QtWidgets import QApplication, QHeaderView, QTabBar, QWidget
 
 from handcal.io.resources import resource_path
 
@@ -224,11 +224,17 @@ def follow_theme(widget: QWidget, redraw: Callable[[], object]) -> None:
 
 
 def set_style(widget: QWidget, sheet: str) -> None:
-    """Give a widget a style sheet, and again after each change of the theme.
+    """Give a widget a style sheet in place of its former one, and again after a change of theme.
 
     Qt does not update the colours of a widget that has one.
     """
-    _THEME.changed.connect(_Style(widget, sheet).set)
+    style = widget.findChild(_Style, options=Qt.FindChildOption.FindDirectChildrenOnly)
+    if style is None:
+        style = _Style(widget)
+        _THEME.changed.connect(style.set)
+    if style.sheet != sheet:
+        style.sheet = sheet
+        style.set()
 
 
 def flat_header(header: QHeaderView) -> None:
@@ -253,9 +259,9 @@ def font_px() -> int:
     return QFontInfo(QGuiApplication.font()).pixelSize()
 
 
-def heighten_tabs(tabs: QTabBar | QTabWidget) -> None:
+def heighten_tabs(bar: QTabBar) -> None:
     """Give tabs the height of their text: Qt cuts the lowest pixels of those not in front."""
-    tabs.setStyleSheet("QTabBar::tab { height: 2em; }")
+    set_style(bar, "QTabBar::tab { height: 2em; }")
 
 
 def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:
@@ -297,14 +303,15 @@ _THEME = _Theme()
 class _Style(QObject):
     """Sets its parent's style sheet; deleted with it, and its connection, too."""
 
-    def __init__(self, widget: QWidget, sheet: str) -> None:
+    sheet = ""
+
+    def __init__(self, widget: QWidget) -> None:
         super().__init__(widget)
-        self._widget, self._sheet = widget, sheet
-        self.set()
+        self._widget = widget
 
     def set(self) -> None:
         self._widget.setStyleSheet("")
-        self._widget.setStyleSheet(self._sheet)
+        self._widget.setStyleSheet(self.sheet)
 
 
 class _PaletteWatch(QObject):

@@ -31,7 +31,6 @@ from handcal_gui.docks import (
     PanelLetters,
     Panels,
     arrange_docks,
-    draw_title_buttons,
     has_columns,
     hide_tabs,
     leave_titles_to_tabs,
@@ -142,7 +141,7 @@ class MainWindow(QMainWindow):
         self._make_menus()
         keep_focus_off_clicked_buttons(self)
         self.show_page("start")
-        follow_theme(self, partial(draw_title_buttons, self._docks))
+        follow_theme(self, self._titles_timer.start)
 
     @property
     def docks(self) -> Docks:

@@ -14,7 +14,7 @@ class RecordTabs(QTabWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        heighten_tabs(self)
+        heighten_tabs(self.tabBar())
         self._delete = QToolButton()
         self._delete.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the table handles Del
         self.setCornerWidget(self._delete)

@@ -184,7 +184,7 @@ class ResultsPanel(QWidget):
         empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         empty.setContentsMargins(*4 * (2 * SPACING_PX,))
         self._tabs = tabs = QTabWidget()
-        heighten_tabs(tabs)
+        heighten_tabs(tabs.tabBar())
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
         tabs.setUsesScrollButtons(False)  # a long title is shortened instead
