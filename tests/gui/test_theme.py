@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Iterator
 from dataclasses import fields
+from functools import partial
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -94,6 +95,9 @@ def test_tabs_and_what_is_in_them_follow_the_theme(qtbot: QtBot) -> None:
         heighten_tabs(tabs.tabBar())  # as docks do whenever they move
         return tabs, inside
 
+    def look_equal(one: QWidget, other: QWidget) -> bool:
+        return one.grab().toImage() == other.grab().toImage()
+
     use_theme("light")
     tabs, inside = made()
     show(qtbot, tabs, 300, 200)
@@ -101,9 +105,8 @@ def test_tabs_and_what_is_in_them_follow_the_theme(qtbot: QtBot) -> None:
         use_theme(theme)
         fresh, fresh_inside = made()
         show(qtbot, fresh, 300, 200)
-        bars, texts = (tabs.tabBar(), fresh.tabBar()), (inside, fresh_inside)
-        for pair in (bars, texts):
-            qtbot.waitUntil(lambda pair=pair: pair[0].grab().toImage() == pair[1].grab().toImage())
+        for one, other in ((tabs.tabBar(), fresh.tabBar()), (inside, fresh_inside)):
+            qtbot.waitUntil(partial(look_equal, one, other))
 
 
 @pytest.mark.usefixtures("themes")
