@@ -221,13 +221,12 @@ class SeparateWindows(QObject):
             opened[0].activateWindow()
             return opened[0]
         self._start.keep_entries(self._current)
-        entries = self._current.now.evaluation
+        entries, proposed = self._current.now.evaluation, self._current.now.station.sessions
         if not entries.users.sessions:
-            users = replace(entries.users, sessions=self._current.now.station.sessions)
-            entries = replace(entries, users=users)
+            entries = replace(entries, users=replace(entries.users, sessions=proposed))
         window = EvaluationWindow(make_specs(), entries, self._window)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        window.remembered.connect(self._remember_evaluation)
+        window.remembered.connect(partial(self._remember_evaluation, proposed))
         window.manual_wanted.connect(self.manual_wanted)
         self._ending.connect(window.stop)
         window.show()
@@ -281,8 +280,9 @@ class SeparateWindows(QObject):
     def _remember_export(self, settings: ExportSettings, folder: Path) -> None:
         self._current.change(export=settings, export_folder=str(folder))
 
-    def _remember_evaluation(self, entries: EvaluationEntries) -> None:
-        if entries.users.sessions == self._current.now.station.sessions:  # which may be changed
+    def _remember_evaluation(self, proposed: str, entries: EvaluationEntries) -> None:
+        """Remember entries, except the folder of sessions that was only proposed."""
+        if entries.users.sessions == proposed:
             entries = replace(entries, users=replace(entries.users, sessions=""))
         self._current.change(evaluation=entries)
 

@@ -55,11 +55,16 @@ def test_the_user_test_proposes_the_session_folder_in_use(qtbot: QtBot, tmp_path
     (tmp_path / "config").mkdir()
     program = Program(PreferencesFile(tmp_path / "config" / "preferences.json"))
     qtbot.addWidget(program.window)
-    for name in ("demonstration", "other"):
+
+    def use(name: str) -> None:  # as a start does, which leaves the page behind
         station = replace(program.preferences.station, sessions=str(tmp_path / name))
-        program._current.change(station=station)  # as a start does, which leaves the page behind
+        program._current.change(station=station)
+
+    for name in ("demonstration", "other"):
+        use(name)
         window = program.windows.evaluate()
         assert window.entries.users.sessions == str(tmp_path / name)
+        use("meanwhile")
         window.close()
     window = program.windows.evaluate()
     window.show_page("users")
