@@ -16,7 +16,13 @@ from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.windows.library.sessions_model import COLUMNS, NAMES, SPARED, SessionsModel
+from handcal_gui.windows.library.sessions_model import (
+    COLUMNS,
+    NAMES,
+    SPARED,
+    SessionRow,
+    SessionsModel,
+)
 
 _MOST_SHOWN_PX = 300
 _TRIALS = 8
@@ -34,7 +40,7 @@ class SessionsTable(QTableView):
     Attributes
     ----------
     left_out : ElidedLabel
-        Names the columns that the window is too narrow for.
+        Shows what the window is too narrow for: of one session its values, else the columns.
     """
 
     def __init__(self, sessions: SessionsModel) -> None:
@@ -42,6 +48,7 @@ class SessionsTable(QTableView):
         self._sessions = sessions
         self._kept: set[Path] = set()
         self._first_row = 0
+        self._hidden: list[int] = []
         self.left_out = with_name(ElidedLabel(), "leftOut")
         self.left_out.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         with_name(self, "sessionTable", tr("Sessions"))
@@ -70,17 +77,22 @@ class SessionsTable(QTableView):
         self._reason = paragraph("noSessions")
         self._reason.setAlignment(Qt.AlignmentFlag.AlignCenter)
         vbox((self._reason, 1), on=self.viewport(), margins=2 * SPACING_PX)
+        self.selectionModel().selectionChanged.connect(self._show_left_out)
         sessions.modelAboutToBeReset.connect(self._keep_chosen)
         sessions.modelReset.connect(lambda: self.choose(self._kept))
 
     @property
     def chosen(self) -> list[LibraryEntry]:
         """The sessions that are selected, in the order shown."""
+        return [one.entry for one in self._chosen_rows]
+
+    @property
+    def _chosen_rows(self) -> list[SessionRow]:
         # By ranges: Qt's list of rows asks the model for every cell of every session.
         selection = self.selectionModel().selection()
         ranges = (selection.at(i) for i in range(selection.size()))
         rows = sorted({row for one in ranges for row in range(one.top(), one.bottom() + 1)})
-        return [self._sessions.shown[row].entry for row in rows]
+        return [self._sessions.shown[row] for row in rows]
 
     def choose(self, paths: Collection[Path]) -> None:
         """Select sessions by their folders; if none is shown, the one in the place of the first."""
@@ -137,10 +149,17 @@ class SessionsTable(QTableView):
             excess_px -= cut_px
         for number, width_px in wanted_px.items():
             self.setColumnWidth(number, width_px)
-        titles = (COLUMNS[number].title.split(" ′")[0] for number in sorted(hidden))
-        self.left_out.setText(
-            tr("In a wider window also: {}").format(", ".join(titles)) if hidden else ""
-        )
+        self._hidden = sorted(hidden)
+        self._show_left_out()
+
+    def _show_left_out(self) -> None:
+        """Show the values of a single selected session that have no column, or their names."""
+        titles = [COLUMNS[number].title.split("\n")[0] for number in self._hidden]
+        text = tr("In a wider window also: {}").format(", ".join(titles))
+        if len(rows := self._chosen_rows) == 1:
+            values = (rows[0].texts[number] for number in self._hidden)
+            text = "; ".join(map("{}: {}".format, titles, values))
+        self.left_out.setText(text if self._hidden else "")
 
     def _keep_chosen(self) -> None:
         chosen = self.chosen
