@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -96,22 +97,25 @@ def variety(found: Iterable[BoardView], board: Board) -> Variety:
     """Count the views in which the board is near, far and tilted, without the camera's intrinsics.
 
     Near: seen from the front, the board would be half as wide as the image or more. Far: a third
-    or less. Tilted: its squares are foreshortened as by 20° or more from the line of sight.
+    or less. Tilted: its squares are foreshortened as if tilted by 20° or more.
     """
     width_m = max(board.squares) * board.square_m
-    shares, tilts_rad = [], []
-    for seen in found:
-        H, _ = cv2.findHomography(seen.points_m[:, :2], seen.pixels)
-        if H is None:
-            continue
-        x, y, scale = H @ [*seen.points_m[:, :2].mean(axis=0), 1.0]
-        px_per_m = (H[:2, :2] - np.outer([x, y], H[2, :2]) / scale) / scale
-        most, least = np.linalg.svd(px_per_m, compute_uv=False)
-        shares.append(most * width_m / seen.size[0])
-        tilts_rad.append(np.arccos(least / most))
-    share, tilt_rad = np.array(shares), np.array(tilts_rad)
+    seen = [one for one in map(_scale_and_tilt, found) if one is not None]
+    share, tilt_rad = np.array(seen).reshape(-1, 2).T * [[width_m], [1.0]]
     counts = (share >= _NEAR_SHARE, share <= _FAR_SHARE, tilt_rad >= _TILTED_RAD)
     return Variety(*(int(which.sum()) for which in counts))
+
+
+@lru_cache(maxsize=1024)
+def _scale_and_tilt(seen: BoardView) -> tuple[float, float] | None:
+    """Return the largest scale, as a share of the image's width per metre, and the tilt in rad."""
+    H, _ = cv2.findHomography(seen.points_m[:, :2], seen.pixels)
+    if H is None:
+        return None
+    x, y, scale = H @ [*seen.points_m[:, :2].mean(axis=0), 1.0]
+    px_per_m = (H[:2, :2] - np.outer([x, y], H[2, :2]) / scale) / scale
+    most, least = np.linalg.svd(px_per_m, compute_uv=False)
+    return float(most) / seen.size[0], float(np.arccos(least / most))
 
 
 def _moved_share(a: BoardView, b: BoardView) -> float:
