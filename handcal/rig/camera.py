@@ -208,7 +208,7 @@ def _judge(
     seen_area = coverage(found.values())
     wanting = []
     if len(poses) < settings.good_views:
-        wanting.append(f"{len(poses)} views, {ASKED_VIEWS} are better")
+        wanting.append(f"{len(poses)} views, {max(ASKED_VIEWS, settings.good_views)} are better")
     if seen_area.share < settings.good_coverage:
         wanting.append(
             f"the board was seen in {100 * seen_area.share:.0f} % of the image only: bring it to "

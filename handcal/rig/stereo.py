@@ -343,7 +343,7 @@ def _judge(
     known = f"± {np.degrees(angle_sigma):.3f}°, ± {1e3 * shift_sigma:.2f} mm"
     wanting = [why] if why else []
     if len(T_D_B) < settings.good_pairs:
-        wanting.append(f"{len(T_D_B)} pairs, {ASKED_VIEWS} are better")
+        wanting.append(f"{len(T_D_B)} pairs, {max(ASKED_VIEWS, settings.good_pairs)} are better")
     if spread_rad < settings.good_spread_rad:
         wanting.append(f"the board was tilted by {np.degrees(spread_rad):.0f}° only")
     if angle_sigma > settings.max_angle_sigma_rad or shift_sigma > settings.max_shift_sigma_m:
