@@ -101,7 +101,8 @@ class ResultPage(QWidget):
         summary = _summary(rig, findings)
         if saved is not None:
             words = tr("saved as {}; {}").format(saved, summary.found)
-            summary = Finding("", summary.health, words)
+            is_broken = summary.health is Health.BROKEN
+            summary = Finding("", summary.health, words, summary.advice if is_broken else "")
         self._end.show_finding(summary)
         self._compare()
 
@@ -264,5 +265,5 @@ def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
     if missing:
         advice = tr("solve these steps, or save the rig file to use it as it is")
     if failed:
-        advice = tr("do what Acceptance says, and accept the rig again")
+        advice = tr("follow the advice under Acceptance, then repeat it")
     return Finding("", health, text, advice)

@@ -76,23 +76,34 @@ def test_each_text_begins_with_a_capital_and_no_file_is_named_before_there_is_on
     qtbot.addWidget(page)
     texts = [text for what, (found, _) in told(page).items() for text in (what, found)]
     assert not [text for text in texts if text[0].islower()]
-    assert told(page)["Headset"] == ("Not known: the headset itself reports it", "Not known")
+    assert told(page)["Headset"] == ("Not known until a headset reports it", "Not known")
 
 
-def test_a_failed_acceptance_is_no_mere_doubt(qtbot: QtBot, project: RigProject) -> None:
-    project.use_rig(replace(project.rig, origins=dict.fromkeys(RIG_PARTS, ORIGIN)))
-    project.note_accepted("the rig fails: left", is_passed=False)
+def test_a_failed_acceptance_is_shown_as_a_failure(
+    qtbot: QtBot, project: RigProject, tmp_path: Path
+) -> None:
     page = ResultPage(project)
     qtbot.addWidget(page)
+    left = replace(project.rig.eyes["left"], z_C0_S_m=20.0)
+    project.use_rig(replace(project.rig, eyes={**project.rig.eyes, "left": left}))
+    project.note_accepted("the rig fails: left", is_passed=False)
+    page.enter()
+    assert [sign for _, sign in told(page).values()][:2] == ["Failed", "Doubtful"]
+    project.use_rig(replace(example_rig(), origins=dict.fromkeys(RIG_PARTS, ORIGIN)))
+    project.note_accepted("the rig fails: left", is_passed=False)
+    page.enter()
     assert next(iter(told(page))) == "Acceptance"
     assert told(page)["Acceptance"][1] == "Failed"
     said, sign = child(page, QLabel, "savedRigFound"), child(page, QLabel, "savedRigHealth")
-    assert said.text().startswith("1 failed; 4 not known or not made. Do what Acceptance says")
+    assert said.text().startswith("1 failed; 4 not known or not made. Follow the advice under")
     assert sign.accessibleName() == "Problem"
     project.note_accepted("the rig passes", is_passed=True)
     page.enter()
     assert told(page)["Acceptance"][1] == "Good"
     assert said.text().startswith("4 not known or not made; none doubtful. Save")
+    project.note_accepted("the rig fails: left", is_passed=False)
+    project.save_rig_as(tmp_path / "ours.yaml")
+    assert said.text().endswith("Follow the advice under Acceptance, then repeat it.")
 
 
 def test_no_item_is_broken_in_a_small_window(qtbot: QtBot, project: RigProject) -> None:
