@@ -95,12 +95,11 @@ class LibraryWindow(QDialog):
         self._folder = folder
         self._contents = Contents()
         self._changes: list[Change] = [()]
-        self._found_damaged: set[Path] = set()  # by the last check, which reads more
+        self._checked, self._found_damaged = list[Path](), set[Path]()  # by the last check
         self._is_read = False
         self._sessions = SessionsModel()
-        self._search = with_name(QLineEdit(), "search", tr("Search"))
+        self._search = with_name(QLineEdit(clearButtonEnabled=True), "search", tr("Search"))
         self._search.setPlaceholderText(tr("Search wearer, date, rig, headset (Ctrl+F)"))
-        self._search.setClearButtonEnabled(True)
         self._kind = choice("kind", tr("Sessions shown"), FILTERS)
         self._table = SessionsTable(self._sessions)
         self._legend = with_name(QLabel(LIBRARY_LEGEND), "legend", help_text=PICTURE_HELP)
@@ -134,8 +133,9 @@ class LibraryWindow(QDialog):
         return self._table.chosen
 
     def reload(self) -> None:
-        """Read the folder again."""
-        self._find.ask([row.entry for row in self._sessions.rows])
+        """Read the folder again; sessions that have not changed only if they were just checked."""
+        rows = self._sessions.rows
+        self._find.ask([row.entry for row in rows if row.entry.path not in self._checked])
 
     def stop(self) -> None:
         """Cancel what is running; safe to call twice."""
@@ -236,8 +236,8 @@ class LibraryWindow(QDialog):
         self.export_requested.emit([entry.path for entry in self.chosen])
 
     def _check_chosen(self) -> None:
-        self._found_damaged.clear()
-        self._start(partial(check_sessions, [one.path for one in self.chosen], self._found_damaged))
+        self._checked, self._found_damaged = [one.path for one in self.chosen], set()
+        self._start(partial(check_sessions, self._checked, self._found_damaged))
 
     def _repair_chosen(self) -> None:
         self._start(partial(repair_beside, self.chosen[0].path))

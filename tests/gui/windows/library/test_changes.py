@@ -26,6 +26,10 @@ from tests.gui.windows.library.conftest import (
 )
 
 
+def state(window: LibraryWindow, wearer: str) -> str:
+    return next(row[9] for row in rows(window) if row[0] == wearer)
+
+
 def test_check_names_the_damage_and_repair_copies_the_rest(
     qtbot: QtBot, window: LibraryWindow, folder: Path
 ) -> None:
@@ -65,6 +69,7 @@ def test_only_a_damaged_session_is_repaired(
     press(window, "checkSessions")
     wait_for(qtbot, window, "Repair copies what is sound")
     qtbot.waitUntil(repair.isEnabled, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: state(window, "Bea") == "Damaged: 1 part", timeout=PATIENCE_MS)
     file.write_bytes(sound)
     press(window, "repairSession")
     wait_for(qtbot, window, " is sound: there is nothing to repair.")
@@ -73,7 +78,8 @@ def test_only_a_damaged_session_is_repaired(
     press(window, "checkSessions")
     wait_for(qtbot, window, "✓ 1 session sound")
     qtbot.waitUntil(child(window, QPushButton, "checkSessions").isEnabled, timeout=PATIENCE_MS)
-    assert not repair.isEnabled()
+    qtbot.waitUntil(lambda: not repair.isEnabled(), timeout=PATIENCE_MS)
+    assert state(window, "Bea") == "Finished"
 
 
 def test_what_was_deleted_together_is_restored_together_by_name(
