@@ -202,8 +202,9 @@ class EvaluationPage(QWidget):
         if self.is_busy or is_shown:
             task = self.kept if self.is_busy else tr("Change the entries for another study.")
         elif is_again:
-            task = tr("Change the entries, or run again if files have changed.")
-        self._question.setText(f"{self._question_text} {task}")
+            task = tr("Change the entries, or run again if the files have changed.")
+        if readiness is not None or not self._is_done:  # else the check has only just begun
+            self._question.setText(f"{self._question_text} {task}")
         if readiness is not None:
             self._button.setText(tr("Run again") if is_again else readiness.button)
         self._found.setVisible(not self.is_busy)  # the progress bar says more
@@ -223,8 +224,6 @@ class EvaluationPage(QWidget):
         if (readiness := self._readiness) is None:
             return None
         finding = readiness.finding
-        if not readiness.can_run:
-            finding = replace(finding, health=Health.BROKEN)
         if not self._is_cancelled:
             return finding
         if finding.health is Health.GOOD and not readiness.is_done:  # ready for a new start

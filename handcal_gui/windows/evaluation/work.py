@@ -30,15 +30,13 @@ class Readiness:
 
     finding: Finding
     button: str = tr("Run")
-    is_complete: bool = True
-    """False if an entry is missing, which is no problem yet."""
     is_done: bool = False
     """True if a run would only show what is stored."""
 
     @property
     def can_run(self) -> bool:
         """True if the evaluation can be run."""
-        return self.is_complete and self.finding.health is not Health.BROKEN
+        return self.finding.health is not Health.BROKEN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +127,7 @@ class FileEvaluation:
     def readiness(self, entries: Any) -> Readiness:
         """Return which entry is missing, or whether an earlier report will be replaced."""
         if missing := self.missing(entries):
-            return Readiness(_note(missing), is_complete=False)
+            return Readiness(Finding("", Health.BROKEN, missing))
         folder = free_of_studies(output_folder(entries.output))
         require_writable(folder)
         if (folder / "report.pdf").exists():

@@ -1,4 +1,4 @@
-"""A page that evaluates given files: what it asks for before and after, and what forbids a run."""
+"""A page that evaluates given files: what it asks for before and after, and what prevents a run."""
 
 from __future__ import annotations
 
@@ -55,14 +55,19 @@ def test_once_done_it_no_longer_says_how_to_start(qtbot: QtBot, window: Evaluati
         run.click()
         qtbot.waitUntil(lambda: run.isEnabled() and run.text() == "Run again")
         assert child(window, QLabel, "readinessFound").text() == "Done."
-        assert question.text().endswith(" Change the entries, or run again if files have changed.")
+        assert question.text().endswith(
+            " Change the entries, or run again if the files have changed."
+        )
+    window.page.hide()
+    window.page.show()
+    assert not question.text().endswith("start at the lower right."), "while it is checked"
     output = window.entries.users.output
     window.page.form.enter(output=f"{output}-2")
     qtbot.waitUntil(lambda: run.isEnabled() and run.text() == "Run")
     assert question.text().endswith(" Check the entries, then start at the lower right.")
 
 
-def test_what_forbids_a_run_has_one_sign(qtbot: QtBot, window: EvaluationWindow) -> None:
+def test_what_prevents_a_run_has_one_sign(qtbot: QtBot, window: EvaluationWindow) -> None:
     run, found = child(window, QPushButton, "run"), child(window, QLabel, "readinessFound")
     sign = child(window, QLabel, "readinessHealth")
     qtbot.waitUntil(run.isEnabled)
