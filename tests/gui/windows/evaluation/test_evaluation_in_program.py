@@ -12,6 +12,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.evaluation.window import EvaluationWindow
 from tests.gui.helpers import child
 
@@ -56,15 +57,17 @@ def test_the_user_test_proposes_the_session_folder_in_use(qtbot: QtBot, tmp_path
     program = Program(PreferencesFile(tmp_path / "config" / "preferences.json"))
     qtbot.addWidget(program.window)
 
-    def use(name: str) -> None:  # as a start does, which leaves the page behind
-        station = replace(program.preferences.station, sessions=str(tmp_path / name))
-        program._current.change(station=station)
+    def use(name: str) -> None:
+        fields = program.window.findChildren(PathField)
+        [field] = [one for one in fields if one.name == "Session folder"]
+        field.set_path(str(tmp_path / name))
 
     for name in ("demonstration", "other"):
         use(name)
         window = program.windows.evaluate()
         assert window.entries.users.sessions == str(tmp_path / name)
-        use("meanwhile")
+        started = replace(program.preferences.station, sessions=str(tmp_path / "started"))
+        program._current.change(station=started)
         window.close()
     window = program.windows.evaluate()
     window.show_page("users")
