@@ -42,6 +42,7 @@ _SETTLE_MS = 300
 """From the last letter typed until the first line found is shown: a page takes 0.1 to 0.3 s."""
 _MOST_FOUND = 200
 _GUIDE = "guide.md"
+_CHOOSE = tr("Choose a page, or search all")
 _NOTHING = tr("Nothing found: search for fewer or other words")
 _LINK = re.compile(r"\]\(([\w-]+\.md)")
 
@@ -125,7 +126,7 @@ class Manual(QWidget):
         self.contents.setHeaderHidden(True)
         self._parts = QSplitter()
         self._pages: dict[Path, QTreeWidgetItem] = {}
-        self._count = QLabel()
+        self._count = QLabel(_CHOOSE)
         self._lines: list[Line] = []
         self._shown: list[Line] = []
         self._settle = QTimer(self, interval=_SETTLE_MS, singleShot=True)
@@ -253,8 +254,8 @@ class Manual(QWidget):
             self.found.resizeColumnToContents(column)
         self.found.setVisible(bool(found))
         most = tr(", the first {} listed").format(_MOST_FOUND) if len(found) > _MOST_FOUND else ""
-        count = pluralize(len(found), tr("line"), tr("lines")) if found else _NOTHING
-        self._count.setText(f"{count}{most}" if words.split() else "")
+        count = pluralize(len(found), tr("line found"), tr("lines found")) if found else _NOTHING
+        self._count.setText(f"{count}{most}" if words.split() else _CHOOSE)
         self._settle.start()
 
     def _show_next(self) -> None:

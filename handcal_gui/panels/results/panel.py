@@ -119,7 +119,7 @@ class ResultsPanel(QWidget):
             card.setVisible(has_verdicts)
         eyes = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(eyes, result_rows(results, rig))
-        for tab in (self._convergence, self._residuals, self._alone):
+        for tab in (self._iterations, self._residuals, self._alone):
             self._tabs.setTabVisible(self._tabs.indexOf(tab), bool(results.alignments))
         self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
@@ -190,7 +190,8 @@ class ResultsPanel(QWidget):
         tabs.setUsesScrollButtons(False)  # a long title is shortened instead
         tabs.setElideMode(Qt.TextElideMode.ElideRight)
         tabs.addTab(self._eyes_tab(), tr("Eyes"))
-        tabs.addTab(self._convergence, tr("Iterations"))
+        self._iterations = self._iterations_tab()
+        tabs.addTab(self._iterations, tr("Iterations"))
         tabs.setTabToolTip(1, tr("Convergence of each registration"))
         tabs.addTab(self._residuals, tr("Residuals"))
         self._alone = self._alignments_tab()
@@ -205,6 +206,12 @@ class ResultsPanel(QWidget):
         cards = hbox(*((card, 1) for card in self._cards.values()), spacing=SPACING_PX)
         tab = QWidget()
         vbox(cards, (self._numbers, 1), on=tab, margins=SPACING_PX // 2, spacing=SPACING_PX // 2)
+        return tab
+
+    def _iterations_tab(self) -> QWidget:
+        tab = QWidget()
+        meaning = paragraph("", tr("Hand to cursor, by iteration; a level end has converged."))
+        vbox((self._convergence, 1), meaning, on=tab, margins=0, spacing=0)
         return tab
 
     def _alignments_tab(self) -> QWidget:
