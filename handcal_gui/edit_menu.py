@@ -52,7 +52,7 @@ def add_edit_menu(window: MainWindow, find: Callable[[], object]) -> None:
             due.connect(partial(_show_target, window, entry, name))
     menu.addSeparator()
     found = window.add_action("Edit", tr("&Find in sessions…"), "Ctrl+F", find)
-    found.setWhatsThis(tr("Find in sessions; in a window with a search field, go there"))
+    found.setWhatsThis(tr("Find in sessions, or go to the search field of the window in front"))
 
 
 def _trigger(window: MainWindow, name: str) -> None:

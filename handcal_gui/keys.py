@@ -39,7 +39,7 @@ _NOT_ACTIONS = {
         (tr("Esc"), tr("Close the message, or a dialog or window opened from here")),
         (tr("Tab"), tr("Move to the next button or field")),
         (tr("Alt+Left, Alt+Right"), tr("In the manual: go back or forward")),
-        (tr("Ctrl+Tab"), tr("Show the next tab, while the focus is in one")),
+        (tr("Ctrl+Tab"), tr("Show the next tab of the panel that has the focus")),
     ),
     tr("Fine-tune"): (
         (tr("Arrows, PgUp, PgDown"), tr("Move what the chosen eye sees in the key's direction")),

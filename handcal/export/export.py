@@ -81,9 +81,9 @@ def export_session(
 
 
 def _part(progress: Progress, done: int, formats: Sequence[Format]) -> Progress:
-    """Return the progress of a part: of solving, then of each format; it tells of which one.
+    """Return the progress of one part: solving, or one format, which its messages name.
 
-    Solving precedes the first format: its user asked for files, not for another result.
+    Solving counts towards the first format, because the user asked for files.
     """
     number, parts = max(done, 1), 1 + len(formats)
     title = f"Exporting {number} of {len(formats)}, {_ALL[formats[number - 1]].title}"

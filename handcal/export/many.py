@@ -70,7 +70,7 @@ def _export(
     name = f"{done + 1} of {count}: {record.wearer or path.name}"
 
     def report(what: str, share: float) -> None:
-        progress.report(f"{name}, {what[0].lower()}{what[1:]}", share)
+        progress.report(f"{name}, {what[:1].lower()}{what[1:]}", share)
 
     part = replace(progress, report=report).part(done / count, (done + 1) / count)
     return export_session(record, folder / path.name, settings, part)

@@ -130,7 +130,7 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
         is_known=bool(camera.model and camera.serial_number),
     )
     if rig.headset is None:
-        yield _not_told("Headset", "not known: the headset itself reports it")
+        yield RigFinding("Headset", "not known until a headset reports it", is_known=False)
     else:
         name, runtime = rig.headset.name or rig.headset.device_id, rig.headset.runtime
         found = f"{name}, {runtime or 'runtime not known'}"
@@ -201,7 +201,7 @@ def depth_finding(check: DepthCheck | None) -> RigFinding:
     """Return the largest bias of depth where hands are held; it is fine if certainly small."""
     what = "Depth check"
     if check is None:
-        return _not_told(what, "not made: 'handcal rig depth' makes it")
+        return RigFinding(what, "not made yet: run 'handcal rig depth'", is_known=False)
     bias_m, sigma_m = np.transpose([check.bias_m(depth_m) for depth_m in _HAND_DEPTHS_M])
     worst = int(np.argmax(np.abs(bias_m) + 2.0 * sigma_m))
     return RigFinding(
@@ -218,7 +218,7 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
     """Return what the check of the displays has found."""
     what, expected = "Display check", "what is drawn moves as the projections say"
     if check is None:
-        return _not_told(what, "not made: 'handcal rig display-check' makes it")
+        return RigFinding(what, "not made yet: run 'handcal rig display-check'", is_known=False)
     found = "; ".join(
         f"{' and '.join(eye for eye in check.problems if check.problems[eye] == text)}: {text}"
         for text in dict.fromkeys(check.problems.values())
@@ -234,15 +234,11 @@ def display_finding(check: DisplayCheck | None) -> RigFinding:
     return RigFinding(what, f"{found} ({by})", is_fine, expected, is_known)
 
 
-def _not_told(what: str, found: str) -> RigFinding:
-    return RigFinding(what, found, is_known=False)
-
-
 def _origin_finding(rig: Rig, part: RigPart) -> RigFinding:
     origin = next((origin for name, origin in rig.origins.items() if name == part), None)
     what = f"Calibration of the {PART_NAMES[part]}"
     if origin is None:
-        return _not_told(what, "not calibrated by handcal")
+        return RigFinding(what, "not calibrated by handcal", is_known=False)
     return RigFinding(
         what,
         f"{origin.verdict}: {origin.reason} ({origin.method}, {origin.made})",

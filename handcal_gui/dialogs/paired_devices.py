@@ -59,7 +59,7 @@ class PairedDevices(QWidget):
         across.setSectionResizeMode(_NAME, QHeaderView.ResizeMode.Stretch)
         across.setSectionResizeMode(_DEVICE, QHeaderView.ResizeMode.ResizeToContents)
         self._empty = paragraph(
-            "noDevices", tr("None yet. Each headset that pairs is listed here.")
+            "noDevices", tr("None yet. Headsets appear here once they are paired.")
         )
         self._empty.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._rename = button("renameDevice", tr("Rena&me"), tr("Rename the chosen headset"))

@@ -32,7 +32,7 @@ PICTURE_HELP = tr(
 
 def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
     """Return a picture of two bars for each eye; an after bar is full if the eye is accepted."""
-    bars = tuple(eyes.get(eye) if has_bars(eyes) else None for eye in EYES)
+    bars = tuple(map(eyes.get, EYES)) if has_bars(eyes) else ()
     return _draw(bars, colors(), QGuiApplication.primaryScreen().devicePixelRatio())
 
 

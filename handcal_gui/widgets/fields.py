@@ -250,9 +250,9 @@ def label_for(field: QWidget, text: str) -> QLabel:
 
 
 def let_keys_choose(box: QComboBox, panel: QWidget, text: str, keys: str) -> None:
-    """Let keys choose the next entry of a list from anywhere in its panel; its tooltip names them.
+    """Add a key that chooses the next entry of a list from anywhere in its panel.
 
-    After the last entry comes the first.
+    After the last entry comes the first. The tooltip names the key.
     """
 
     def choose_next() -> None:

@@ -209,9 +209,9 @@ class PlannedWizard(Wizard):
 
     def _ask_to_verify(self, planned: NextStep, snapshot: Snapshot) -> WizardView:
         eye = planned.eyes[0]
-        text = tr("Keep the hand up and still, to measure the error of the {} eye.")
+        text = tr("Keep the hand up and still to measure the error of the {} eye.")
         if len(set(self.usable_eyes) - snapshot.procedure.verifications.keys()) > 1:
-            text = tr("Keep the hand up and still, to measure the error of each eye, first the {}.")
+            text = tr("Keep the hand up and still to measure the error of each eye, the {} first.")
         return WizardView(
             Step.VERIFY,
             text.format(EYE_WORDS[eye]),

@@ -233,11 +233,11 @@ class Wizard:
         )
         if is_usable and (unverified := self.unverified(snapshot)):
             eye = unverified[0]
-            text = tr("Raise the hand and hold it still, to measure the error of the {} eye.")
+            text = tr("Raise the hand and hold it still to measure the error of the {} eye.")
             if len(unverified) > 1:
                 text = tr(
-                    "Raise the hand and hold it still, to measure the error of each eye, first the "
-                    "{}."
+                    "Raise the hand and hold it still to measure the error of each eye, the {} "
+                    "first."
                 )
             return WizardView(
                 Step.VERIFY,

@@ -44,7 +44,7 @@ _REASONS = {
     "moved": tr("Last: moved too fast."),
     "shape changed": tr("Last: shape changed."),
     "no hand": tr("Last: no hand."),
-    "drawn otherwise": tr("Last: drawn otherwise."),
+    "drawn otherwise": tr("Last: the drawing had changed."),
 }
 """Reasons of the journal."""
 
@@ -192,8 +192,8 @@ class RotationPanel(QWidget):
 
 def _last_reason(record: SessionRecord) -> str:
     """Return the reason of a session's last refusal; empty if there is none."""
-    reasons = [str(one.data.get("reason")) for one in record.events if one.name == "refused"]
-    return _REASONS.get(reasons[-1], "") if reasons else ""
+    last = next((one for one in reversed(record.events) if one.name == "refused"), None)
+    return "" if last is None else _REASONS.get(str(last.data.get("reason")), "")
 
 
 def _text_label(name: str, scale: float = 1.0, least_lines: int = 2) -> QLabel:

@@ -155,7 +155,7 @@ class SessionsTable(QTableView):
     def _show_left_out(self) -> None:
         """Show the values of a single selected session that have no column, or their names."""
         titles = [COLUMNS[number].title.split("\n")[0] for number in self._hidden]
-        text = tr("In a wider window also: {}").format(", ".join(titles))
+        text = tr("A wider window also shows: {}").format(", ".join(titles))
         if len(rows := self._chosen_rows) == 1:
             values = (rows[0].texts[number] for number in self._hidden)
             text = "; ".join(map("{}: {}".format, titles, values))

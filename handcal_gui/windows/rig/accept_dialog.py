@@ -47,7 +47,7 @@ _HOW = tr(
     "For each eye, put the viewpoint camera behind its display. In a dark room, take "
     "images of the grid. Do not move camera or headset: switch the display off, and take images "
     "of the board with both cameras at {} or more distances, 0.35 to 0.65 m. The rig passes if "
-    "the board's corners as drawn are on average at most {:g}′ from those seen."
+    "the drawn corners of the board lie, on average, within {:g}′ of those seen."
 ).format(FEWEST_VIEWS, LIMIT_ARCMIN)
 _COLUMNS = (tr("Corners"), tr("Mean, ′ (at most {:g})").format(LIMIT_ARCMIN), tr("Largest, ′"))
 _TAKE: dict[Eye, dict[str, str]] = {

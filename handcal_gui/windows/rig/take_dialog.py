@@ -95,8 +95,8 @@ class TakeDialog(QDialog):
         self._kinds = with_name(QLabel(), "takenKinds")
         self._kinds.setToolTip(
             tr(
-                "Near: the board would be half as wide as the view or more; far: a third or less. "
-                "Tilted: by 20° or more from the line of sight."
+                "Near: seen from the front, the board would fill half of the width or more; far: "
+                "a third or less. Tilted: by 20° or more from the line of sight."
             )
         )
         self._maps = tuple(CoverageMap(title) for title in folders)

@@ -298,4 +298,4 @@ def test_the_first_verification_says_that_the_other_eye_follows(snapshot: Maker)
         ).sentence.partition("error of ")[2]
         for verified in ({}, {"left": VERIFIED["left"]})
     ]
-    assert texts == ["each eye, first the left.", "the left eye."]
+    assert texts == ["each eye, the left first.", "the left eye."]

@@ -298,7 +298,7 @@ def test_a_narrow_window_names_the_columns_left_out_and_cuts_only_names(
                 assert across.sectionSize(column) >= table(window).sizeHintForColumn(column)
         hidden = [COLUMNS[i].title for i in range(across.count()) if across.isSectionHidden(i)]
         table(window).selectAll()
-        named = text(window, "leftOut").removeprefix("In a wider window also: ").split(", ")
+        named = text(window, "leftOut").removeprefix("A wider window also shows: ").split(", ")
         assert [one for one in named if one] == [one.partition("\n")[0] for one in hidden]
         choose(window, "Bea")
         assert ("Headset: –" in text(window, "leftOut")) == ("Headset" in hidden)

@@ -145,7 +145,7 @@ def test_one_eye_of_a_right_rig_passes(qtbot: QtBot, project: RigProject) -> Non
     qtbot.addWidget(dialog)
     dialog.show()
     found = part(dialog, QLabel, "acceptedFound")
-    assert "are on average at most 5′ from those seen" in part(dialog, QLabel, "how").text()
+    assert "lie, on average, within 5′ of those seen" in part(dialog, QLabel, "how").text()
     assert "Press Check the rig" in found.text()
     assert part(dialog, QLabel, "acceptedHealth").accessibleName() == "Not yet", "as in Result"
     part(dialog, QPushButton, "runAcceptance").click()
