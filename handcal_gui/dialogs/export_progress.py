@@ -38,7 +38,7 @@ class ExportProgress(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._doing: QLabel = with_name(ElidedLabel(), "doing")
-        self._bar = with_name(QProgressBar(), "progress", tr("Progress"))
+        self._bar = with_name(QProgressBar(format="%p %"), "progress", tr("Progress"))
         self._end = FindingLine("exportEnd")
         self._report = Path()
         self._open_report = button("openReport", tr("Open &report"))

@@ -60,7 +60,7 @@ class JobBar(QWidget):
         self._job: Job | None = None
         self._then: Callable[[Any], object] = lambda _: None
         self._doing: QLabel = with_name(ElidedLabel(), "doing")
-        self._bar = with_name(QProgressBar(), "progress", tr("Progress"))
+        self._bar = with_name(QProgressBar(format="%p %"), "progress", tr("Progress"))
         self._bar.setFixedWidth(20 * SPACING_PX)
         self._cancel = button("cancel", end or tr("Cance&l"))
         self._cancel.clicked.connect(self.cancel)

@@ -95,7 +95,7 @@ class LiveCameras(QWidget):
             field.changed.connect(self.chosen_changed)
         self._lay_out()
         self._refresh()
-        self._show_message(tr("The camera's image will be shown here"))
+        self._show_message(tr("The camera's image will be shown here."))
 
     def add_cameras(self, numbers: Iterable[int]) -> None:
         """Add cameras of this computer to the choices, by their numbers."""

@@ -532,7 +532,7 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>None yet. Each headset that pairs is listed here.</source>
+        <source>None yet. Headsets appear here once they are paired.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -843,7 +843,7 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Show the next tab, while the focus is in one</source>
+        <source>Show the next tab of the panel that has the focus</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1481,7 +1481,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Keep the hand up and still, to measure the error of each eye, first the {}.</source>
+        <source>{}: drawn, saved and exported with {}; the verdict is on the solved φ.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1517,10 +1517,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The headset draws with {}, which is saved and exported.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Press G to return.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1538,10 +1534,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Solve</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Keep the hand up and still, to measure the error of the {} eye.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1566,6 +1558,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Solving…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep the hand up and still to measure the error of the {} eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Keep the hand up and still to measure the error of each eye, the {} first.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1813,7 +1813,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Raise the hand and hold it still, to measure the error of each eye, first the {}.</source>
+        <source>Raise the hand and hold it still to measure the error of the {} eye.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Raise the hand and hold it still to measure the error of each eye, the {} first.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1822,10 +1826,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>The wearer has verified and corrected the result. Finish, or add an alignment.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Raise the hand and hold it still, to measure the error of the {} eye.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1929,7 +1929,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Find in sessions; in a window with a search field, go there</source>
+        <source>Find in sessions, or go to the search field of the window in front</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2924,6 +2924,10 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Hand to cursor, by iteration; a level end has converged.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Alignments</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2980,10 +2984,6 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The hand&apos;s rotation from the cursor will be shown here.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The alignment is confirmed.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3020,7 +3020,11 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Last: drawn otherwise.</source>
+        <source>While the wearer aligns, the hand&apos;s rotation from the cursor is shown here.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last: the drawing had changed.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3613,6 +3617,10 @@ of the trials above and below it, but not below 0. A single trial has no SD.</so
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>All keys, by the place where they work.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Key</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3808,7 +3816,7 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The camera&apos;s image will be shown here</source>
+        <source>The camera&apos;s image will be shown here.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4923,7 +4931,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>In a wider window also: {}</source>
+        <source>A wider window also shows: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5035,6 +5043,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Choose a page, or search all</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Nothing found: search for fewer or other words</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5083,11 +5095,11 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>line</source>
+        <source>line found</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>lines</source>
+        <source>lines found</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5243,7 +5255,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Change the entries, or run again if files have changed.</source>
+        <source>Change the entries, or run again if the files have changed.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -5635,6 +5647,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>For each eye, put the viewpoint camera behind its display. In a dark room, take images of the grid. Do not move camera or headset: switch the display off, and take images of the board with both cameras at {} or more distances, 0.35 to 0.65 m. The rig passes if the drawn corners of the board lie, on average, within {:g}′ of those seen.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Take &amp;board…</source>
         <translation type="unfinished"></translation>
     </message>
@@ -5660,10 +5676,6 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Open re&amp;port</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>For each eye, put the viewpoint camera behind its display. In a dark room, take images of the grid. Do not move camera or headset: switch the display off, and take images of the board with both cameras at {} or more distances, 0.35 to 0.65 m. The rig passes if the board&apos;s corners as drawn are on average at most {:g}′ from those seen.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6385,7 +6397,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>do what Acceptance says, and accept the rig again</source>
+        <source>follow the advice under Acceptance, then repeat it</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6665,6 +6677,10 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Near: seen from the front, the board would fill half of the width or more; far: a third or less. Tilted: by 20° or more from the line of sight.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Take &amp;automatically when the board is still</source>
         <translation type="unfinished"></translation>
     </message>
@@ -6690,10 +6706,6 @@ of the session, also of a calibration that was then repeated, and their number.
     </message>
     <message>
         <source>Press Take while nothing moves. Close when there are enough.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Near: the board would be half as wide as the view or more; far: a third or less. Tilted: by 20° or more from the line of sight.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

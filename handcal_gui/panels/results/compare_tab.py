@@ -66,7 +66,9 @@ class CompareTab(QWidget):
         self._cancel = QPushButton(tr("Ca&ncel"))
         self._cancel.setObjectName("comparison-cancel")
         self._cancel.clicked.connect(self._request_cancel)
-        self._progress = with_name(QProgressBar(), "comparison-progress", tr("Progress"))
+        self._progress = with_name(
+            QProgressBar(format="%p %"), "comparison-progress", tr("Progress")
+        )
         self._progress.setTextVisible(False)
         keep_space(self._progress)
         self._progress.setMaximumHeight(SPACING_PX)

@@ -34,7 +34,7 @@ _STRAIGHT_RAD = np.radians(2.0)
 """Rotations below this need no correction: hardly more than the guard's own error."""
 _SHAPE_M = 0.0015
 """A smaller change of shape, rms, is not mentioned."""
-_NO_CURSOR = tr("The hand's rotation from the cursor will be shown here.")
+_NO_CURSOR = tr("While the wearer aligns, the hand's rotation from the cursor is shown here.")
 _TAKEN = tr("The alignment is confirmed.")
 _NO_HAND = tr("Hold the hand in view of the camera.")
 _NO_IMAGE = tr("The camera gives no image; the message below the guide says why.")

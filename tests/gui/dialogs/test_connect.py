@@ -94,11 +94,11 @@ def test_nothing_is_ticked_before_a_headset_has_connected(dialog: ConnectDialog)
     assert child(dialog, QrCode).accessibleDescription().startswith("HANDCAL://")
 
 
-def test_the_place_of_the_paired_headsets_says_what_will_be_there(dialog: ConnectDialog) -> None:
+def test_the_empty_list_says_that_paired_headsets_appear_there(dialog: ConnectDialog) -> None:
     heading = next(one for one in dialog.findChildren(QLabel) if one.text() == "Paired headsets")
     empty = child(dialog, QLabel, "noDevices")
     assert empty.isVisible()
-    assert "is listed here" in empty.text()
+    assert "appear here once" in empty.text()
     between_px = empty.mapTo(dialog, empty.rect().topLeft()).y() - heading.geometry().bottom()
     assert 0 < between_px <= 2 * SPACING_PX
     assert empty.alignment() & Qt.AlignmentFlag.AlignTop

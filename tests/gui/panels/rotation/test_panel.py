@@ -61,7 +61,7 @@ def turned(snapshot: Make, rotation_deg: Any, t_s: float = 0.0) -> Snapshot:
 
 def test_before_a_cursor_it_says_what_it_will_show(panel: RotationPanel, snapshot: Make) -> None:
     panel.show_snapshot(snapshot(State.SHOW_HAND))
-    assert text(panel, "advice").endswith("will be shown here.")
+    assert text(panel, "advice").startswith("While the wearer aligns, ")
     assert word(panel) == ""
 
 

@@ -189,7 +189,7 @@ def test_results_stand_beside_the_images(full: ImagesPanel) -> None:
     assert item(full, 8).text(0) != "depth-099.png"
 
 
-def test_it_searches_again_only_where_it_has_searched(
+def test_search_again_needs_all_folders(
     panel: ImagesPanel, photographs: Any, tmp_path: Path
 ) -> None:
     again = child(panel.buttons, QPushButton, "again")
