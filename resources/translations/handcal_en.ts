@@ -2503,6 +2503,10 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Ctrl+6, then the keys above</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>against the calibrated φ</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2924,7 +2928,7 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Hand to cursor, by iteration; a level end has converged.</source>
+        <source>A line that ends level has converged.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -37,6 +37,11 @@ class ControlsArea(QScrollArea):
         self.setWidget(body)
         self._fit_soon = fit_soon(self._fit, self)
 
+    @property
+    def shows_keys(self) -> bool:
+        """True if the keys are in sight."""
+        return self._keys.isVisible()
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Leave the arrow keys to the enclosing panel."""
         event.ignore()

@@ -157,6 +157,8 @@ class FineTunePanel(QWidget):
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
         if self._is_editable() and arrival is Arrival.ARRIVED and not self._has_keys():
             sign, text = "fine-tune", tr("Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")
+            if self._area.shows_keys:
+                text = tr("Ctrl+6, then the keys above")
         self._show_status(sign, text)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -375,7 +377,8 @@ class FineTunePanel(QWidget):
         )
         status = _row(self._sign, self._status)
         status.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 4)
-        vbox((ControlsArea(controls), 1), status, 0, on=self, margins=0)
+        self._area = ControlsArea(controls)
+        vbox((self._area, 1), status, 0, on=self, margins=0)
         for one in self.findChildren(QAbstractButton):
             one.installEventFilter(self)
 

@@ -210,7 +210,8 @@ class ResultsPanel(QWidget):
 
     def _iterations_tab(self) -> QWidget:
         tab = QWidget()
-        meaning = paragraph("", tr("Hand to cursor, by iteration; a level end has converged."))
+        meaning = paragraph("", tr("A line that ends level has converged."))
+        meaning.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
         vbox((self._convergence, 1), meaning, on=tab, margins=0, spacing=0)
         return tab
 
