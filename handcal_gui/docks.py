@@ -31,7 +31,7 @@ from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.wearer_view.panel import WearerViewPanel
-from handcal_gui.theme import SPACING_PX, heighten_tabs, icon, set_style
+from handcal_gui.theme import SPACING_PX, icon, set_style
 from handcal_gui.translation import tr
 
 TITLES = {
@@ -59,6 +59,8 @@ _ICON_TABS = """
     QTabBar::tab:selected { border-bottom: 2px solid palette(highlight); }
 """
 """Tabs without texts, which stay for screen readers and tooltips."""
+_TEXT_TABS = "QTabBar::tab { height: 2em; }"
+"""Tabs with the height of their text: Qt cuts the lowest pixels of those not in front."""
 
 Docks = Mapping[str, QDockWidget]
 """Docks by the names of their panels."""
@@ -272,10 +274,7 @@ def _fit_tabs(bar: QTabBar, docks: Docks) -> list[str]:
     texts_px = sum(bar.fontMetrics().horizontalAdvance(docks[name].windowTitle()) for name in names)
     room_px = max((docks[name].width() for name in names), default=0)
     has_icons = texts_px + 3 * SPACING_PX * len(names) > room_px
-    if has_icons:
-        set_style(bar, _ICON_TABS)
-    else:
-        heighten_tabs(bar)
+    set_style(bar, _ICON_TABS if has_icons else _TEXT_TABS)
     for i, name in enumerate(names):
         keys = native(f"Ctrl+{list(docks).index(name) + 1}")
         bar.setTabToolTip(i, f"{docks[name].windowTitle()} ({keys})")

@@ -21,7 +21,7 @@ from PySide6.QtGui import (
     QPixmap,
 )
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication, QHeaderView, QTabBar, QWidget
+from PySide6.QtWidgets import QApplication, QHeaderView, QWidget
 
 from handcal.io.resources import resource_path
 
@@ -257,11 +257,6 @@ def number_font(scale: float = 1.0) -> QFont:
 def font_px() -> int:
     """Return the size of the program's font in pixels: 12 by default on most systems."""
     return QFontInfo(QGuiApplication.font()).pixelSize()
-
-
-def heighten_tabs(bar: QTabBar) -> None:
-    """Give tabs the height of their text: Qt cuts the lowest pixels of those not in front."""
-    set_style(bar, "QTabBar::tab { height: 2em; }")
 
 
 def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTabWidget, QToolButton, QWidget
 
-from handcal_gui.theme import heighten_tabs
 from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.tab_bar import TabBar
 
 
 class RecordTabs(QTabWidget):
@@ -14,7 +14,7 @@ class RecordTabs(QTabWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        heighten_tabs(self.tabBar())
+        self.setTabBar(TabBar())
         self._delete = QToolButton()
         self._delete.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the table handles Del
         self.setCornerWidget(self._delete)

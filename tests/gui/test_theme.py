@@ -5,7 +5,6 @@ from __future__ import annotations
 import weakref
 from collections.abc import Iterator
 from dataclasses import fields
-from functools import partial
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -13,19 +12,11 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import (
-    QApplication,
-    QLabel,
-    QLineEdit,
-    QPushButton,
-    QSlider,
-    QTabWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QSlider, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.types import Float64
-from handcal_gui.theme import colors, follow_theme, heighten_tabs, icon, is_dark, use_theme
+from handcal_gui.theme import colors, follow_theme, icon, is_dark, use_theme
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.residual_scale import OUTLIER, residual_ramp
 from tests.gui.helpers import show
@@ -82,31 +73,6 @@ def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
     for theme in ("dark", "light", "contrast"):
         use_theme(theme)
         qtbot.waitUntil(follows)
-
-
-@pytest.mark.usefixtures("themes")
-def test_tabs_and_what_is_in_them_follow_the_theme(qtbot: QtBot) -> None:
-    def made() -> tuple[QTabWidget, QLabel]:
-        tabs, inside = QTabWidget(), QLabel("inside")
-        qtbot.addWidget(tabs)
-        tabs.addTab(inside, "First")
-        tabs.addTab(QLabel(), "Second")
-        heighten_tabs(tabs.tabBar())
-        heighten_tabs(tabs.tabBar())  # as docks do whenever they move
-        return tabs, inside
-
-    def look_equal(one: QWidget, other: QWidget) -> bool:
-        return one.grab().toImage() == other.grab().toImage()
-
-    use_theme("light")
-    tabs, inside = made()
-    show(qtbot, tabs, 300, 200)
-    for theme in ("dark", "light"):
-        use_theme(theme)
-        fresh, fresh_inside = made()
-        show(qtbot, fresh, 300, 200)
-        for one, other in ((tabs.tabBar(), fresh.tabBar()), (inside, fresh_inside)):
-            qtbot.waitUntil(partial(look_equal, one, other))
 
 
 @pytest.mark.usefixtures("themes")

@@ -206,10 +206,11 @@ class _Pictures(QWidget):
             )
 
     def show_text(self, *, message: str, caption: str = "") -> None:
-        self._depth.show_text(message=message, caption=caption)
+        is_in_color = self._color.has_image and not self._color.isHidden()
+        self._depth.show_text(message=message, caption="" if is_in_color else caption)
         if self._depth.has_image and not self._color.has_image:
             message = message or _NO_COLOR
-        self._color.show_text(message=message, caption=caption)
+        self._color.show_text(message=message, caption=caption if is_in_color else "")
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Stack the images if that makes them larger."""

@@ -24,7 +24,6 @@ from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.legend import RESIDUALS, LegendEntry
 from handcal_gui.widgets.missing import missing_text
-from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.residual_scale import ResidualScale, residual_colors
 from handcal_gui.widgets.splat import rgb
 
@@ -250,7 +249,7 @@ class CloudPanel(QWidget):
         for entry, cloud in ((self._cursor, cursor), (self._hand, hand)):
             if cloud is not None:
                 entry.show_name(cloud.name, cloud.role)
-            entry.show_number(f"{len(cloud.points_mm):,}" if cloud else UNKNOWN)
+            entry.show_number(f"{len(cloud.points_mm):,}" if cloud else tr("none"))
         self._show_switches()
         self._scale.setVisible(hand is not None and hand.residuals_m is not None)
         self._clouds = [cloud for cloud in (cursor, hand) if cloud is not None]

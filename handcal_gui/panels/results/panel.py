@@ -17,7 +17,7 @@ from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.panels.results.verdict_card import VerdictCard
-from handcal_gui.theme import SPACING_PX, heighten_tabs
+from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.fields import paragraph
@@ -32,6 +32,7 @@ from handcal_gui.widgets.result_rows import (
     verdict_rows,
     verdict_word,
 )
+from handcal_gui.widgets.tab_bar import TabBar
 
 _EMPTY = tr(
     "Nothing is solved yet.\n\nEach eye's position, its uncertainty and the verdict appear here "
@@ -184,7 +185,7 @@ class ResultsPanel(QWidget):
         empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         empty.setContentsMargins(*4 * (2 * SPACING_PX,))
         self._tabs = tabs = QTabWidget()
-        heighten_tabs(tabs.tabBar())
+        tabs.setTabBar(TabBar())
         tabs.setObjectName("results-tabs")
         tabs.setDocumentMode(True)
         tabs.setUsesScrollButtons(False)  # a long title is shortened instead

@@ -42,7 +42,7 @@ class TrialPlot(Plot):
         )
         self.item.setXRange(min(TARGET_DEPTHS_M) - _MARGIN_M, max(TARGET_DEPTHS_M) + _MARGIN_M)
         self.show_legend()
-        self._mean = self.add_line("muted", name=tr("Mean ± SD"))
+        self._mean = self.add_line("muted", name=tr("Mean ± SD (≥ 0)"))
         self._errors = {
             eye: self.add_line(eye, name=EYE_NAMES[eye], symbol=_SIGNS[eye][0]) for eye in EYES
         }

@@ -9,13 +9,24 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QRadioButton, QTabBar, QToolButton
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QRadioButton,
+    QTabBar,
+    QTabWidget,
+    QToolButton,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
+from handcal.station.states import State
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from handcal_gui.theme import use_theme
+from handcal_gui.widgets.banner import Banner
 from handcal_gui.window import MainWindow, Page
 from tests.gui.views import all_views
 from tests.gui.window.conftest import Maker, is_in_front, main_button, press, say, shown
@@ -310,3 +321,32 @@ def test_the_page_of_a_stored_session_grows_with_the_window(window: MainWindow) 
     page = window.findChild(ReviewPage)
     assert isinstance(page, ReviewPage)
     assert page.width() > 1200
+
+
+def test_all_texts_follow_the_theme(qtbot: QtBot, program: Program, snapshot: Maker) -> None:
+    window = program.window
+    banner = window.findChild(Banner)
+    assert banner is not None
+    use_theme("light")
+    window.show_page("live")
+    window.panels.results.show_snapshot(snapshot(State.APPLIED))
+    for dock in window.docks.values():
+        dock.raise_()
+        for tabs in dock.findChildren(QTabWidget):
+            for i in range(tabs.count()):
+                tabs.setCurrentIndex(i)
+                QApplication.processEvents()  # Qt gives a page its style when it is first shown
+
+    def unlike() -> list[str]:
+        """Return the enabled widgets with texts in another theme's colours."""
+        text = QApplication.palette().windowText().color().lightness()
+        return [
+            f"{type(one).__name__} {one.objectName()}"
+            for one in window.findChildren(QWidget)
+            if one.isEnabled() and one is not banner and not banner.isAncestorOf(one)
+            if abs(one.palette().windowText().color().lightness() - text) > 150  # a verdict has a colour
+        ]
+
+    for theme in ("dark", "light", "contrast", "system"):
+        use_theme(theme)
+        qtbot.waitUntil(lambda: not unlike())

@@ -114,7 +114,11 @@ def test_the_hand_is_drawn_in_both_pictures(panel: CameraPanel, snapshot: Maker)
 def test_a_turned_hand_is_called_so_in_words(panel: CameraPanel, snapshot: Maker) -> None:
     turned = {"is_over_limit": True, "rotation_rad": np.radians([0.0, 0.0, 12.34])}
     panel.show_snapshot(snapshot(observation=turned))
-    assert view(panel, "colour").caption == "Rotated by 12.3°: too far"
+    for mode, captions in ((Mode.BOTH, (1, 0)), (Mode.DEPTH, (0, 1)), (Mode.COLOR, (1, 0))):
+        panel.set_mode(mode)
+        panel.show_snapshot(snapshot(observation=turned))
+        shown = [view(panel, name).caption for name in ("colour", "depth")]
+        assert shown == ["Rotated by 12.3°: too far" * count for count in captions], mode
 
 
 def test_a_lost_hand_is_explained(panel: CameraPanel, snapshot: Maker) -> None:

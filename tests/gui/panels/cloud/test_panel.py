@@ -53,7 +53,7 @@ def _count(widget: QWidget, color: str) -> int:
 
 def test_empty_it_says_what_will_appear(panel: CloudPanel) -> None:
     assert "Hold a hand in front" in _view(panel).accessibleDescription()
-    assert _legend(panel) == ["Cursor –", "Live hand –"]
+    assert _legend(panel) == ["Cursor none", "Live hand none"]
 
 
 def test_live_hand_alone_is_shown_from_the_camera(
@@ -63,7 +63,7 @@ def test_live_hand_alone_is_shown_from_the_camera(
     panel.show_snapshot(now)
     assert now.observation is not None
     assert now.observation.hand is not None
-    assert _legend(panel) == ["Cursor –", f"Live hand {len(now.observation.hand.points_W_m):,}"]
+    assert _legend(panel) == ["Cursor none", f"Live hand {len(now.observation.hand.points_W_m):,}"]
     assert "depth camera" in _view(panel).accessibleDescription()
     assert _count(panel, colors().live) > 500
     # Half a metre from the camera.
@@ -94,7 +94,7 @@ def test_lost_hand_leaves_the_cursor_and_the_reason(
 ) -> None:
     panel.show_snapshot(snapshot(observation={"hand": None, "problem": "no hand in view"}))
     assert _view(panel).accessibleDescription() == "No hand in view"
-    assert _legend(panel)[1] == "Live hand –"
+    assert _legend(panel)[1] == "Live hand none"
     assert _count(panel, colors().cursor) > 500
 
 

@@ -29,7 +29,7 @@ def test_plot_table_and_text_have_one_statistic(
     drawn = {line.name(): line.getData() for line in plot.item.listDataItems()}
     _, errors = drawn["Left eye"]
     np.testing.assert_allclose(errors[~np.isnan(errors)], [means[1], means[3]])
-    at_m, marks = (values.reshape(-1, 3)[:, :2] for values in drawn["Mean ± SD"])
+    at_m, marks = (values.reshape(-1, 3)[:, :2] for values in drawn["Mean ± SD (≥ 0)"])
     np.testing.assert_allclose(at_m.mean(axis=1), (0.4, 0.4, 0.6, 0.6))
     near = [means[1], means[4]]
     sd = np.std(near, ddof=1)
@@ -56,7 +56,7 @@ def test_the_plot_shows_whole_marks_and_bars(
     QApplication.processEvents()
     plot = child(panel, TrialPlot).item
     drawn = {line.name(): line for line in plot.listDataItems()}
-    _, up = drawn["Mean ± SD"].getData()
+    _, up = drawn["Mean ± SD (≥ 0)"].getData()
     _, (bottom, top) = plot.vb.viewRange()
     assert bottom < np.nanmin(up) == 0.0 < np.nanmax(up) < top, "no error is below 0"
     shown = plot.vb.mapRectToScene(plot.vb.boundingRect())
@@ -79,7 +79,7 @@ def test_the_legend_of_a_low_plot_is_above_it_and_whole(
     plot = child(panel, TrialPlot).item
     legend = plot.legend.mapRectToScene(plot.legend.boundingRect())
     assert [label.text for _, label in plot.legend.items] == [
-        "Mean ± SD",
+        "Mean ± SD (≥ 0)",
         "Left eye",
         "Right eye",
     ]
