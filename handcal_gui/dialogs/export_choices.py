@@ -18,7 +18,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import fill_row, label_for, number, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.layouts import keep_space, vbox
 from handcal_gui.widgets.path_field import PathField
 
 _PURPOSES: dict[Format, str] = {
@@ -87,6 +87,7 @@ class ExportChoices(QWidget):
         self._folder = PathField(tr("Export folder"), "folder")
         self._folder.set_path(str(folder))
         self._found = FindingLine("folder")
+        keep_space(self._found)
         self._is_refused = False
         self._lay_out()
         for kind, box in self._boxes.items():
@@ -159,6 +160,7 @@ class ExportChoices(QWidget):
     def _refresh(self) -> None:
         for field in (self._near, self._far):
             field.setEnabled(any(self._boxes[kind].isChecked() for kind in _WITH_PLANES))
+        self._found.setVisible(bool(self._folder.path))
         self._task.setText(self._missing() or tr("Choose what to write and where, then export."))
         self.changed.emit()
 

@@ -54,12 +54,13 @@ class SupportDialog(QDialog):
         self._folder.setMinimumWidth(45 * SPACING_PX)
         self._frames = PathField(tr("Recording to add"), "either", empty=tr("None"))
         self._name = f"handcal-support-{date.today():%Y%m%d}.zip"
-        will = tr("The file {} will be written to the folder.").format(self._name)
-        self._doing = paragraph("supportDoing", will)
+        self._will = tr("The file {} will be written to the folder.").format(self._name)
+        self._doing = paragraph("supportDoing", self._will)
         self._said = FindingLine("support")
         self._said.hide()
         self._write = main_button("writeBundle", tr("&Write"))
         close = button("close", tr("&Close"))
+        self._folder.changed.connect(self._refresh)
         self._write.clicked.connect(self.write)
         close.clicked.connect(self.reject)
         self.finished.connect(self.stop)
@@ -109,12 +110,19 @@ class SupportDialog(QDialog):
         assert self._job is not None
         self._job.wait()
         self._job = None
-        self._doing.clear()
-        self._write.setEnabled(True)
+        self._refresh()
         if found is not None:
+            self._doing.clear()
             self._said.show_finding(found)
             self._said.show()
         self._fit_soon.start()
+
+    def _refresh(self) -> None:
+        """Ask for a folder if there is none; else allow to write, and say what will be written."""
+        if self._job is None:
+            self._write.setEnabled(bool(self._folder.path))
+            ask = tr("Choose the folder to write to.")
+            self._doing.setText(self._will if self._folder.path else ask)
 
     def _fit(self) -> None:
         """Make the dialog higher for what is said: it was cut off, or cut the text above."""

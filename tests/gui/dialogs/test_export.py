@@ -160,6 +160,7 @@ def test_without_formats_or_folder_nothing_can_be_exported(dialog: ExportDialog)
     folder.set_path("")
     assert not press(dialog, "export").isEnabled()
     assert text(dialog, "exportTask") == "Choose the folder to export to."
+    assert not child(dialog, QLabel, "folderFound").isVisible()
 
 
 def test_it_fits_a_small_screen_and_a_heading_stands_by_its_own_group(

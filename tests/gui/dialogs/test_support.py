@@ -11,6 +11,7 @@ from pytestqt.qtbot import QtBot
 from handcal.station import support
 from handcal.station.support import SupportSettings
 from handcal_gui.dialogs.support import SupportDialog
+from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, text
 
 
@@ -23,7 +24,12 @@ def test_the_dialog_writes_a_bundle(
     dialog.show()
     assert "to the handcal developers" in text(dialog, "supportAbout")
     announced = text(dialog, "supportDoing")
-    child(dialog, QPushButton, "writeBundle").click()
+    folder, write = child(dialog, PathField), child(dialog, QPushButton, "writeBundle")
+    folder.set_path("")
+    assert not write.isEnabled(), "or it would be written wherever the program was started"
+    assert text(dialog, "supportDoing") == "Choose the folder to write to."
+    folder.set_path(str(tmp_path))
+    write.click()
     qtbot.waitUntil(lambda: "was written" in text(dialog, "supportFound"), timeout=10_000)
     [written] = tmp_path.glob("handcal-support-*.zip")
     assert f"The file {written.name} will be written" in announced

@@ -344,7 +344,8 @@ def test_all_texts_follow_the_theme(qtbot: QtBot, program: Program, snapshot: Ma
             f"{type(one).__name__} {one.objectName()}"
             for one in window.findChildren(QWidget)
             if one.isEnabled() and one is not banner and not banner.isAncestorOf(one)
-            if abs(one.palette().windowText().color().lightness() - text) > 150  # a verdict has a colour
+            if abs(one.palette().windowText().color().lightness() - text)
+            > 150  # a verdict has a colour
         ]
 
     for theme in ("dark", "light", "contrast", "system"):
