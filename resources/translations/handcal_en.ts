@@ -755,6 +755,10 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Choose the folder to write to.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Window</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2350,6 +2354,10 @@ Both eyes at once is quicker, but cannot measure an eye distance that differs fr
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>none</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Live hand</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3373,7 +3381,7 @@ of the trials above and below it, but not below 0. A single trial has no SD.</so
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Mean ± SD</source>
+        <source>Mean ± SD (≥ 0)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
