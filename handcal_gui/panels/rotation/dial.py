@@ -35,6 +35,7 @@ class RotationDial(QWidget):
         self._angle_deg: float | None = None
         self._limit_deg = 9.0
         self._word, self._word_is_red = "", False
+        self._seen: tuple[object, ...] = ()
 
     def sizeHint(self) -> QSize:
         """Prefer a square that is readable from across the room."""
@@ -58,7 +59,14 @@ class RotationDial(QWidget):
         if word != self._word:
             self._word = word
             self.setAccessibleDescription(word)
-        update_in_turn(self)
+        seen = self._digits, self.is_over, self._limit_deg, word, is_refused
+        if seen != self._seen:  # a tenth of a degree is no wider than the arc's end
+            self._seen = seen
+            update_in_turn(self)
+
+    @property
+    def _digits(self) -> str:
+        return "–" if self._angle_deg is None else f"{self._angle_deg:.1f}°"
 
     def paintEvent(self, _: QPaintEvent) -> None:
         """Draw the arc, its limit, the digits and the word."""
@@ -70,8 +78,7 @@ class RotationDial(QWidget):
         self._paint_arc(painter)
         text = self.palette().windowText().color()
         fixed, normal = number_font(), self.font()
-        digits = "–" if self._angle_deg is None else f"{self._angle_deg:.1f}°"
-        _write(painter, fixed, digits, -14, 46, self._color())
+        _write(painter, fixed, self._digits, -14, 46, self._color())
         limit_size = round(min(max(13.0, _LEAST_PX * 200 / side), 23.0))
         _write(painter, normal, tr("limit {:.1f}°").format(self._limit_deg), 22, limit_size, text)
         color = QColor(colors().red) if self._word_is_red else self._color()

@@ -59,3 +59,15 @@ def test_without_an_angle_there_is_no_verdict_in_colour(dial: RotationDial) -> N
     assert not dial.is_over
     assert painted(dial, "red") == painted(dial, "live") == 0
     assert dial.accessibleDescription() == "? No hand"
+
+
+def test_it_is_painted_only_if_it_looks_different(
+    dial: RotationDial, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    painted: list[object] = []
+    monkeypatch.setattr("handcal_gui.panels.rotation.dial.update_in_turn", painted.append)
+    for angle_deg, times in ((3.01, 1), (3.04, 1), (3.06, 2), (8.99, 3), (9.01, 4)):
+        dial.show_angle(float(np.radians(angle_deg)), np.radians(9.0), "a word")
+        assert len(painted) == times, angle_deg
+    dial.show_angle(float(np.radians(9.01)), np.radians(9.0), "another word")
+    assert len(painted) == 5
