@@ -6,13 +6,15 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QDialog, QFormLayout, QWidget
 
-from handcal.io.files import user_path
+from handcal.io.files import require_writable, user_path
 from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal.station.support import SupportSettings, run_support
 from handcal_gui.engine.jobs import Job
+from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, label_for, main_button, paragraph
@@ -60,7 +62,10 @@ class SupportDialog(QDialog):
         self._said.hide()
         self._write = main_button("writeBundle", tr("&Write"))
         close = button("close", tr("&Close"))
-        self._folder.changed.connect(self._refresh)
+        self._check = LatestJob(require_writable, self)  # the folder may be on a slow network
+        self._check.answered.connect(lambda: self._refuse(""))
+        self._check.failed.connect(self._refuse)
+        self._folder.changed.connect(self._check_folder)
         self._write.clicked.connect(self.write)
         close.clicked.connect(self.reject)
         self.finished.connect(self.stop)
@@ -78,6 +83,11 @@ class SupportDialog(QDialog):
             margins=2 * SPACING_PX,
             spacing=2 * SPACING_PX,
         )
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Check the folder."""
+        super().showEvent(event)
+        self._check_folder()
 
     def write(self) -> None:
         """Write the bundle."""
@@ -102,6 +112,7 @@ class SupportDialog(QDialog):
 
     def stop(self) -> None:
         """Cancel the writing; safe to call twice."""
+        self._check.stop()
         if self._job is not None:
             self._job.abandon()
             self._job = None
@@ -110,19 +121,29 @@ class SupportDialog(QDialog):
         assert self._job is not None
         self._job.wait()
         self._job = None
-        self._refresh()
-        if found is not None:
-            self._doing.clear()
-            self._said.show_finding(found)
-            self._said.show()
-        self._fit_soon.start()
+        self._doing.clear()
+        self._write.setEnabled(True)
+        self._show(found)
 
-    def _refresh(self) -> None:
-        """Ask for a folder if there is none; else allow to write, and say what will be written."""
+    def _check_folder(self) -> None:
+        if self._folder.path:
+            self._check.ask(user_path(self._folder.path))
+        self._refuse("")
+
+    def _refuse(self, problem: str) -> None:
+        """Say why the folder is refused; otherwise allow to write, and name the file."""
+        if not self._folder.path:
+            problem = tr("Choose the folder to write to.")
         if self._job is None:
-            self._write.setEnabled(bool(self._folder.path))
-            ask = tr("Choose the folder to write to.")
-            self._doing.setText(self._will if self._folder.path else ask)
+            self._write.setEnabled(not problem)
+            self._doing.setText("" if problem else self._will)
+            self._show(Finding("", Health.BROKEN, problem) if problem else None)
+
+    def _show(self, found: Finding | None) -> None:
+        self._said.setVisible(found is not None)
+        if found is not None:
+            self._said.show_finding(found)
+        self._fit_soon.start()
 
     def _fit(self) -> None:
         """Make the dialog higher for what is said: it was cut off, or cut the text above."""

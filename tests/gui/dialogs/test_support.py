@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.station import support
@@ -24,11 +24,16 @@ def test_the_dialog_writes_a_bundle(
     dialog.show()
     assert "to the handcal developers" in text(dialog, "supportAbout")
     announced = text(dialog, "supportDoing")
-    folder, write = child(dialog, PathField), child(dialog, QPushButton, "writeBundle")
+    folder, write = dialog.findChildren(PathField)[0], child(dialog, QPushButton, "writeBundle")
     folder.set_path("")
     assert not write.isEnabled(), "or it would be written wherever the program was started"
-    assert text(dialog, "supportDoing") == "Choose the folder to write to."
+    assert text(dialog, "supportFound") == "Choose the folder to write to."
+    (tmp_path / "file").touch()
+    folder.set_path(str(tmp_path / "file"))
+    qtbot.waitUntil(lambda: "is a file: choose a folder" in text(dialog, "supportFound"))
+    assert not write.isEnabled()
     folder.set_path(str(tmp_path))
+    qtbot.waitUntil(lambda: not child(dialog, QLabel, "supportFound").isVisible())
     write.click()
     qtbot.waitUntil(lambda: "was written" in text(dialog, "supportFound"), timeout=10_000)
     [written] = tmp_path.glob("handcal-support-*.zip")
@@ -37,10 +42,11 @@ def test_the_dialog_writes_a_bundle(
 
 
 def test_a_failure_says_what_to_do_and_cuts_nothing_off(qtbot: QtBot, tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    dialog = SupportDialog(SupportSettings(tmp_path), tmp_path / "file" / "folder")
+    dialog = SupportDialog(SupportSettings(tmp_path), tmp_path)
     qtbot.addWidget(dialog)
     dialog.show()
+    recording = next(one for one in dialog.findChildren(PathField) if "Recording" in one.name)
+    recording.set_path(str(tmp_path / "nowhere"))
     child(dialog, QPushButton, "writeBundle").click()
     qtbot.waitUntil(lambda: "choose another folder" in text(dialog, "supportFound"))
     layout = dialog.layout()
