@@ -49,11 +49,17 @@ class ShiftHistory:
     ----------
     shifts_m : mapping of eye to (3,) float64
         Initial shifts, which cannot be undone.
+
+    Attributes
+    ----------
+    is_replaced : bool
+        True while the present shifts are those of a result that replaced shifts set by hand.
     """
 
     def __init__(self, shifts_m: Shifts) -> None:
         self._steps = [_frozen(shifts_m)]
         self._at = 0
+        self.is_replaced = False
 
     @property
     def present(self) -> Shifts:
@@ -83,11 +89,21 @@ class ShiftHistory:
         """
         if same_shifts(shifts_m, self.present):
             return
+        self.is_replaced = False
         self._at += not (goes_on and self.can_undo)
         self._steps[self._at :] = [_frozen(shifts_m)]
 
+    def after(self, shifts_m: Shifts) -> ShiftHistory:
+        """Return the history with the shifts of a new result: an undo away from any set by hand."""
+        if not self.can_undo:
+            return ShiftHistory(shifts_m)
+        self.change(shifts_m)
+        self.is_replaced = True
+        return self
+
     def undo(self) -> None:
         """Undo the last change, if there is one."""
+        self.is_replaced = False
         self._at -= self.can_undo
 
     def redo(self) -> None:

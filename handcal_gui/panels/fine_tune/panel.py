@@ -55,6 +55,7 @@ _ARRIVALS = {
     Arrival.ARRIVED: ("check", tr("In the headset. ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")),
     Arrival.LATE: ("warning", tr("Not acknowledged by the headset; see Link")),
 }
+_REPLACED = "wait", tr("A new result replaced φ as it was set: Ctrl+Z returns to that.")
 _NO_SESSION = tr("Fine-tuning starts with a session.")
 
 
@@ -118,7 +119,7 @@ class FineTunePanel(QWidget):
         self._rig = rig
         self._stream.begin()
         self._obstacle = _NO_SESSION  # until its φ is known
-        self._begin(_OFFLINE)
+        self._begin(ShiftHistory(_OFFLINE))
         self._refresh()
 
     def shift_m(self) -> Shifts:
@@ -148,14 +149,17 @@ class FineTunePanel(QWidget):
         obstacle = find_obstacle(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:
-            self._begin(snapshot.procedure.applied_shift_m)
+            self._begin(self._history.after(snapshot.procedure.applied_shift_m))
         is_same = same_shifts(solved, self._solved) and same_shifts(calibrated, self._calibrated)
         if is_new or obstacle != self._obstacle or not is_same:
             self._obstacle, self._solved, self._calibrated = obstacle, solved, calibrated
             self._refresh()
         arrival = self._stream.arrival
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
-        if self._is_editable() and arrival is Arrival.ARRIVED and not self._has_keys():
+        can_move = self._is_editable() and arrival is Arrival.ARRIVED
+        if can_move and self._history.is_replaced:
+            sign, text = _REPLACED
+        elif can_move and not self._has_keys():
             sign, text = "fine-tune", tr("Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")
             if self._area.shows_keys:
                 text = tr("Ctrl+6, then the keys above")
@@ -194,8 +198,8 @@ class FineTunePanel(QWidget):
             action.setIcon(icon(name))
         self._sign.setPixmap(icon(self._sign_name).pixmap(2 * SPACING_PX))
 
-    def _begin(self, shifts_m: Shifts) -> None:
-        self._history = ShiftHistory(shifts_m)
+    def _begin(self, history: ShiftHistory) -> None:
+        self._history = history
         self._burst = None
         self._stop_showing()
 

@@ -23,6 +23,7 @@ from tests.gui.panels.fine_tune.controls import (
     editor,
     field,
     fields_mm,
+    status,
     texts,
 )
 
@@ -35,6 +36,28 @@ def test_starts_again_with_another_wearer(panel: FineTunePanel, show: Show, rig:
     panel.set_rig(rig)
     assert fields_mm(panel, "left") == [0.0, 0.0, 0.0]
     assert not action(panel, "Undo").isEnabled()
+
+
+def test_what_a_new_result_replaces_is_an_undo_away(
+    qtbot: QtBot, panel: FineTunePanel, show: Show, results: Results, sent: list[Shifts]
+) -> None:
+    show()
+    field(panel, "left", 1).setValue(4.0)
+    fine_tuned_mm = fields_mm(panel, "left")
+    qtbot.waitUntil(lambda: bool(sent))
+    for moved_m in (0.001, 0.002):  # as without an alignment, and with another in its place
+        solved_m = {eye: results.eyes[eye].shift_m + moved_m for eye in EYES}
+        show(procedure={"applied_shift_m": solved_m})
+        np.testing.assert_allclose(fields_mm(panel, "left"), 1e3 * solved_m["left"], atol=0.005)
+        assert status(panel).startswith("A new result replaced φ as it was set: Ctrl+Z returns")
+    for _ in range(2):
+        action(panel, "Undo").trigger()
+    assert fields_mm(panel, "left") == fine_tuned_mm
+    qtbot.waitUntil(lambda: 1e3 * sent[-1]["left"][0] == pytest.approx(4.0))
+    show(procedure={"applied_shift_m": sent[-1]})
+    assert not status(panel).startswith("A new result")
+    action(panel, "Undo").trigger()
+    assert not action(panel, "Undo").isEnabled(), "the solved φ was not set by hand"
 
 
 def test_undo_and_redo(
@@ -168,7 +191,6 @@ def test_a_hidden_panel_leaves_the_headset_with_what_was_set(
 
 def test_new_projections_start_again(panel: FineTunePanel, show: Show) -> None:
     show()
-    field(panel, "left", 1).setValue(4.0)
     panel.hide()
     panel.show()
     applied_m = {eye: np.array([0.001, 0.002, 0.003]) for eye in EYES}
