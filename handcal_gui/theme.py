@@ -270,10 +270,14 @@ def scale_font(widget: QWidget, scale: float, *, is_bold: bool = False) -> None:
 def icon(name: str, color: str = "") -> QIcon:
     """Return the icon ``resources/icons/NAME.svg``, in the palette's text colour or another."""
     result = QIcon()
-    text = QGuiApplication.palette().windowText().color()
+    palette = QGuiApplication.palette()
+    text, disabled = (
+        palette.color(group, QPalette.ColorRole.WindowText)
+        for group in (QPalette.ColorGroup.Active, QPalette.ColorGroup.Disabled)
+    )
     for mode, shade in (
         (QIcon.Mode.Normal, QColor(color) if color else text),
-        (QIcon.Mode.Disabled, QColor(colors().muted)),
+        (QIcon.Mode.Disabled, disabled),
     ):
         tinted = _svg(name).replace(b"currentColor", shade.name().encode())
         for size_px in (16, 24, 32, 48, 64):

@@ -93,8 +93,8 @@ class ExportChoices(QWidget):
         for kind, box in self._boxes.items():
             box.setChecked(kind in settings.formats)
             box.toggled.connect(self._refresh)
-        self._check = LatestJob(require_writable, self)  # the folder may be on a slow network
-        self._check.answered.connect(lambda: self._show_found(""))
+        self._check = LatestJob(_has_files, self)  # the folder may be on a slow network
+        self._check.answered.connect(lambda _, found: self._show_found("", has_files=found))
         self._check.failed.connect(self._show_found)
         self._folder.changed.connect(self._check_folder)
         self._show_found("")
@@ -138,12 +138,17 @@ class ExportChoices(QWidget):
         self._check.ask(self.target)
         self._refresh()
 
-    def _show_found(self, problem: str) -> None:
-        """Show why the folder is refused, or else what is created in it."""
+    def _show_found(self, problem: str, *, has_files: bool = False) -> None:
+        """Show why the folder is refused, or else what is created or replaced in it."""
         self._is_refused = bool(problem)
-        health = Health.BROKEN if problem else Health.GOOD
-        created = tr("The export will create the folder {} there.").format(self._name)
-        self._found.show_finding(Finding("", health, problem or created))
+        found = Finding("", Health.BROKEN, problem)
+        if not problem:
+            text = tr("The export will create the folder {} there.")
+            if has_files:
+                text = tr("Files of the same names in the folder {} there will be replaced.")
+            health = Health.LIMITED if has_files else Health.GOOD
+            found = Finding("", health, text.format(self._name))
+        self._found.show_finding(found)
         self._refresh()
 
     def _missing(self) -> str:
@@ -189,6 +194,12 @@ class ExportChoices(QWidget):
             form.addRow(label_for(field, title), field)
         form.addRow(self._found)
         vbox(self._task, formats, form, 1, on=self, margins=0, spacing=2 * SPACING_PX)
+
+
+def _has_files(folder: Path) -> bool:
+    """Return whether a folder contains anything; raise FileError if it cannot be written to."""
+    require_writable(folder)
+    return folder.is_dir() and any(folder.iterdir())
 
 
 def _lettered(title: str, letter: str) -> str:

@@ -188,6 +188,13 @@ def test_a_folder_that_cannot_be_created_is_refused_beside_it(
     field.set_path(str(tmp_path / "new"))
     qtbot.waitUntil(press(dialog, "export").isEnabled)
     assert text(dialog, "folderFound") == made
+    earlier = tmp_path / "earlier" / dialog._choices.target.name
+    earlier.mkdir(parents=True)
+    (earlier / "parameters.csv").touch()
+    field.set_path(str(earlier.parent))
+    qtbot.waitUntil(lambda: text(dialog, "folderFound").endswith("there will be replaced."))
+    assert child(dialog, QLabel, "folderHealth").accessibleName() == "Note"
+    assert press(dialog, "export").isEnabled()
 
 
 def test_a_failure_is_reported_and_can_be_tried_again(
