@@ -39,6 +39,7 @@ _NOT_ACTIONS = {
         (tr("Esc"), tr("Close the message, or a dialog or window opened from here")),
         (tr("Tab"), tr("Move to the next button or field")),
         (tr("Alt+Left, Alt+Right"), tr("In the manual: go back or forward")),
+        (tr("F6, Shift+F6"), tr("In the list of Sessions: sort by the next column, or in reverse")),
         (tr("Ctrl+Tab"), tr("Show the next tab of the panel that has the focus")),
     ),
     tr("Fine-tune"): (

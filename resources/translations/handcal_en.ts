@@ -424,6 +424,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Files of the same names in the folder {} there will be replaced.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Choose what to write: nothing is ticked.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -840,6 +844,14 @@ local network can read them.</source>
     </message>
     <message>
         <source>In the manual: go back or forward</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>F6, Shift+F6</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>In the list of Sessions: sort by the next column, or in reverse</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2504,6 +2516,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>The calibrated φ is the one with which the headset draws after the calibration: the solved φ, or 0 for an eye that keeps the offline calibration. A trial records its error.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>A new result replaced φ as it was set: Ctrl+Z returns to that.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

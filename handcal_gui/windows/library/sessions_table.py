@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, Qt
-from PySide6.QtGui import QFontMetrics, QResizeEvent
+from PySide6.QtGui import QFontMetrics, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from handcal.session.library import LibraryEntry
@@ -181,6 +181,20 @@ class SessionsTable(QTableView):
         # The trials fill their column, and the text of the next one would touch them.
         apart_px = (3 if column == _TRIALS else 2) * SPACING_PX
         return max(text_px + _picture_px(column) + apart_px, title_px)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Sort by the next column in sight (F6), or in reverse (Shift+F6)."""
+        if event.key() != Qt.Key.Key_F6:
+            super().keyPressEvent(event)
+            return
+        header = self.horizontalHeader()
+        column, order = header.sortIndicatorSection(), header.sortIndicatorOrder()
+        if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+            order = Qt.SortOrder(1 - order.value)
+        else:
+            others = (*range(column + 1, len(COLUMNS)), *range(column + 1))
+            column = next(one for one in others if not header.isSectionHidden(one))
+        self.sortByColumn(column, order)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give the columns the room there is."""

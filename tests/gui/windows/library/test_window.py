@@ -255,6 +255,23 @@ def test_enter_in_the_search_opens_the_first_that_is_found(
     assert opened.args == [folder / "bea"]
 
 
+def test_keys_sort_by_the_columns_in_sight(window: LibraryWindow) -> None:
+    window.resize(800, 510)
+    QApplication.processEvents()
+    across = table(window).horizontalHeader()
+    hidden = {column for column in range(across.count()) if across.isSectionHidden(column)}
+    assert hidden
+    seen = []
+    for _ in range(across.count() - len(hidden)):
+        QTest.keyClick(table(window), Qt.Key.Key_F6)
+        seen.append(across.sortIndicatorSection())
+    assert sorted(seen) == [one for one in range(across.count()) if one not in hidden]
+    table(window).sortByColumn(0, Qt.SortOrder.AscendingOrder)
+    assert wearers(window) == ["Ada", "Ada", "Bea", "Cid"]
+    QTest.keyClick(table(window), Qt.Key.Key_F6, Qt.KeyboardModifier.ShiftModifier)
+    assert wearers(window) == ["Cid", "Bea", "Ada", "Ada"]
+
+
 def test_a_sorted_or_filtered_table_keeps_what_is_selected(window: LibraryWindow) -> None:
     choose(window, "Ada", "Cid")
     table(window).sortByColumn(0, Qt.SortOrder.AscendingOrder)
