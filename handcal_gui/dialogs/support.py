@@ -126,9 +126,11 @@ class SupportDialog(QDialog):
         self._show(found)
 
     def _check_folder(self) -> None:
+        self._write.setEnabled(False)  # until an answer, which would hide how the writing ended
         if self._folder.path:
             self._check.ask(user_path(self._folder.path))
-        self._refuse("")
+        else:
+            self._refuse("")
 
     def _refuse(self, problem: str) -> None:
         """Say why the folder is refused; otherwise allow to write, and name the file."""

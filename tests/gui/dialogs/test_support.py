@@ -34,6 +34,7 @@ def test_the_dialog_writes_a_bundle(
     assert not write.isEnabled()
     folder.set_path(str(tmp_path))
     qtbot.waitUntil(lambda: not child(dialog, QLabel, "supportFound").isVisible())
+    qtbot.waitUntil(write.isEnabled)
     write.click()
     qtbot.waitUntil(lambda: "was written" in text(dialog, "supportFound"), timeout=10_000)
     [written] = tmp_path.glob("handcal-support-*.zip")
@@ -47,7 +48,9 @@ def test_a_failure_says_what_to_do_and_cuts_nothing_off(qtbot: QtBot, tmp_path: 
     dialog.show()
     recording = next(one for one in dialog.findChildren(PathField) if "Recording" in one.name)
     recording.set_path(str(tmp_path / "nowhere"))
-    child(dialog, QPushButton, "writeBundle").click()
+    write = child(dialog, QPushButton, "writeBundle")
+    qtbot.waitUntil(write.isEnabled)
+    write.click()
     qtbot.waitUntil(lambda: "choose another folder" in text(dialog, "supportFound"))
     layout = dialog.layout()
     assert layout is not None
