@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidget
 
@@ -48,6 +49,8 @@ _LETTERS: dict[Format, str] = {
     "slicer": "S",
 }
 """Letter in the title of each format that ticks it."""
+_SLOW_MS = 300
+"""From a change of the folder until it is said that it is checked."""
 _WITH_PLANES: tuple[Format, ...] = ("json", "unity")
 """Formats with clipping distances."""
 
@@ -88,7 +91,7 @@ class ExportChoices(QWidget):
         self._folder.set_path(str(folder))
         self._found = FindingLine("folder")
         keep_space(self._found)
-        self._is_refused = False
+        self._is_checked = self._is_refused = False
         self._lay_out()
         for kind, box in self._boxes.items():
             box.setChecked(kind in settings.formats)
@@ -96,13 +99,15 @@ class ExportChoices(QWidget):
         self._check = LatestJob(_has_files, self)  # the folder may be on a slow network
         self._check.answered.connect(lambda _, found: self._show_found("", has_files=found))
         self._check.failed.connect(self._show_found)
+        self._slow = QTimer(self, interval=_SLOW_MS, singleShot=True)
+        self._slow.timeout.connect(lambda: self._task.setText(tr("Checking the folder…")))
         self._folder.changed.connect(self._check_folder)
-        self._show_found("")
+        self._refresh()
 
     @property
     def is_complete(self) -> bool:
-        """True if at least one format and a folder are chosen."""
-        return not self._missing()
+        """True if at least one format and a folder are chosen, and the folder is checked."""
+        return self._is_checked and not self._missing()
 
     @property
     def settings(self) -> ExportSettings:
@@ -133,14 +138,19 @@ class ExportChoices(QWidget):
         """Wait for the end of the check."""
         super().hideEvent(event)
         self._check.stop()
+        self._slow.stop()
 
     def _check_folder(self) -> None:
-        self._check.ask(self.target)
+        self._is_checked = self._is_refused = False
+        if self._folder.path:
+            self._check.ask(self.target)
+            self._slow.start()
         self._refresh()
 
     def _show_found(self, problem: str, *, has_files: bool = False) -> None:
         """Show why the folder is refused, or else what is created or replaced in it."""
-        self._is_refused = bool(problem)
+        self._is_checked, self._is_refused = True, bool(problem)
+        self._slow.stop()
         found = Finding("", Health.BROKEN, problem)
         if not problem:
             text = tr("The export will create the folder {} there.")
@@ -165,7 +175,7 @@ class ExportChoices(QWidget):
     def _refresh(self) -> None:
         for field in (self._near, self._far):
             field.setEnabled(any(self._boxes[kind].isChecked() for kind in _WITH_PLANES))
-        self._found.setVisible(bool(self._folder.path))
+        self._found.setVisible(self._is_checked and bool(self._folder.path))
         self._task.setText(self._missing() or tr("Choose what to write and where, then export."))
         self.changed.emit()
 
@@ -199,7 +209,9 @@ class ExportChoices(QWidget):
 def _has_files(folder: Path) -> bool:
     """Return whether a folder contains anything; raise FileError if it cannot be written to."""
     require_writable(folder)
-    return folder.is_dir() and any(folder.iterdir())
+    with suppress(OSError):  # it is not there, or only to be written to
+        return any(folder.iterdir())
+    return False
 
 
 def _lettered(title: str, letter: str) -> str:

@@ -87,7 +87,8 @@ class SupportDialog(QDialog):
     def showEvent(self, event: QShowEvent) -> None:
         """Check the folder."""
         super().showEvent(event)
-        self._check_folder()
+        if not event.spontaneous():  # not when it was minimized
+            self._check_folder()
 
     def write(self) -> None:
         """Write the bundle."""
@@ -101,7 +102,7 @@ class SupportDialog(QDialog):
             written = run_support(output, settings, progress)
             return tr("{} was written; it contains {}.").format(output, ", ".join(written[:5]))
 
-        self._write.setEnabled(False)
+        self._set_writing(True)
         self._job = Job(work)
         self._said.hide()
         self._job.progressed.connect(lambda doing, _: self._doing.setText(f"{doing}…"))
@@ -122,8 +123,12 @@ class SupportDialog(QDialog):
         self._job.wait()
         self._job = None
         self._doing.clear()
-        self._write.setEnabled(True)
+        self._set_writing(False)
         self._show(found)
+
+    def _set_writing(self, is_writing: bool) -> None:
+        for part in (self._folder, self._frames, self._write):
+            part.setEnabled(not is_writing)
 
     def _check_folder(self) -> None:
         self._write.setEnabled(False)  # until an answer, which would hide how the writing ended
@@ -136,10 +141,9 @@ class SupportDialog(QDialog):
         """Say why the folder is refused; otherwise allow to write, and name the file."""
         if not self._folder.path:
             problem = tr("Choose the folder to write to.")
-        if self._job is None:
-            self._write.setEnabled(not problem)
-            self._doing.setText("" if problem else self._will)
-            self._show(Finding("", Health.BROKEN, problem) if problem else None)
+        self._write.setEnabled(not problem)
+        self._doing.setText("" if problem else self._will)
+        self._show(Finding("", Health.BROKEN, problem) if problem else None)
 
     def _show(self, found: Finding | None) -> None:
         self._said.setVisible(found is not None)

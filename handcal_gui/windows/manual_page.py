@@ -52,9 +52,8 @@ class ManualPage(QTextBrowser):
         self.setObjectName("manualPage")
         self.setOpenExternalLinks(True)
         self._words: re.Pattern[str] | None = None
-        self._pictures: set[QUrl] = set()
+        self._pictures: dict[QUrl, tuple[float, float]] = {}  # full width, and that shown
         self._fit_soon = fit_soon(self._fit_pictures, self)
-        self._fit_soon.setInterval(_SETTLED_MS)
         self.anchorClicked.connect(self._open_picture)
         follow_theme(self, self._load_again)
 
@@ -126,27 +125,35 @@ class ManualPage(QTextBrowser):
         image = _drawn(path, ratio) if is_drawing else QImage(str(path))
         if image.isNull():
             return image
-        width_px = min(image.deviceIndependentSize().width(), self.width() - _BESIDE_PX)
+        full_px = image.deviceIndependentSize().width()
+        width_px = self._shown_px(full_px)
         if image.width() > ratio * width_px:
             smooth = Qt.TransformationMode.SmoothTransformation
             image = image.scaledToWidth(round(ratio * width_px), smooth)
         if is_dark() and not is_drawing:
             image = _dimmed(image)
         image.setDevicePixelRatio(image.width() / width_px)
-        self._pictures.add(QUrl(name))
+        self._pictures[QUrl(name)] = full_px, width_px
         return image
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give the pictures the page's new width, once it has stopped changing: they take 0.1 s."""
+        """Give the pictures the page's new width, once it has stopped changing."""
         super().resizeEvent(event)
         if event.size().width() != event.oldSize().width():
-            self._fit_soon.start()
+            self._fit_soon.start(_SETTLED_MS)
+
+    def _shown_px(self, full_px: float) -> float:
+        return min(full_px, self.width() - _BESIDE_PX)
 
     def _fit_pictures(self) -> None:
-        kind = QTextDocument.ResourceType.ImageResource.value
-        for name in tuple(self._pictures):
-            self.document().addResource(kind, name, self.loadResource(kind, name))
-        self.document().markContentsDirty(0, self.document().characterCount())
+        """Load a picture that has a new width, then the next: all at once would take 0.2 s."""
+        for name, (full_px, shown_px) in self._pictures.items():
+            if shown_px != self._shown_px(full_px):
+                kind = QTextDocument.ResourceType.ImageResource.value
+                self.document().addResource(kind, name, self.loadResource(kind, name))
+                self.document().markContentsDirty(0, self.document().characterCount())
+                self._fit_soon.start(0)
+                return
 
     def _open_picture(self, link: QUrl) -> None:
         target = self.source().resolved(link)

@@ -206,7 +206,8 @@ class _Pictures(QWidget):
             )
 
     def show_text(self, *, message: str, caption: str = "") -> None:
-        is_in_color = self._color.has_image and not self._color.isHidden()
+        is_in_depth = not self._color.has_image and not self._depth_side.isHidden()
+        is_in_color = not self._color.isHidden() and not is_in_depth
         self._depth.show_text(message=message, caption="" if is_in_color else caption)
         if self._depth.has_image and not self._color.has_image:
             message = message or _NO_COLOR

@@ -53,7 +53,7 @@ class ShiftHistory:
     Attributes
     ----------
     is_replaced : bool
-        True while the present shifts are those of a result that replaced shifts set by hand.
+        True while the present shifts are those of others, in place of shifts set by hand.
     """
 
     def __init__(self, shifts_m: Shifts) -> None:
@@ -94,11 +94,14 @@ class ShiftHistory:
         self._steps[self._at :] = [_frozen(shifts_m)]
 
     def after(self, shifts_m: Shifts) -> ShiftHistory:
-        """Return the history with the shifts of a new result: an undo away from any set by hand."""
+        """Return the history with shifts set by others: an undo away from any set by hand."""
         if not self.can_undo:
             return ShiftHistory(shifts_m)
-        self.change(shifts_m)
-        self.is_replaced = True
+        if self.is_replaced and same_shifts(shifts_m, self._steps[self._at - 1]):
+            self.undo()  # others set what had been set by hand
+        else:
+            self.change(shifts_m, goes_on=self.is_replaced)
+            self.is_replaced = True
         return self
 
     def undo(self) -> None:

@@ -55,7 +55,6 @@ _ARRIVALS = {
     Arrival.ARRIVED: ("check", tr("In the headset. ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")),
     Arrival.LATE: ("warning", tr("Not acknowledged by the headset; see Link")),
 }
-_REPLACED = "wait", tr("A new result replaced φ as it was set: Ctrl+Z returns to that.")
 _NO_SESSION = tr("Fine-tuning starts with a session.")
 
 
@@ -158,7 +157,9 @@ class FineTunePanel(QWidget):
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
         can_move = self._is_editable() and arrival is Arrival.ARRIVED
         if can_move and self._history.is_replaced:
-            sign, text = _REPLACED
+            sign, text = "wait", tr("φ was replaced; Ctrl+Z returns to the former one.")
+            if not self._has_keys():
+                text = tr("φ was replaced; Ctrl+6, then Ctrl+Z returns to the former one.")
         elif can_move and not self._has_keys():
             sign, text = "fine-tune", tr("Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")
             if self._area.shows_keys:

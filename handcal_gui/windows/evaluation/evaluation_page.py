@@ -203,7 +203,7 @@ class EvaluationPage(QWidget):
             task = self.kept if self.is_busy else tr("Change the entries for another study.")
         elif is_again:
             task = tr("Change the entries, or run again if the files have changed.")
-        if readiness is not None or not self._is_done:  # else the check has only just begun
+        if readiness is not None or self.is_busy or not self._question.text():
             self._question.setText(f"{self._question_text} {task}")
         if readiness is not None:
             self._button.setText(tr("Run again") if is_again else readiness.button)

@@ -108,6 +108,7 @@ class SessionsTable(QTableView):
         if rows:
             current = self._sessions.index(rows[0], 0)
             self.selectionModel().setCurrentIndex(current, flags.NoUpdate)
+        self._show_left_out()  # a reset, after which none is shown, emits nothing
 
     def show_reason(self, is_missing: bool) -> None:
         """Show why there is no session, and what to do; nothing if there is one."""

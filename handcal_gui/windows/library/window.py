@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -95,7 +95,7 @@ class LibraryWindow(QDialog):
         self._folder = folder
         self._contents = Contents()
         self._changes: list[Change] = [()]
-        self._checked, self._found_damaged = list[Path](), set[Path]()  # by the last check
+        self._found_damaged: set[Path] = set()  # by the last check, which reads more
         self._is_read = False
         self._sessions = SessionsModel()
         self._search = with_name(QLineEdit(clearButtonEnabled=True), "search", tr("Search"))
@@ -132,10 +132,10 @@ class LibraryWindow(QDialog):
         """The sessions that are selected, in the order shown."""
         return self._table.chosen
 
-    def reload(self) -> None:
+    def reload(self, checked: Collection[Path] = ()) -> None:
         """Read the folder again; sessions that have not changed only if they were just checked."""
         rows = self._sessions.rows
-        self._find.ask([row.entry for row in rows if row.entry.path not in self._checked])
+        self._find.ask([row.entry for row in rows if row.entry.path not in checked])
 
     def stop(self) -> None:
         """Cancel what is running; safe to call twice."""
@@ -236,8 +236,8 @@ class LibraryWindow(QDialog):
         self.export_requested.emit([entry.path for entry in self.chosen])
 
     def _check_chosen(self) -> None:
-        self._checked, self._found_damaged = [one.path for one in self.chosen], set()
-        self._start(partial(check_sessions, self._checked, self._found_damaged))
+        paths, self._found_damaged = [one.path for one in self.chosen], set()
+        self._start(partial(check_sessions, paths, self._found_damaged), paths)
 
     def _repair_chosen(self) -> None:
         self._start(partial(repair_beside, self.chosen[0].path))
@@ -284,17 +284,17 @@ class LibraryWindow(QDialog):
     def _undo_last(self) -> None:
         self._start(partial(undo, self._changes[-1]))
 
-    def _start(self, work: Work) -> None:
+    def _start(self, work: Work, checked: Collection[Path] = ()) -> None:
         if not self._jobs.is_busy:
             self._table.setFocus()  # or the search gets it from a button that is disabled
             self._say("")
             self._table.viewport().repaint()  # or each cell painted waits for the work
-            self._jobs.run(tr("Starting"), work, self._end)
+            self._jobs.run(tr("Starting"), work, partial(self._end, checked=checked))
 
-    def _end(self, said: object) -> None:
+    def _end(self, said: object, checked: Collection[Path] = ()) -> None:
         self._say(str(said))
         self.changed.emit()
-        self.reload()
+        self.reload(checked)
 
     def _show_busy(self, is_busy: bool) -> None:
         self._said.setCurrentWidget(self._jobs if is_busy else self._message)

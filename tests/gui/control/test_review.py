@@ -164,8 +164,8 @@ def test_a_session_without_alignments_shows_no_hand_of_another(
         tasks.append(child(program, QLabel, "reviewTask").text())
     assert "export" in tasks[0]
     assert tasks[1].startswith("Resume")
-    assert not any(text.endswith("–") for text in points[0])
-    assert all(text.endswith("–") for text in points[1])
+    assert not any(text.endswith("none") for text in points[0])
+    assert all(text.endswith("none") for text in points[1])
 
 
 def test_a_session_is_shown_and_closed_again(

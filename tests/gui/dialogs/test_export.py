@@ -67,6 +67,7 @@ def dialog(
     dialog = ExportDialog(record.path.name, settings, tmp_path / "out", exporter)
     qtbot.addWidget(dialog)
     dialog.show()
+    qtbot.waitUntil(press(dialog, "export").isEnabled)  # the folder is checked
     yield dialog
     exporter.may_end.set()
     qtbot.waitUntil(lambda: press(dialog, "close").text() == "&Close")
@@ -142,6 +143,7 @@ def test_the_report_that_was_made_opens_with_a_letter(
     assert opened == [exporter.folders[0] / "report.pdf"]
     press(dialog, "back").click()
     exporter.names = ("a/report.pdf", "b/report.pdf")
+    qtbot.waitUntil(press(dialog, "export").isEnabled)
     press(dialog, "export").click()
     qtbot.waitUntil(lambda: text(dialog, "doing") == "Done.")
     assert press(dialog, "openReport").isHidden()  # which of them?
@@ -209,6 +211,7 @@ def test_a_failure_is_reported_and_can_be_tried_again(
     exporter.failure = ""
     press(dialog, "back").click()
     assert press(dialog, "export").isVisible()
+    qtbot.waitUntil(press(dialog, "export").isEnabled)
     press(dialog, "export").click()
     qtbot.waitUntil(lambda: len(files(dialog)) == 2)
 

@@ -36,7 +36,9 @@ def test_the_dialog_writes_a_bundle(
     qtbot.waitUntil(lambda: not child(dialog, QLabel, "supportFound").isVisible())
     qtbot.waitUntil(write.isEnabled)
     write.click()
+    assert not folder.isEnabled(), "or another would not be checked"
     qtbot.waitUntil(lambda: "was written" in text(dialog, "supportFound"), timeout=10_000)
+    assert folder.isEnabled()
     [written] = tmp_path.glob("handcal-support-*.zip")
     assert f"The file {written.name} will be written" in announced
     dialog.stop()

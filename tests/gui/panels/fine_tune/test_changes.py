@@ -38,24 +38,30 @@ def test_starts_again_with_another_wearer(panel: FineTunePanel, show: Show, rig:
     assert not action(panel, "Undo").isEnabled()
 
 
-def test_what_a_new_result_replaces_is_an_undo_away(
+def test_what_others_replace_is_an_undo_away(
     qtbot: QtBot, panel: FineTunePanel, show: Show, results: Results, sent: list[Shifts]
 ) -> None:
+    def set_by_others(shifts_m: Shifts) -> None:
+        show(procedure={"applied_shift_m": shifts_m})
+        np.testing.assert_allclose(fields_mm(panel, "left"), 1e3 * shifts_m["left"], atol=0.005)
+
     show()
     field(panel, "left", 1).setValue(4.0)
     fine_tuned_mm = fields_mm(panel, "left")
     qtbot.waitUntil(lambda: bool(sent))
     for moved_m in (0.001, 0.002):  # as without an alignment, and with another in its place
-        solved_m = {eye: results.eyes[eye].shift_m + moved_m for eye in EYES}
-        show(procedure={"applied_shift_m": solved_m})
-        np.testing.assert_allclose(fields_mm(panel, "left"), 1e3 * solved_m["left"], atol=0.005)
-        assert status(panel).startswith("A new result replaced φ as it was set: Ctrl+Z returns")
-    for _ in range(2):
-        action(panel, "Undo").trigger()
+        set_by_others({eye: results.eyes[eye].shift_m + moved_m for eye in EYES})
+        assert status(panel).startswith("φ was replaced; Ctrl+")
+    sent.clear()
+    action(panel, "Undo").trigger()
     assert fields_mm(panel, "left") == fine_tuned_mm
-    qtbot.waitUntil(lambda: 1e3 * sent[-1]["left"][0] == pytest.approx(4.0))
-    show(procedure={"applied_shift_m": sent[-1]})
-    assert not status(panel).startswith("A new result")
+    qtbot.waitUntil(lambda: bool(sent))
+    set_by_others(fine_tuned := sent[-1])
+    assert "replaced" not in status(panel)
+    set_by_others(OFFLINE)  # by G
+    assert "replaced" in status(panel)
+    set_by_others(fine_tuned)  # by G once more
+    assert "replaced" not in status(panel)
     action(panel, "Undo").trigger()
     assert not action(panel, "Undo").isEnabled(), "the solved φ was not set by hand"
 

@@ -319,6 +319,9 @@ def test_a_narrow_window_names_the_columns_left_out_and_cuts_only_names(
         assert [one for one in named if one] == [one.partition("\n")[0] for one in hidden]
         choose(window, "Bea")
         assert ("Headset: –" in text(window, "leftOut")) == ("Headset" in hidden)
+        child(window, QLineEdit, "search").setText("zzz")
+        assert "Headset: " not in text(window, "leftOut"), "no session is in sight"
+        child(window, QLineEdit, "search").clear()
         assert not across.isSectionHidden(2), "the name of the rig is cut instead"
     assert not across.hiddenSectionCount()
     tip = table(window).model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
