@@ -57,7 +57,7 @@ class KeysDialog(QDialog):
         close.clicked.connect(self.accept)
         add_action(self, tr("Search the keys"), "Ctrl+F", search.setFocus)
         vbox(
-            paragraph("keysMeaning", tr("All keys, by the place where they work.")),
+            paragraph("keysMeaning", tr("All keys, grouped by where they work.")),
             search,
             (self._list, 1),
             (self._none, 1),

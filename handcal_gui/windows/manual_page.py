@@ -53,6 +53,7 @@ class ManualPage(QTextBrowser):
         self.setOpenExternalLinks(True)
         self._words: re.Pattern[str] | None = None
         self._pictures: dict[QUrl, tuple[float, float]] = {}  # full width, and that shown
+        self._place = 0, 0  # block at the top, and where it was; 0 if none was asked for
         self._fit_soon = fit_soon(self._fit_pictures, self)
         self.anchorClicked.connect(self._open_picture)
         follow_theme(self, self._load_again)
@@ -86,6 +87,7 @@ class ManualPage(QTextBrowser):
         """Scroll until a block is at the top."""
         self.setTextCursor(QTextCursor(self.document().lastBlock()))
         self.setTextCursor(QTextCursor(block))
+        self._place = block.blockNumber(), self.verticalScrollBar().value()
 
     def doSetSource(
         self,
@@ -105,6 +107,7 @@ class ManualPage(QTextBrowser):
         while heading and block.isValid():
             if block.blockFormat().headingLevel() and _anchor(block.text()) == heading:
                 self.go_to(block)
+                self._fit_soon.start(_SETTLED_MS)  # Qt lays out the pictures above it later
                 return
             block = block.next()
 
@@ -117,6 +120,7 @@ class ManualPage(QTextBrowser):
         path = Path(self.source().resolved(QUrl(name)).toLocalFile())
         if kind == QTextDocument.ResourceType.MarkdownResource.value and path.is_file():
             self._pictures.clear()  # of the page before
+            self._place = 0, 0
             return markdown_of(path)
         if kind != QTextDocument.ResourceType.ImageResource.value:
             return super().loadResource(kind, name)
@@ -154,6 +158,9 @@ class ManualPage(QTextBrowser):
                 self.document().markContentsDirty(0, self.document().characterCount())
                 self._fit_soon.start(0)
                 return
+        block, place = self._place
+        if block and self.verticalScrollBar().value() == place:  # not scrolled since
+            self.go_to(self.document().findBlockByNumber(block))
 
     def _open_picture(self, link: QUrl) -> None:
         target = self.source().resolved(link)

@@ -324,5 +324,5 @@ def _drawn_otherwise(snapshot: Snapshot) -> str:
     former_m = procedure.former_shift_m
     can_return = all(eye in former_m and (former_m[eye] == solved_m[eye]).all() for eye in solved_m)
     how = tr("Press G to return.") if can_return else tr("Reset φ in Fine-tune to return.")
-    found = tr("{}: drawn, saved and exported with {}; the verdict is on the solved φ.")
+    found = tr("{}: drawn, saved and exported with {}; the verdict applies to the solved φ.")
     return f"{found.format(eyes_text(others), which)} {how}"

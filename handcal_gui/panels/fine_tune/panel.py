@@ -157,9 +157,9 @@ class FineTunePanel(QWidget):
         sign, text = ("wait", obstacle) if obstacle else _ARRIVALS[arrival]
         can_move = self._is_editable() and arrival is Arrival.ARRIVED
         if can_move and self._history.is_replaced:
-            sign, text = "wait", tr("φ was replaced; Ctrl+Z returns to the former one.")
+            sign, text = "wait", tr("The φ you set was replaced. Ctrl+Z brings it back.")
             if not self._has_keys():
-                text = tr("φ was replaced; Ctrl+6, then Ctrl+Z returns to the former one.")
+                text = tr("The φ you set was replaced. Ctrl+6, then Ctrl+Z brings it back.")
         elif can_move and not self._has_keys():
             sign, text = "fine-tune", tr("Ctrl+6, then ← → φ1, ↑ ↓ φ2, PgUp PgDn φ3, E eye")
             if self._area.shows_keys:

@@ -44,7 +44,7 @@ _REASONS = {
     "moved": tr("Last: moved too fast."),
     "shape changed": tr("Last: shape changed."),
     "no hand": tr("Last: no hand."),
-    "drawn otherwise": tr("Last: the drawing had changed."),
+    "drawn otherwise": tr("Last: the drawn φ had changed."),
 }
 """Reasons of the journal."""
 

@@ -40,7 +40,7 @@ class SessionsTable(QTableView):
     Attributes
     ----------
     left_out : ElidedLabel
-        Shows what the window is too narrow for: of one session its values, else the columns.
+        Shows what has no room: the values of a single selected session, else the names of columns.
     """
 
     def __init__(self, sessions: SessionsModel) -> None:

@@ -236,7 +236,7 @@ class LibraryWindow(QDialog):
         self.export_requested.emit([entry.path for entry in self.chosen])
 
     def _check_chosen(self) -> None:
-        paths, self._found_damaged = [one.path for one in self.chosen], set()
+        self._found_damaged.difference_update(paths := [one.path for one in self.chosen])
         self._start(partial(check_sessions, paths, self._found_damaged), paths)
 
     def _repair_chosen(self) -> None:

@@ -265,5 +265,5 @@ def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
     if missing:
         advice = tr("solve these steps, or save the rig file to use it as it is")
     if failed:
-        advice = tr("follow the advice under Acceptance, then repeat it")
+        advice = tr("follow the advice under Acceptance, then accept the rig again")
     return Finding("", health, text, advice)

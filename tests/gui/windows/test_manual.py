@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QPoint, Qt, QUrl
 from PySide6.QtGui import QImage, QTextDocument
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QToolButton, QWidget
@@ -217,8 +217,8 @@ def test_a_small_window_shows_the_contents_beside_pages_that_fit(
 
 
 def test_pictures_have_the_width_of_the_window(qtbot: QtBot, manual: Manual) -> None:
-    def pictures_px() -> float:
-        return manual.page.document().idealWidth()
+    def pictures_px() -> list[float]:
+        return [shown_px for _, shown_px in manual.page._pictures.values()]
 
     manual.resize(1300, 700)
     manual.open("docs/guide.md")
@@ -230,10 +230,32 @@ def test_pictures_have_the_width_of_the_window(qtbot: QtBot, manual: Manual) -> 
     manual.resize(700, 482)
     qtbot.waitUntil(lambda: manual.page.width() < 600)
     qtbot.waitUntil(lambda: manual.page.horizontalScrollBar().maximum() == 0)
-    assert pictures_px() < 600
+    room_px = manual.page.width()
+    qtbot.waitUntil(lambda: max(pictures_px()) < room_px)
+    qtbot.waitUntil(lambda: not manual.page._fit_soon.isActive())  # the last one is done, too
     manual.resize(1300, 700)
     qtbot.waitUntil(lambda: pictures_px() == wide_px)
+    assert max(wide_px) > room_px
     assert manual.page.textCursor().position() == marked
+
+
+def test_a_heading_stays_at_the_top_while_pictures_are_laid_out(
+    qtbot: QtBot, manual: Manual
+) -> None:
+    manual.resize(1300, 700)
+    manual.open("docs/guide.md#sessions")
+
+    def top() -> str:
+        return manual.page.cursorForPosition(QPoint(10, 10)).block().text()
+
+    before = manual.page.document().size().height()
+    qtbot.waitUntil(lambda: manual.page.document().size().height() != before)
+    QTest.qWait(300)
+    assert top() == "Sessions"
+    manual.page.verticalScrollBar().setValue(0)
+    manual.resize(1000, 700)
+    QTest.qWait(300)
+    assert manual.page.verticalScrollBar().value() == 0, "it was scrolled since"
 
 
 def test_the_titles_are_shown_whole(manual: Manual) -> None:

@@ -249,8 +249,8 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
         seen = planned_snapshot(snapshot, StepName.DONE, **shifts_m)
         seen = replace(seen, record=replace(seen.record, events=events))
         said = (
-            f"Both eyes: drawn, saved and exported with {which}; the verdict is on the solved φ. "
-            f"{how} to return."
+            f"Both eyes: drawn, saved and exported with {which}; the verdict applies to the solved "
+            f"φ. {how} to return."
         )
         assert wizard.view(seen).fact == said
         wizard.move(Action.NEXT, seen)

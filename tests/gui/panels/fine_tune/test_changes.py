@@ -51,7 +51,7 @@ def test_what_others_replace_is_an_undo_away(
     qtbot.waitUntil(lambda: bool(sent))
     for moved_m in (0.001, 0.002):  # as without an alignment, and with another in its place
         set_by_others({eye: results.eyes[eye].shift_m + moved_m for eye in EYES})
-        assert status(panel).startswith("φ was replaced; Ctrl+")
+        assert status(panel).startswith("The φ you set was replaced. Ctrl+")
     sent.clear()
     action(panel, "Undo").trigger()
     assert fields_mm(panel, "left") == fine_tuned_mm

@@ -103,7 +103,7 @@ def test_a_failed_acceptance_is_shown_as_a_failure(
     assert said.text().startswith("4 not known or not made; none doubtful. Save")
     project.note_accepted("the rig fails: left", is_passed=False)
     project.save_rig_as(tmp_path / "ours.yaml")
-    assert said.text().endswith("Follow the advice under Acceptance, then repeat it.")
+    assert said.text().endswith("Follow the advice under Acceptance, then accept the rig again.")
 
 
 def test_no_item_is_broken_in_a_small_window(qtbot: QtBot, project: RigProject) -> None:
