@@ -217,7 +217,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         alignments=len(state.alignments.active),
         trials=len(trials),
         trials_arcmin=_mean_arcmin(trials),
-        target_arcmin=_target_arcmin(state.settings),
+        target_arcmin=lab_target_arcmin(state.settings),
         is_finished=state.is_finished,
         is_repaired=any(one.name == SessionEvent.REPAIRED for one in replayed.journal.events),
         damaged=len(replayed.damaged) + _damaged_files(path, state),
@@ -251,8 +251,8 @@ def _mean_arcmin(trials: Sequence[Trial]) -> float | None:
     return float(np.mean([trial.error_arcmin.mean() for trial in trials])) if trials else None
 
 
-def _target_arcmin(settings: Mapping[str, Any] | None) -> float | None:
-    """Return the lab's target; None in sessions of older versions, whose settings are in a file."""
+def lab_target_arcmin(settings: Mapping[str, Any] | None) -> float | None:
+    """Return the lab's target of a session's settings; None if they have none."""
     found: object = settings
     for name in ("calibration", "solve", "verdict", "target_arcmin"):
         found = found.get(name) if isinstance(found, dict) else None

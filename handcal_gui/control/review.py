@@ -136,6 +136,7 @@ class ReviewController(QObject):
         panels.results.show_results(
             stored.results, record.alignments, record.rig, has_verdicts=False
         )
+        panels.results.show_trials(record)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
 from handcal.report.cells import signed
 from handcal.rig_types import EyeDisplay, Rig
+from handcal.session.trial import Trial
 from handcal.types import EYES, Eye, EyeShift, VerdictName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
@@ -137,11 +138,29 @@ QUANTITIES = (
 )
 _ANOTHER = tr("Expected error after one more alignment like these")
 _ALONE: Mapping[Eye, str] = {"left": tr("{} left"), "right": tr("{} right")}
+_TRIALS = tr(
+    "Error of the calibrated φ in the user-test trials, the mean, and their number. ⚠: over the\n"
+    "lab's target; look at the trials, and calibrate again if φ was set well by hand."
+)
 _EYE_DISTANCE = tr("Eye distance")
 _EYE_DISTANCE_MEANING = tr("Distance between the two solved eye positions")
 
 
-def result_rows(results: Results, rig: Rig) -> list[Row]:
+def trial_row(trials: Iterable[Trial], target_arcmin: float | None) -> Row:
+    """Return the mean error of each eye's trials; ⚠ marks one over the lab's target."""
+    errors: dict[Eye, list[float]] = {eye: [] for eye in EYES}
+    for trial in trials:
+        errors[trial.eye].append(float(trial.error_arcmin.mean()))
+    cells = []
+    for found in errors.values():
+        mean_arcmin = sum(found) / max(len(found), 1)
+        is_over = target_arcmin is not None and mean_arcmin > target_arcmin
+        text = tr("⚠ {:.1f}′ (n = {})") if is_over else tr("{:.1f}′ (n = {})")
+        cells.append(text.format(mean_arcmin, len(found)) if found else NOTHING)
+    return Row(tr("Trials"), tuple(cells), _TRIALS)
+
+
+def result_rows(results: Results, rig: Rig, trials: Row | None = None) -> list[Row]:
     """Return the numbers of each eye, one column per eye, and those of both eyes."""
     rows = [
         Row(q.name, tuple(_cell(q, results.eyes.get(eye), rig, eye) for eye in EYES), q.meaning)
@@ -149,9 +168,8 @@ def result_rows(results: Results, rig: Rig) -> list[Row]:
     ]
     arcmin = results.expected_after_another_arcmin
     another = tuple(_arcmin(arcmin[eye]) if eye in arcmin else NOTHING for eye in EYES)
-    rows.insert(
-        QUANTITIES.index(EXPECTED_ERROR) + 1, Row(tr("One more alignment"), another, _ANOTHER)
-    )
+    after = QUANTITIES.index(EXPECTED_ERROR) + 1
+    rows[after:after] = [Row(tr("One more alignment"), another, _ANOTHER), *filter(None, [trials])]
     solved = tr("Eye distance, solved")  # as another may be measured
     rows.append(Row(solved, (eye_distance_text(results),), _EYE_DISTANCE_MEANING))
     if measured := results.measured_eye_distance:

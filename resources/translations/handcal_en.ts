@@ -420,6 +420,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Checking the folder…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The export will create the folder {} there.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1497,10 +1501,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{}: drawn, saved and exported with {}; the verdict is on the solved φ.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Not every eye has been verified. Finish as it is, or verify an eye.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1538,6 +1538,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Reset φ in Fine-tune to return.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}: drawn, saved and exported with {}; the verdict applies to the solved φ.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2471,6 +2475,14 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The φ you set was replaced. Ctrl+Z brings it back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The φ you set was replaced. Ctrl+6, then Ctrl+Z brings it back.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>against the offline φ</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2516,10 +2528,6 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>The calibrated φ is the one with which the headset draws after the calibration: the solved φ, or 0 for an eye that keeps the offline calibration. A trial records its error.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>A new result replaced φ as it was set: Ctrl+Z returns to that.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3052,7 +3060,7 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Last: the drawing had changed.</source>
+        <source>Last: the drawn φ had changed.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3645,7 +3653,7 @@ of the trials above and below it, but not below 0. A single trial has no SD.</so
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>All keys, by the place where they work.</source>
+        <source>All keys, grouped by where they work.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4044,7 +4052,20 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Error of the calibrated φ in the user-test trials, the mean, and their number. ⚠: over the
+lab&apos;s target; look at the trials, and calibrate again if φ was set well by hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Eye distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>⚠ {:.1f}′ (n = {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:.1f}′ (n = {})</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6425,7 +6446,7 @@ of the session, also of a calibration that was then repeated, and their number.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>follow the advice under Acceptance, then repeat it</source>
+        <source>follow the advice under Acceptance, then accept the rig again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QSlider, QWidget
@@ -73,6 +73,18 @@ def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
     for theme in ("dark", "light", "contrast"):
         use_theme(theme)
         qtbot.waitUntil(follows)
+
+
+@pytest.mark.usefixtures("themes")
+@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
+def test_a_disabled_icon_is_grey(theme: Literal["light", "dark", "contrast"]) -> None:
+    use_theme(theme)
+    shades = []
+    for mode in (QIcon.Mode.Normal, QIcon.Mode.Disabled):
+        image = icon("undo").pixmap(QSize(24, 24), 1.0, mode).toImage()
+        pixels = [image.pixelColor(x, y) for x in range(24) for y in range(24)]
+        shades.append(max(pixels, key=QColor.alpha).lightness())
+    assert abs(shades[0] - shades[1]) > 60
 
 
 @pytest.mark.usefixtures("themes")

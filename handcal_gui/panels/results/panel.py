@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
@@ -10,6 +10,9 @@ from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
 from handcal.rig_types import Rig
+from handcal.session.library import lab_target_arcmin
+from handcal.session.record import SessionRecord
+from handcal.session.trial import Trial
 from handcal.station.snapshot import Snapshot
 from handcal.types import EYES, Alignment
 from handcal_gui.keys import add_action
@@ -22,13 +25,14 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable, rows_as_text
+from handcal_gui.widgets.number_table import NumberTable, Row, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     PHI,
     another_text,
     result_rows,
     single_alignment_rows,
+    trial_row,
     verdict_rows,
     verdict_word,
 )
@@ -66,6 +70,7 @@ class ResultsPanel(QWidget):
         self.setObjectName("results-panel")
         self.setAccessibleName(tr("Results"))
         self._results: Results | None = None
+        self._trials: Mapping[int, Trial] = {}
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
         self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
@@ -87,6 +92,7 @@ class ResultsPanel(QWidget):
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
             self.show_results(procedure.results, record.alignments, record.rig)
+        self.show_trials(record)
 
     def show_results(
         self,
@@ -108,7 +114,7 @@ class ResultsPanel(QWidget):
         has_verdicts : bool
             False if the page beside the panel shows the verdicts.
         """
-        self._results = results
+        self._results, self._trials = results, {}
         self._copy.setEnabled(results is not None)
         self._stack.setCurrentIndex(0 if results is None else 1)
         if results is None:
@@ -118,8 +124,7 @@ class ResultsPanel(QWidget):
             word = verdict_word(results, eye) if eye in results.verdicts else ""
             card.show_verdict(results.verdicts.get(eye), word)
             card.setVisible(has_verdicts)
-        eyes = [EYE_NAMES[eye] for eye in EYES]
-        self._numbers.show_rows(eyes, result_rows(results, rig))
+        self._show_numbers(result_rows(results, rig))
         for tab in (self._iterations, self._residuals, self._alone):
             self._tabs.setTabVisible(self._tabs.indexOf(tab), bool(results.alignments))
         self._convergence.show_results(results)
@@ -128,6 +133,18 @@ class ResultsPanel(QWidget):
         self._another.setText(another_text(results, rig))
         self._compare.show_results(results, rig)
         self._fit()
+
+    def show_trials(self, record: SessionRecord) -> None:
+        """Show the errors of a session's trials among the numbers, if there are any."""
+        if self._results is not None and record.trials is not self._trials:
+            self._trials = record.trials
+            target_arcmin = lab_target_arcmin(record.settings)
+            row = trial_row(record.trials.values(), target_arcmin) if record.trials else None
+            self._show_numbers(result_rows(self._results, record.rig, row))
+            self._fit()
+
+    def _show_numbers(self, rows: Sequence[Row]) -> None:
+        self._numbers.show_rows([EYE_NAMES[eye] for eye in EYES], rows)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the tab of the eyes into the panel."""

@@ -9,7 +9,8 @@ import pytest
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig_types import Rig
-from handcal.types import EYES, Alignment, EyeDistance, EyeShift
+from handcal.session.trial import Trial, make_trial
+from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
@@ -18,6 +19,7 @@ from handcal_gui.widgets.result_rows import (
     comparison_rows,
     result_rows,
     single_alignment_rows,
+    trial_row,
     verdict_rows,
 )
 from tests.gui.views import VERIFIED
@@ -141,3 +143,17 @@ def test_only_eyes_that_both_solved_are_compared(
     labels = [row.label for row in comparison_rows(results, left_only, rig)]
     assert "Left eye" in labels
     assert not {"Right eye", "Eye distance"} & set(labels)
+
+
+def test_trials_over_the_target_are_marked(results: Results, rig: Rig) -> None:
+    def trial(eye: Eye, phi1_mm: float) -> Trial:
+        return make_trial(rig.eyes[eye], eye, 0.4, np.zeros(3), [1e-3 * phi1_mm, 0.0, 0.0])
+
+    trials = [trial("left", 1.0), trial("left", 2.0)]
+    mean = np.mean([one.error_arcmin.mean() for one in trials])
+    assert trial_row(trials, mean - 0.1).cells == (f"⚠ {mean:.1f}′ (n = 2)", "–")
+    for target_arcmin in (mean + 0.1, None):
+        row = trial_row(trials, target_arcmin)
+        assert row.cells == (f"{mean:.1f}′ (n = 2)", "–")
+    labels = [one.label for one in result_rows(results, rig, row)]
+    assert labels.index("Trials") == labels.index("One more alignment") + 1

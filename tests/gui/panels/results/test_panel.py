@@ -15,6 +15,7 @@ from pytestqt.qtbot import QtBot
 from handcal.geometry import transform
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig_types import Rig
+from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES, Alignment, Verdict
@@ -79,6 +80,28 @@ def test_without_results_it_says_how_to_get_them(panel: ResultsPanel, snapshot: 
     assert panel.as_text() == ""
     panel.show_snapshot(snapshot(State.SOLVED))
     assert child(panel, QTabWidget).currentIndex() == 0  # not what the last wearer's ended with
+
+
+def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
+    panel: ResultsPanel, snapshot: Make, rig: Rig
+) -> None:
+    seen = snapshot(State.APPLIED)
+    trial = make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), [0.02, 0.0, 0.0])
+    settings = {"calibration": {"solve": {"verdict": {"target_arcmin": 8.0}}}}
+    for trials, told in (({}, False), ({1: trial}, True), ({}, False)):
+        record = replace(seen.record, trials=trials, settings=settings)
+        panel.show_snapshot(replace(seen, record=record))
+        rows = child(panel, NumberTable, "numbers-of-both-eyes").as_text()
+        assert ("Trials\t⚠ " in rows) == told
+
+
+def test_without_alignments_no_tab_is_of_them(
+    panel: ResultsPanel, results: Results, rig: Rig
+) -> None:
+    panel.show_results(replace(results, alignments={}), {}, rig)
+    tabs = child(panel, QTabWidget)
+    seen = [tabs.tabText(i) for i in range(tabs.count()) if tabs.isTabVisible(i)]
+    assert seen == ["Eyes", "Compare"]
 
 
 def test_a_low_panel_has_room_for_all_numbers(qtbot: QtBot, solved: ResultsPanel) -> None:
