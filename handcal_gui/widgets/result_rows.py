@@ -155,7 +155,7 @@ def trial_row(trials: Iterable[Trial], target_arcmin: float | None) -> Row:
     for found in errors.values():
         mean_arcmin = sum(found) / max(len(found), 1)
         is_over = target_arcmin is not None and mean_arcmin > target_arcmin
-        text = tr("⚠ {:.1f}′ (n = {})") if is_over else tr("{:.1f}′ (n = {})")
+        text = tr("⚠ {:.1f}′ n={}") if is_over else tr("{:.1f}′ n={}")
         cells.append(text.format(mean_arcmin, len(found)) if found else NOTHING)
     return Row(tr("Trials"), tuple(cells), _TRIALS)
 

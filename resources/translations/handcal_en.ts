@@ -4061,14 +4061,6 @@ lab&apos;s target; look at the trials, and calibrate again if φ was set well by
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>⚠ {:.1f}′ (n = {})</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{:.1f}′ (n = {})</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Eye distance, solved</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4102,6 +4094,14 @@ lab&apos;s target; look at the trials, and calibrate again if φ was set well by
     </message>
     <message>
         <source>Distance between the two solved eye positions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>⚠ {:.1f}′ n={}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{:.1f}′ n={}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

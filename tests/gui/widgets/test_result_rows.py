@@ -151,9 +151,9 @@ def test_trials_over_the_target_are_marked(results: Results, rig: Rig) -> None:
 
     trials = [trial("left", 1.0), trial("left", 2.0)]
     mean = np.mean([one.error_arcmin.mean() for one in trials])
-    assert trial_row(trials, mean - 0.1).cells == (f"⚠ {mean:.1f}′ (n = 2)", "–")
+    assert trial_row(trials, mean - 0.1).cells == (f"⚠ {mean:.1f}′ n=2", "–")
     for target_arcmin in (mean + 0.1, None):
         row = trial_row(trials, target_arcmin)
-        assert row.cells == (f"{mean:.1f}′ (n = 2)", "–")
+        assert row.cells == (f"{mean:.1f}′ n=2", "–")
     labels = [one.label for one in result_rows(results, rig, row)]
     assert labels.index("Trials") == labels.index("One more alignment") + 1

@@ -86,11 +86,17 @@ def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
     panel: ResultsPanel, snapshot: Make, rig: Rig
 ) -> None:
     seen = snapshot(State.APPLIED)
-    trial = make_trial(rig.eyes["left"], "left", 0.4, np.zeros(3), [0.02, 0.0, 0.0])
+    panel.resize(360, 416)
+    both = {
+        number: make_trial(rig.eyes[eye], eye, 0.4, np.zeros(3), [0.02, 0.0, 0.0])
+        for number, eye in enumerate(EYES)
+    }
     settings = {"calibration": {"solve": {"verdict": {"target_arcmin": 8.0}}}}
-    for trials, told in (({}, False), ({1: trial}, True), ({}, False)):
+    for trials, told in (({}, False), (both, True), ({}, False)):
         record = replace(seen.record, trials=trials, settings=settings)
         panel.show_snapshot(replace(seen, record=record))
+        table = child(panel, NumberTable, "numbers-of-both-eyes")
+        assert table.horizontalScrollBar().maximum() == 0
         rows = child(panel, NumberTable, "numbers-of-both-eyes").as_text()
         assert ("Trials\t⚠ " in rows) == told
 
