@@ -97,8 +97,7 @@ class SessionPanel(QWidget):
         self._notes.changed.connect(self.notes_changed)
         self._unwritten = paragraph("unwritten")
         self._unwritten.hide()
-        self._single = ElidedLabel()
-        self._single.setText(tr("φ of each alignment alone; the result is in Results"))
+        self._meaning = ElidedLabel()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
             lambda deletion: self.restore_requested.emit(deletion.kind, deletion.number)
@@ -183,9 +182,14 @@ class SessionPanel(QWidget):
         self._tabs.setTabText(1, tr("Trials ({})").format(len(record.trials)))
 
     def _show_note(self) -> None:
-        """Explain the numbers of alignments while they are in sight."""
-        has_any = self._record is not None and bool(self._record.alignments)
-        self._single.setVisible(has_any and self._tabs.currentWidget() is self._alignments)
+        """Explain the numbers of alignments or trials while they are in sight."""
+        record, shown, meaning = self._record, self._tabs.currentWidget(), ""
+        if record is not None and record.alignments and shown is self._alignments:
+            meaning = tr("φ of each alignment alone; the result is in Results")
+        elif record is not None and record.trials and shown is self._trials:
+            meaning = tr("Error: between the calibrated φ and the fine-tuned one")
+        self._meaning.setText(meaning)
+        self._meaning.setVisible(bool(meaning))
 
     def _show_eye_distance(self, stored: EyeDistance | None) -> None:
         is_told = stored is not None and stored.source == "headset"
@@ -239,7 +243,7 @@ class SessionPanel(QWidget):
         buttons = self._strip.button, (QWidget(), 1), self._open_folder, self._inspect, self._export
         row = hbox(*buttons, spacing=SPACING_PX)
         self._tabs.currentChanged.connect(self._show_note)
-        parts = form, (self._tabs, 1), self._unwritten, self._single, self._strip, row
+        parts = form, (self._tabs, 1), self._unwritten, self._meaning, self._strip, row
         vbox(*parts, on=self, margins=SPACING_PX, spacing=SPACING_PX)
 
 

@@ -25,6 +25,7 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EyeDistance
 from handcal_gui.panels.session.panel import SessionPanel
+from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.record_table import RecordTable
 from tests.gui.helpers import button, child, note_opened, show, text
 
@@ -60,21 +61,24 @@ def test_shows_the_session_of_a_snapshot(
     assert cell(alignments, 0, 3) == "–", "the results are gone"
 
 
-def test_the_numbers_of_alignments_are_explained_while_they_are_shown(
+def test_the_numbers_of_a_tab_are_explained_while_there_are_any(
     panel: SessionPanel, record: SessionRecord
 ) -> None:
-    note = "φ of each alignment alone; the result is in Results"
-    shown = [one for one in panel.findChildren(QLabel) if one.text() == note]
-    panel.show_record(record, None)
-    tabs = child(panel, QTabWidget)
-    seen = []
-    for tab in range(3):
-        tabs.setCurrentIndex(tab)
-        seen.append(shown[0].isVisible())
-    assert seen == [True, False, False]
-    tabs.setCurrentIndex(0)
-    panel.show_record(replace(record, alignments={}), None)
-    assert not shown[0].isVisible()
+    def seen(shown: SessionRecord) -> list[str]:
+        panel.show_record(shown, None)
+        tabs, found = child(panel, QTabWidget), []
+        for tab in range(3):
+            tabs.setCurrentIndex(tab)
+            notes = (one.text() for one in panel.findChildren(ElidedLabel) if one.isVisible())
+            found.append(next((one for one in notes if "φ" in one), ""))
+        return found
+
+    alone = "φ of each alignment alone; the result is in Results"
+    assert seen(replace(record, trials={})) == [alone, "", ""]
+    trial = make_trial(record.rig.eyes["left"], "left", 0.4, np.zeros(3), [1e-3, 0.0, 0.0])
+    error = "Error: between the calibrated φ and the fine-tuned one"
+    assert seen(replace(record, trials={1: trial})) == [alone, error, ""]
+    assert seen(replace(record, alignments={}, trials={})) == ["", "", ""]
 
 
 def test_alignments_that_are_not_written_yet_are_counted(
