@@ -180,6 +180,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>For the For the &amp;whole image, not the hand once foundwhole image, even once a hand is found</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Exposure of colour for the whole image</source>
         <translation type="unfinished"></translation>
     </message>
@@ -213,10 +217,6 @@
     </message>
     <message>
         <source>&amp;Keep the camera&apos;s setting</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>For the &amp;whole image, not the hand once found</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3203,6 +3203,10 @@ A change discards the results: solve again.</source>
     </message>
     <message>
         <source>Trials ({})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error: between the calibrated φ and the fine-tuned one</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
