@@ -40,7 +40,7 @@ def main() -> None:
     use_theme("light")
     with tempfile.TemporaryDirectory() as scratch:
         photographs, work = Path(scratch, "photographs"), ProjectFolder(Path(scratch, "rig"))
-        write_photographs(photographs, example_rig(), 12, np.random.default_rng(0), samples=2)
+        write_photographs(photographs, example_rig(), 20, np.random.default_rng(0), samples=2)
         os.chdir(scratch)  # so that the paths shown are short
         work.save(entries())
         wizard = RigWizard(work)
