@@ -96,7 +96,7 @@ class CameraSettingsDialog(QDialog):
             150,
         )
         self._whole = with_name(
-            QCheckBox(tr("For the For the &whole image, not the hand once foundwhole image, even once a hand is found")),
+            QCheckBox(tr("For the &whole image, even once a hand is found")),
             "wholeImage",
             tr("Exposure of colour for the whole image"),
             tr("Measures the exposure of colour on the whole image, not on the hand once found."),

@@ -180,10 +180,6 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>For the For the &amp;whole image, not the hand once foundwhole image, even once a hand is found</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Exposure of colour for the whole image</source>
         <translation type="unfinished"></translation>
     </message>
@@ -217,6 +213,10 @@
     </message>
     <message>
         <source>&amp;Keep the camera&apos;s setting</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For the &amp;whole image, even once a hand is found</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
