@@ -91,5 +91,8 @@ def test_size_rate_and_the_other_exposure_are_said(qtbot: QtBot) -> None:
         assert "848 × 480 px, 30 Hz" in sizes.itemText(i) or "1280 × 720 px, 30 Hz" in (
             sizes.itemText(i)
         )
-    assert child(dialog, QCheckBox, "wholeImage").text() == "For the &whole image, even once a hand is found"
+    assert (
+        child(dialog, QCheckBox, "wholeImage").text()
+        == "For the &whole image, even once a hand is found"
+    )
     assert sizes.minimumWidth() == child(dialog, QComboBox, "preset").minimumWidth()
