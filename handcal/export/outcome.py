@@ -12,13 +12,12 @@ from handcal.display import projection_matrix
 from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import SessionRecord
+from handcal.session.trial import SAME_SHIFT_M
 from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES, Eye, Float64, Projection
 
 ShiftOrigin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
 
-# φ solved again by another version of NumPy differs by rounding.
-_SAME_M = 1e-7
 _MAX_CHARACTERS = 1000
 
 
@@ -57,7 +56,7 @@ class SessionOutcome:
     def is_applied(self, eye: Eye, origin: ShiftOrigin) -> bool:
         """Return whether the headset rendered with this φ of the eye at the end."""
         last_m = self.record.applied_shift_m.get(eye, np.zeros(3))
-        return bool(np.abs(last_m - self.shifts_m[eye][origin]).max() < _SAME_M)
+        return bool(np.abs(last_m - self.shifts_m[eye][origin]).max() < SAME_SHIFT_M)
 
     def projection(self, eye: Eye, origin: ShiftOrigin) -> Projection:
         """Return the projection of an eye for one of its φ."""
@@ -103,6 +102,6 @@ def _shifts_m(
     shifts_m.setdefault("offline", np.zeros(3))
     if record.fine_tuned is not None and eye in record.fine_tuned:
         tuned_m = record.fine_tuned[eye]  # recorded of both eyes, and after an undo
-        if np.abs(tuned_m - next(iter(shifts_m.values()))).max() >= _SAME_M:
+        if np.abs(tuned_m - next(iter(shifts_m.values()))).max() >= SAME_SHIFT_M:
             return {"fine_tuned": tuned_m, **shifts_m}
     return shifts_m

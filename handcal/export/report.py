@@ -29,6 +29,7 @@ from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.session.comparison import read_comparisons
+from handcal.session.trial import trial_errors_arcmin
 from handcal.types import EYES, Alignment, Eye, EyeShift, Verdict, VerdictName
 
 _ORIGINS: Mapping[ShiftOrigin, str] = {
@@ -84,7 +85,7 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
 
 
 def _verdict(outcome: SessionOutcome) -> str:
-    """Return the verdict in one sentence."""
+    """Return the verdict in one sentence, and another of each eye whose trials contradict it."""
     if outcome.results is None:
         return "Nothing is solved: the session holds no alignment."
     parts = [
@@ -95,7 +96,19 @@ def _verdict(outcome: SessionOutcome) -> str:
     if tuned:
         parts.append(f"{' and '.join(tuned)} fine-tuned by hand since")
     sentence = "; ".join(parts)
-    return f"{sentence[0].upper()}{sentence[1:]}."
+    return f"{sentence[0].upper()}{sentence[1:]}.{_doubts(outcome, outcome.results)}"
+
+
+def _doubts(outcome: SessionOutcome, results: Results) -> str:
+    """Return a sentence on each eye whose trials are over the lab's target."""
+    trials = outcome.record.trials.values()
+    target_arcmin = outcome.settings.verdict.target_arcmin
+    return "".join(
+        f" The trials of the {eye} eye found {mean_arcmin:.1f} arcmin on average, over the lab's "
+        f"target of {target_arcmin:g}."
+        for eye, found in trial_errors_arcmin(trials, results.rendered_shift_m).items()
+        if (mean_arcmin := sum(found) / max(len(found), 1)) > target_arcmin
+    )
 
 
 def _summary(outcome: SessionOutcome) -> Section:

@@ -15,6 +15,7 @@ from handcal.errors import FileError
 from handcal.io.files import make_folder, read_json, read_limited, sync_folder
 from handcal.io.lock import FileLock
 from handcal.progress import Progress
+from handcal.register.results import USED
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.journal import JOURNAL, JOURNAL_VERSION, find_journals
 from handcal.session.record import (
@@ -26,8 +27,8 @@ from handcal.session.record import (
 )
 from handcal.session.session import Session
 from handcal.session.state import SessionEvent, SessionState, clean_wearer
-from handcal.session.trial import Trial
-from handcal.types import EYES, Eye
+from handcal.session.trial import Trial, trial_errors_arcmin
+from handcal.types import EYES, Eye, Float64
 
 DELETED = ".deleted"
 """Folder, inside the folder of sessions, to which deleted sessions are moved."""
@@ -46,6 +47,8 @@ class EyeOutcome:
     """Error after the wearer's verification; None if the calibrated φ was not verified."""
     found_arcmin: float | None = None
     """Error that the verification found, and corrected."""
+    trials_arcmin: float | None = None
+    """Mean error of the trials of the calibrated φ; None without any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +74,7 @@ class LibraryEntry:
     trials: int = 0
     """Numbers of those that are not deleted."""
     trials_arcmin: float | None = None
-    """Mean error of the trials, each trial counting once."""
+    """Mean error of all trials, each counting once."""
     target_arcmin: float | None = None
     """Largest expected error that the lab accepts, as set in the session; None if unknown."""
     is_finished: bool = False
@@ -228,7 +231,13 @@ def eye_outcomes(path: Path, replayed: Replayed) -> dict[Eye, EyeOutcome]:
     """Return the results of a session's eyes; those that it does not hold are left out."""
     found = _results(path, replayed).get("eyes")
     eyes = found if isinstance(found, dict) else {}
-    return {eye: _outcome(eyes[eye]) for eye in EYES if isinstance(eyes.get(eye), dict)}
+    outcomes = {eye: _outcome(eyes[eye]) for eye in EYES if isinstance(eyes.get(eye), dict)}
+    shifts_m = {eye: _calibrated_m(eyes[eye]) for eye in outcomes}
+    errors = trial_errors_arcmin(replayed.state.trials.active.values(), shifts_m)
+    return {
+        eye: replace(one, trials_arcmin=float(np.mean(errors[eye]))) if errors[eye] else one
+        for eye, one in outcomes.items()
+    }
 
 
 def _damaged_files(path: Path, state: SessionState) -> int:
@@ -278,6 +287,16 @@ def _results(path: Path, replayed: Replayed) -> dict[str, Any]:
         except FileError:
             return {}
     return state.results or {}
+
+
+def _calibrated_m(one: Mapping[str, Any]) -> Float64:
+    """Return φ of an eye's result as rendered, (3,); not a number if it is unknown."""
+    if one.get("verdict") not in USED:
+        return np.zeros(3)
+    try:
+        return np.array(one.get("shift_m"), np.float64).reshape(3)
+    except (TypeError, ValueError):
+        return np.full(3, np.nan)
 
 
 def _outcome(one: Mapping[str, Any]) -> EyeOutcome:

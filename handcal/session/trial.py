@@ -6,7 +6,7 @@ one; the corners drawn with that φ are the ground truth.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +32,8 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 }
 _MOST = 1e9
 """Limit of a length in metres or pixels, so that no product of two overflows."""
+SAME_SHIFT_M = 1e-7
+"""φ solved again by another version of NumPy differs by rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,6 +139,26 @@ def make_trial(
         error_px=error_px,
         error_arcmin=arcmin_from_px(display, error_px),
     )
+
+
+def trial_errors_arcmin(
+    trials: Iterable[Trial], shifts_m: Mapping[Eye, Float64]
+) -> dict[Eye, list[float]]:
+    """Return the mean error of each trial that judges a calibrated φ, by eye.
+
+    Parameters
+    ----------
+    trials : iterable of Trial
+        Those of another φ, such as of a calibration that was then repeated, are left out.
+    shifts_m : mapping of Eye to (3,) float64
+        The calibrated φ.
+    """
+    found: dict[Eye, list[float]] = {eye: [] for eye in shifts_m}
+    for one in trials:
+        shift_m = shifts_m.get(one.eye)
+        if shift_m is not None and np.abs(one.calibrated_shift_m - shift_m).max() < SAME_SHIFT_M:
+            found[one.eye].append(float(one.error_arcmin.mean()))
+    return found
 
 
 def summarise_trials(trials: Collection[Trial]) -> TrialStatistics:

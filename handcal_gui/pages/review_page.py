@@ -18,6 +18,7 @@ from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_card import ResultCard
+from handcal_gui.widgets.result_rows import eye_trials
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.session_rows import RESUME_HELP
 from handcal_gui.widgets.times import local_time
@@ -111,7 +112,8 @@ class ReviewPage(QWidget):
         self._export.setEnabled(record.is_solvable)
         self._again.setEnabled(results is not None)
         self._task.setText(_EXPORT if record.is_solvable else _RESUME)
-        self._card.show_results(results, target_arcmin)
+        trials = eye_trials(results, record.trials.values(), target_arcmin) if results else {}
+        self._card.show_results(results, target_arcmin, trials)
         self._card.setVisible(results is not None)
         if results is not None:
             self.residuals.show_results(results, record.alignments)

@@ -10,13 +10,18 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.register.results import USED, Results
-from handcal.types import EYES, Eye, VerdictName, phi_text
+from handcal.types import EYES, Eye, phi_text
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.result_rows import EYE_NAMES, VERDICT_COLORS, verdict_word
-from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.result_rows import (
+    EYE_NAMES,
+    EyeTrials,
+    verdict_color,
+    verdict_reason,
+    verdict_word,
+)
 
 _NOT_VERIFIED = tr("not verified")
 
@@ -42,7 +47,8 @@ class EyeResult:
     """The result of one eye."""
 
     eye: Eye
-    verdict: VerdictName
+    shade: str
+    """Name of the theme's colour for the verdict."""
     word: str
     reason: str
     bars: tuple[Bar, ...]
@@ -50,8 +56,8 @@ class EyeResult:
     """Error in depth without the calibration and with it, and the effect of one more alignment."""
 
 
-def eye_results(results: Results) -> list[EyeResult]:
-    """Return the result of each solved eye."""
+def eye_results(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list[EyeResult]:
+    """Return the result of each solved eye, with the doubt that its trials cast on it."""
     found = []
     for eye in EYES:
         if eye not in results.eyes:
@@ -71,12 +77,19 @@ def eye_results(results: Results) -> list[EyeResult]:
             results.expected_after_another_arcmin[eye]
         )
         details = (tr("Depth error: {}").format(benefit.depth), another) if is_used else ()
-        word, reason = verdict_word(results, eye), sentence(verdict.reason)
-        found.append(EyeResult(eye, verdict.name, word, reason, bars, details))
+        given = results, eye, trials.get(eye)
+        word, reason = verdict_word(*given), verdict_reason(*given)
+        shade = verdict_color(verdict.name, trials.get(eye))
+        found.append(EyeResult(eye, shade, word, reason, bars, details))
     return found
 
 
-def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] = {}) -> str:
+def result_text(
+    results: Results,
+    target_arcmin: float,
+    head: Mapping[str, str] = {},
+    trials: Mapping[Eye, EyeTrials] = {},
+) -> str:
     """Return the card as plain text, one fact a line.
 
     Parameters
@@ -86,10 +99,11 @@ def result_text(results: Results, target_arcmin: float, head: Mapping[str, str] 
         The lab's target.
     head : mapping of str to str
         Facts shown first, such as the wearer.
+    trials : mapping of Eye to EyeTrials
     """
     lines = [f"{name}: {value}" for name, value in head.items()]
     lines.append(tr("Target: {:.1f}′").format(target_arcmin))
-    for one in eye_results(results):
+    for one in eye_results(results, trials):
         lines += ["", f"{EYE_NAMES[one.eye]}: {one.word}", one.reason]
         lines.append(tr("Solved: {}").format(phi_text(results.eyes[one.eye])))
         lines += [f"{bar.name}: {bar.text}" for bar in one.bars]
@@ -104,25 +118,31 @@ class ResultCard(QWidget):
         super().__init__(parent)
         self.setObjectName("resultCard")
         self.setAccessibleName(tr("Result"))
-        self._results: Results | None = None
         self._columns = {eye: _Column(eye) for eye in EYES}
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
-        grid.setSpacing(2 * SPACING_PX)
+        grid.setHorizontalSpacing(2 * SPACING_PX)
+        grid.setVerticalSpacing(SPACING_PX // 2)
         for i, column in enumerate(self._columns.values()):
-            grid.addWidget(column, 0, i)
+            grid.addWidget(column.verdict, 0, i)
+            grid.addWidget(column, 1, i)
             grid.setColumnStretch(i, 1)
         follow_theme(self, self._refresh)
 
-    def show_results(self, results: Results | None, target_arcmin: float) -> None:
+    def show_results(
+        self,
+        results: Results | None,
+        target_arcmin: float,
+        trials: Mapping[Eye, EyeTrials] = {},
+    ) -> None:
         """Show results; without any, the card is empty."""
-        self._results = results
-        found = {one.eye: one for one in eye_results(results)} if results else {}
+        found = {one.eye: one for one in eye_results(results, trials)} if results else {}
         widest = max((b.arcmin or 0.0 for one in found.values() for b in one.bars), default=0.0)
         scale_arcmin = 1.1 * max(widest, target_arcmin)
         for eye, column in self._columns.items():
             column.show_result(found.get(eye), target_arcmin, scale_arcmin)
-        self.setAccessibleDescription(result_text(results, target_arcmin) if results else "")
+        text = result_text(results, target_arcmin, trials=trials) if results else ""
+        self.setAccessibleDescription(text)
 
     def show_details(self, is_shown: bool) -> None:
         """Show the error in depth and the effect of another alignment, or leave them out."""
@@ -135,23 +155,23 @@ class ResultCard(QWidget):
 
 
 class _Column(QWidget):
-    """One eye: verdict, bars, depth, effect of another alignment, reason."""
+    """One eye: bars, depth, effect of another alignment, reason; its verdict stands above."""
 
     def __init__(self, eye: Eye) -> None:
         super().__init__()
         self._eye = eye
         self._result: EyeResult | None = None
-        self._verdict = QLabel()
-        self._verdict.setObjectName(f"card-verdict-{eye}")
+        self.verdict = QLabel(wordWrap=True)
+        self.verdict.setObjectName(f"card-verdict-{eye}")
         bold = QFont()
         bold.setBold(True)
-        self._verdict.setFont(bold)  # its size is the card's
+        self.verdict.setFont(bold)  # its size is the card's
+        self.verdict.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._bars = _Bars()
         self.details = QLabel(wordWrap=True)
         self._reason = paragraph(f"card-reason-{eye}")
         self._reason.setAlignment(Qt.AlignmentFlag.AlignTop)
         vbox(
-            self._verdict,
             self._bars,
             self.details,
             (self._reason, 1),
@@ -165,7 +185,7 @@ class _Column(QWidget):
     ) -> None:
         self._result = result
         word = tr("– Not solved") if result is None else result.word
-        self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
+        self.verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
         self._reason.setText(result.reason if result else "")
         self.details.setText("\n".join(result.details) if result else "")
         self._bars.show_bars(result, target_arcmin, scale_arcmin)
@@ -173,8 +193,8 @@ class _Column(QWidget):
 
     def refresh(self) -> None:
         """Take the colours of the theme; style sheets would keep the size of the text."""
-        shade = VERDICT_COLORS[self._result.verdict] if self._result else "muted"
-        for label, role in ((self._verdict, shade), (self.details, "muted")):
+        shade = self._result.shade if self._result else "muted"
+        for label, role in ((self.verdict, shade), (self.details, "muted")):
             palette = QPalette()
             palette.setColor(QPalette.ColorRole.WindowText, QColor(getattr(colors(), role)))
             label.setPalette(palette)

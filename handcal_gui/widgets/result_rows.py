@@ -9,11 +9,12 @@ from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
 from handcal.report.cells import signed
 from handcal.rig_types import EyeDisplay, Rig
-from handcal.session.trial import Trial
+from handcal.session.trial import Trial, trial_errors_arcmin
 from handcal.types import EYES, Eye, EyeShift, VerdictName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.sentence import sentence
 
 EYE_NAMES: Mapping[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
 VERDICT_WORDS: Mapping[VerdictName, str] = {
@@ -139,25 +140,57 @@ QUANTITIES = (
 _ANOTHER = tr("Expected error after one more alignment like these")
 _ALONE: Mapping[Eye, str] = {"left": tr("{} left"), "right": tr("{} right")}
 _TRIALS = tr(
-    "Error of the calibrated φ in the user-test trials, the mean, and their number. ⚠: over the\n"
+    "Error of this φ in the user-test trials, the mean, and their number. ⚠: over the\n"
     "lab's target; look at the trials, and calibrate again if φ was set well by hand."
 )
 _EYE_DISTANCE = tr("Eye distance")
 _EYE_DISTANCE_MEANING = tr("Distance between the two solved eye positions")
 
 
-def trial_row(trials: Iterable[Trial], target_arcmin: float | None) -> Row:
+@dataclass(frozen=True, slots=True)
+class EyeTrials:
+    """The trials of one eye's φ, against the lab's target."""
+
+    count: int
+    mean_arcmin: float
+    target_arcmin: float | None
+    """None for a session without a target."""
+
+    @property
+    def is_over(self) -> bool:
+        """True if the mean error is over the target."""
+        return self.target_arcmin is not None and self.mean_arcmin > self.target_arcmin
+
+    @property
+    def doubt(self) -> str:
+        """Advice on trials over the target; empty for others."""
+        asked = tr("Trials found {:.1f}′: look at them, or calibrate again")
+        return asked.format(self.mean_arcmin) if self.is_over else ""
+
+
+def eye_trials(
+    results: Results, trials: Iterable[Trial], target_arcmin: float | None
+) -> dict[Eye, EyeTrials]:
+    """Return the trials of the results' φ, of each eye that has some."""
+    errors = trial_errors_arcmin(trials, results.rendered_shift_m)
+    return {
+        eye: EyeTrials(len(found), sum(found) / len(found), target_arcmin)
+        for eye, found in errors.items()
+        if found
+    }
+
+
+def trial_row(trials: Mapping[Eye, EyeTrials]) -> Row:
     """Return the mean error of each eye's trials; ⚠ marks one over the lab's target."""
-    errors: dict[Eye, list[float]] = {eye: [] for eye in EYES}
-    for trial in trials:
-        errors[trial.eye].append(float(trial.error_arcmin.mean()))
-    cells = []
-    for found in errors.values():
-        mean_arcmin = sum(found) / max(len(found), 1)
-        is_over = target_arcmin is not None and mean_arcmin > target_arcmin
-        text = tr("⚠ {:.1f}′ n={}") if is_over else tr("{:.1f}′ n={}")
-        cells.append(text.format(mean_arcmin, len(found)) if found else NOTHING)
+    cells = (_trials_cell(trials.get(eye)) for eye in EYES)
     return Row(tr("Trials"), tuple(cells), _TRIALS)
+
+
+def _trials_cell(found: EyeTrials | None) -> str:
+    if found is None:
+        return NOTHING
+    text = tr("⚠ {:.1f}′ n={}") if found.is_over else tr("{:.1f}′ n={}")
+    return text.format(found.mean_arcmin, found.count)
 
 
 def result_rows(results: Results, rig: Rig, trials: Row | None = None) -> list[Row]:
@@ -194,20 +227,38 @@ def eyes_text(eyes: Sequence[Eye]) -> str:
     return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
 
 
-def verdict_word(results: Results, eye: Eye) -> str:
-    """Return an eye's verdict in a word: what a result to be repeated needs may be to verify."""
+def verdict_word(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:
+    """Return an eye's verdict in a word: what a result to be repeated needs may be to verify.
+
+    Nothing is ticked whose trials are over the target.
+    """
     name, advice = results.verdicts[eye].name, results.advice.get(eye)
     if name == "repeat" and advice is not None and advice.verify and not advice.alignments:
         return tr("↻ Verify")
+    if name == "accept" and trials is not None and trials.is_over:
+        return tr("⚠ Accept, trials over {:g}′").format(trials.target_arcmin)
     return VERDICT_WORDS[name]
 
 
-def verdict_rows(results: Results) -> list[Row]:
+def verdict_color(verdict: VerdictName, trials: EyeTrials | None) -> str:
+    """Return the name of the theme's colour for a verdict."""
+    is_doubted = trials is not None and trials.is_over and verdict == "accept"
+    return "warning" if is_doubted else VERDICT_COLORS[verdict]
+
+
+def verdict_reason(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:
+    """Return the reason of an eye's verdict, and what trials over the target ask for."""
+    reason = sentence(results.verdicts[eye].reason)
+    return f"{reason}. {trials.doubt}" if trials is not None and trials.doubt else reason
+
+
+def verdict_rows(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list[Row]:
     """Return each solved eye's verdict and its reason."""
-    return [
-        Row(EYE_NAMES[eye], (VERDICT_WORDS[verdict.name], verdict.reason))
-        for eye, verdict in results.verdicts.items()
-    ]
+    rows = []
+    for eye in results.verdicts:
+        given = results, eye, trials.get(eye)
+        rows.append(Row(EYE_NAMES[eye], (verdict_word(*given), verdict_reason(*given))))
+    return rows
 
 
 def another_text(results: Results, rig: Rig) -> str:

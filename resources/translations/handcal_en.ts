@@ -3319,11 +3319,11 @@ and record which fits the hand better. The report says which was which.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>φ of the {} has not been fine-tuned: the error would be 0 px. Press T again if the wearer sees no error.</source>
+        <source>A trial is the error of the calibrated φ relative to the φ with which the drawn target covers the real one. The calibrated φ is the solved one, or 0 for an eye that keeps the offline calibration.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>A trial is the error of the calibrated φ relative to the φ with which the drawn target covers the real one. The calibrated φ is the solved one, or 0 for an eye that keeps the offline calibration.</source>
+        <source>φ of the {} has not been fine-tuned: the error would be 0 px. Press T again if the wearer sees no error; fine-tune φ first otherwise.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4056,11 +4056,6 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error of the calibrated φ in the user-test trials, the mean, and their number. ⚠: over the
-lab&apos;s target; look at the trials, and calibrate again if φ was set well by hand.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Eye distance</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4097,7 +4092,16 @@ lab&apos;s target; look at the trials, and calibrate again if φ was set well by
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Error of this φ in the user-test trials, the mean, and their number. ⚠: over the
+lab&apos;s target; look at the trials, and calibrate again if φ was set well by hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Distance between the two solved eye positions</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials found {:.1f}′: look at them, or calibrate again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4130,6 +4134,10 @@ lab&apos;s target; look at the trials, and calibrate again if φ was set well by
     </message>
     <message>
         <source>↻ Verify</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>⚠ Accept, trials over {:g}′</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4470,13 +4478,14 @@ in arcminutes; – was not verified</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all trials
-of the session, also of a calibration that was then repeated, and their number.
-⚠ over the lab&apos;s target: look at the trials; if φ was set well by hand, calibrate again</source>
+        <source>Trials ′</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Trials ′</source>
+        <source>Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all trials
+of the session, also of a calibration that was then repeated, and their number.
+⚠ those of an eye&apos;s last calibration are over the lab&apos;s target: look at the trials;
+if φ was set well by hand, calibrate again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

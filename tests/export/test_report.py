@@ -94,6 +94,22 @@ def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: SessionO
     )
 
 
+def test_the_verdict_says_that_trials_contradict_it(outcome: SessionOutcome) -> None:
+    assert outcome.results is not None
+    shift_m = outcome.results.rendered_shift_m["left"]
+    number, trial = next((n, t) for n, t in outcome.record.trials.items() if t.eye == "left")
+
+    def lead(**changes: object) -> str:
+        changed = replace(trial, error_arcmin=np.full(4, 20.7), **changes)  # type: ignore[arg-type]
+        record = replace(outcome.record, trials={number: changed})
+        return session_report(replace(outcome, record=record)).lead
+
+    said = "The trials of the left eye found 20.7 arcmin on average, over the lab's target of 8."
+    assert lead(calibrated_shift_m=shift_m).endswith(f". {said}")
+    assert said not in lead(calibrated_shift_m=shift_m + 1e-3), "a former calibration's"
+    assert said not in session_report(outcome).lead
+
+
 @pytest.mark.parametrize("text", HOSTILE)
 def test_no_name_or_note_breaks_it(tmp_path: Path, empty: SessionRecord, text: str) -> None:
     hostile = replace(empty, wearer=text, notes=text, settings={text: {text: [text]}})

@@ -72,6 +72,25 @@ def test_an_entry_says_what_the_session_holds(make: Callable[..., Path], tmp_pat
     assert not entry.damaged
 
 
+def test_the_trials_of_an_eye_are_those_of_its_calibration(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = make("one", "Ada", solved=False)
+    means = [float(one.error_arcmin.mean()) for one in Session.open(path).trials.values()]
+
+    def found(**results: object) -> float | None:
+        with Session(path) as session:
+            session.save_results({"eyes": {"left": results}})
+        return read_library(tmp_path)[0].eyes["left"].trials_arcmin
+
+    mean = pytest.approx(np.mean(means))
+    assert found(verdict="accept", shift_m=[0.0, 0.0, 0.0]) == mean
+    assert found(verdict="keep", shift_m=[0.001, 0.0, 0.0]) == mean, "offline is kept"
+    assert found(verdict="accept", shift_m=[0.001, 0.0, 0.0]) is None
+    assert found(verdict="accept", shift_m=["?"]) is None
+    assert found(verdict="accept") is None
+
+
 @pytest.mark.parametrize(
     ("settings", "target_arcmin"),
     [

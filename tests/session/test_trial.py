@@ -13,9 +13,10 @@ from handcal.session.trial import (
     make_trial,
     read_trial,
     summarise_trials,
+    trial_errors_arcmin,
     trial_json,
 )
-from handcal.types import EYES, Float64
+from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 CALIBRATED_M = np.array([0.003, -0.002, 0.004])
@@ -138,3 +139,16 @@ def test_trials_of_one_calibration_are_told_from_others() -> None:
     of_calibration = (1, 1, 1, 1, 2, 2, 2, 2, 1, 1, 1, 1)
     assert calibration_numbers(dict(enumerate(trials))) == dict(enumerate(of_calibration))
     assert calibration_numbers({}) == {}
+
+
+def test_trials_of_another_shift_judge_nothing_of_this_one() -> None:
+    def trial(eye: Eye, apart_m: float) -> Trial:
+        return make_trial(RIG.eyes[eye], eye, 0.4, CALIBRATED_M + apart_m, ADJUSTED_M)
+
+    trials = [trial("left", 0.0), trial("left", 1e-9), trial("left", 1e-3), trial("right", 1e-3)]
+    errors = [float(trial.error_arcmin.mean()) for trial in trials]
+    both = dict.fromkeys(EYES, CALIBRATED_M)
+    assert trial_errors_arcmin(trials, both) == {"left": errors[:2], "right": []}
+    assert trial_errors_arcmin(trials, {"right": CALIBRATED_M + 1e-3}) == {"right": errors[3:]}
+    unknown = dict.fromkeys(EYES, np.full(3, np.nan))
+    assert trial_errors_arcmin(trials, unknown) == {"left": [], "right": []}

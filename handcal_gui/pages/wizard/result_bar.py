@@ -12,6 +12,7 @@ from handcal.register.results import Results
 from handcal.register.verdict import VerdictSettings
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
+from handcal.types import Eye
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
@@ -20,6 +21,7 @@ from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.printing import ask_printer
 from handcal_gui.widgets.result_card import ResultCard, result_text
+from handcal_gui.widgets.result_rows import EyeTrials, eye_trials
 from handcal_gui.widgets.times import local_time
 
 
@@ -63,10 +65,12 @@ class ResultBar(QWidget):
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the results of a snapshot if they have changed."""
+        results, shown = snapshot.procedure.results, self._record
+        has_new_trials = shown is None or snapshot.record.trials is not shown.trials
         self._record = snapshot.record
-        if snapshot.procedure.results is not self._results:
-            self._results = snapshot.procedure.results
-            self.card.show_results(self._results, self._target_arcmin)
+        if results is not self._results or has_new_trials:
+            self._results = results
+            self.card.show_results(results, self._target_arcmin, self._trials())
 
     def offer_blinking(self, is_offered: bool) -> None:
         """Offer to show before and after in turn, where they are in sight."""
@@ -78,7 +82,13 @@ class ResultBar(QWidget):
         """Return the result as text; empty if there is none."""
         if self._results is None or self._record is None:
             return ""
-        return result_text(self._results, self._target_arcmin, _head(self._record))
+        head = _head(self._record)
+        return result_text(self._results, self._target_arcmin, head, self._trials())
+
+    def _trials(self) -> Mapping[Eye, EyeTrials]:
+        if self._results is None or self._record is None:
+            return {}
+        return eye_trials(self._results, self._record.trials.values(), self._target_arcmin)
 
     def copy(self) -> None:
         """Copy the result as text."""

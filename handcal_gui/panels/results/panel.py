@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
@@ -14,7 +14,7 @@ from handcal.session.library import lab_target_arcmin
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment
+from handcal.types import EYES, Alignment, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
@@ -25,16 +25,17 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable, Row, rows_as_text
+from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     PHI,
+    EyeTrials,
     another_text,
+    eye_trials,
     result_rows,
     single_alignment_rows,
     trial_row,
     verdict_rows,
-    verdict_word,
 )
 from handcal_gui.widgets.tab_bar import TabBar
 
@@ -71,6 +72,7 @@ class ResultsPanel(QWidget):
         self.setAccessibleName(tr("Results"))
         self._results: Results | None = None
         self._trials: Mapping[int, Trial] = {}
+        self._judged: Mapping[Eye, EyeTrials] = {}
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
         self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
@@ -114,17 +116,15 @@ class ResultsPanel(QWidget):
         has_verdicts : bool
             False if the page beside the panel shows the verdicts.
         """
-        self._results, self._trials = results, {}
+        self._results, self._trials, self._judged = results, {}, {}
         self._copy.setEnabled(results is not None)
         self._stack.setCurrentIndex(0 if results is None else 1)
         if results is None:
             self._tabs.setCurrentIndex(0)
             return
-        for eye, card in self._cards.items():
-            word = verdict_word(results, eye) if eye in results.verdicts else ""
-            card.show_verdict(results.verdicts.get(eye), word)
+        for card in self._cards.values():
             card.setVisible(has_verdicts)
-        self._show_numbers(result_rows(results, rig))
+        self._show_eyes(results, rig)
         for tab in (self._iterations, self._residuals, self._alone):
             self._tabs.setTabVisible(self._tabs.indexOf(tab), bool(results.alignments))
         self._convergence.show_results(results)
@@ -139,12 +139,17 @@ class ResultsPanel(QWidget):
         if self._results is not None and record.trials is not self._trials:
             self._trials = record.trials
             target_arcmin = lab_target_arcmin(record.settings)
-            row = trial_row(record.trials.values(), target_arcmin) if record.trials else None
-            self._show_numbers(result_rows(self._results, record.rig, row))
+            self._judged = eye_trials(self._results, record.trials.values(), target_arcmin)
+            self._show_eyes(self._results, record.rig)
             self._fit()
 
-    def _show_numbers(self, rows: Sequence[Row]) -> None:
-        self._numbers.show_rows([EYE_NAMES[eye] for eye in EYES], rows)
+    def _show_eyes(self, results: Results, rig: Rig) -> None:
+        """Show the verdicts and the numbers of both eyes, with those of their trials."""
+        for eye, card in self._cards.items():
+            card.show_verdict(results, eye, self._judged.get(eye))
+        row = trial_row(self._judged) if self._judged else None
+        names = [EYE_NAMES[eye] for eye in EYES]
+        self._numbers.show_rows(names, result_rows(results, rig, row))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the tab of the eyes into the panel."""
@@ -167,7 +172,8 @@ class ResultsPanel(QWidget):
         """Return all numbers shown as tab-separated text."""
         if self._results is None:
             return ""
-        verdicts = rows_as_text((tr("Verdict"), tr("Reason")), verdict_rows(self._results))
+        rows = verdict_rows(self._results, self._judged)
+        verdicts = rows_as_text((tr("Verdict"), tr("Reason")), rows)
         tables = self._numbers, self._alignments, self._compare.table
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 

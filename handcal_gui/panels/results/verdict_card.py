@@ -6,12 +6,19 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
-from handcal.types import Eye, Verdict
+from handcal.register.results import Results
+from handcal.types import Eye
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS, VERDICT_WORDS
-from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.result_rows import (
+    EYE_NAMES,
+    NOTHING,
+    EyeTrials,
+    verdict_color,
+    verdict_reason,
+    verdict_word,
+)
 
 _REASON_LINES = 4
 
@@ -23,8 +30,9 @@ class VerdictCard(QFrame):
         super().__init__(parent)
         self.setObjectName(f"verdict-{eye}")
         self.setFrameShape(QFrame.Shape.StyledPanel)
-        self._verdict: Verdict | None = None
+        self._shade = ""
         self._word = QLabel()
+        self._word.setWordWrap(True)
         scale_font(self._word, 1.25, is_bold=True)
         self._reason = QLabel()
         self._reason.setTextFormat(Qt.TextFormat.PlainText)
@@ -39,18 +47,21 @@ class VerdictCard(QFrame):
             margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
             spacing=SPACING_PX // 2,
         )
-        self.show_verdict(None)
+        self.show_verdict(None, eye)
         follow_theme(self, self._recolor)
 
-    def show_verdict(self, verdict: Verdict | None, word: str = "") -> None:
-        """Show a verdict, by its own or another word; None if the eye is in no alignment."""
-        self._verdict = verdict
-        if verdict is None:
+    def show_verdict(
+        self, results: Results | None, eye: Eye, trials: EyeTrials | None = None
+    ) -> None:
+        """Show an eye's verdict, with the doubt that its trials cast on it."""
+        if results is None or eye not in results.verdicts:
+            self._shade = ""
             self._word.setText(tr("{} Not solved").format(NOTHING))
             self._reason.setText(tr("Not in any alignment"))
         else:
-            self._word.setText(word or VERDICT_WORDS[verdict.name])
-            self._reason.setText(sentence(verdict.reason))
+            self._shade = verdict_color(results.verdicts[eye].name, trials)
+            self._word.setText(verdict_word(results, eye, trials))
+            self._reason.setText(verdict_reason(results, eye, trials))
         self.setToolTip(self._reason.text())
         self.setAccessibleDescription(self._reason.text())
         self._recolor()
@@ -61,7 +72,6 @@ class VerdictCard(QFrame):
 
     def _recolor(self) -> None:
         palette = QPalette(self.palette())
-        if self._verdict is not None:
-            color = QColor(getattr(colors(), VERDICT_COLORS[self._verdict.name]))
-            palette.setColor(QPalette.ColorRole.WindowText, color)
+        if self._shade:
+            palette.setColor(QPalette.ColorRole.WindowText, QColor(getattr(colors(), self._shade)))
         self._word.setPalette(palette)

@@ -55,7 +55,7 @@ _UNTOUCHED = tr(
 )
 _ZERO = tr(
     "φ of the {} has not been fine-tuned: the error would be 0 px. "
-    "Press T again if the wearer sees no error."
+    "Press T again if the wearer sees no error; fine-tune φ first otherwise."
 )
 _LEAST_APART_S = 1.0
 """A double click neither confirms a doubtful trial nor records a second one."""

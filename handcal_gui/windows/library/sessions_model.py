@@ -97,9 +97,10 @@ def _verdicts(entry: LibraryEntry) -> str:
 
 
 def _is_over_target(entry: LibraryEntry) -> bool:
-    """Return whether the mean of the trials is over the lab's target."""
-    mean_arcmin, target_arcmin = entry.trials_arcmin, entry.target_arcmin
-    return mean_arcmin is not None and target_arcmin is not None and mean_arcmin > target_arcmin
+    """Return whether the mean of the trials of an eye's φ is over the lab's target."""
+    target_arcmin = entry.target_arcmin
+    found = [one.trials_arcmin for one in entry.eyes.values() if one.trials_arcmin is not None]
+    return target_arcmin is not None and max(found, default=0.0) > target_arcmin
 
 
 def _errors(kind: _Kind) -> Callable[[LibraryEntry], str]:
@@ -186,8 +187,8 @@ COLUMNS = (
         tr(
             "Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all "
             "trials\nof the session, also of a calibration that was then repeated, and their "
-            "number.\n⚠ over the lab's target: look at the trials; if φ was set well by hand, "
-            "calibrate again"
+            "number.\n⚠ those of an eye's last calibration are over the lab's target: look at the "
+            "trials;\nif φ was set well by hand, calibrate again"
         ),
         _trials,
         lambda e: _known_first(e.trials_arcmin),

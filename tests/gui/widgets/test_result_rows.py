@@ -10,18 +10,22 @@ from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig_types import Rig
 from handcal.session.trial import Trial, make_trial
-from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift
+from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verdict
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
     PHI,
+    EyeTrials,
     another_text,
     comparison_rows,
+    eye_trials,
     result_rows,
     single_alignment_rows,
     trial_row,
+    verdict_color,
     verdict_rows,
 )
+from handcal_gui.widgets.sentence import sentence
 from tests.gui.views import VERIFIED
 
 
@@ -67,7 +71,7 @@ def test_each_eye_has_its_numbers(results: Results, rig: Rig) -> None:
     assert cells(rows, "Eye distance, solved") == (f"{1e3 * results.eye_distance_m:.1f} mm",)
     assert cells(rows, "Solved from") == (f"2 alignments, {results.method}",)
     assert [row.cells[1] for row in verdict_rows(results)] == [
-        results.verdicts[eye].reason for eye in EYES
+        sentence(results.verdicts[eye].reason) for eye in EYES
     ]
 
 
@@ -146,14 +150,35 @@ def test_only_eyes_that_both_solved_are_compared(
 
 
 def test_trials_over_the_target_are_marked(results: Results, rig: Rig) -> None:
-    def trial(eye: Eye, phi1_mm: float) -> Trial:
-        return make_trial(rig.eyes[eye], eye, 0.4, np.zeros(3), [1e-3 * phi1_mm, 0.0, 0.0])
+    def trial(eye: Eye, phi1_mm: float, calibrated_m: Float64) -> Trial:
+        adjusted_m = np.add(calibrated_m, [1e-3 * phi1_mm, 0.0, 0.0])
+        return make_trial(rig.eyes[eye], eye, 0.4, calibrated_m, adjusted_m)
 
-    trials = [trial("left", 1.0), trial("left", 2.0)]
-    mean = np.mean([one.error_arcmin.mean() for one in trials])
-    assert trial_row(trials, mean - 0.1).cells == (f"⚠ {mean:.1f}′ n=2", "–")
+    shifts_m = results.rendered_shift_m
+    trials = [trial("left", phi1_mm, shifts_m["left"]) for phi1_mm in (1.0, 2.0)]
+    former = trial("right", 9.0, shifts_m["right"] + 1e-3)
+    mean = float(np.mean([one.error_arcmin.mean() for one in trials]))
+
+    def judged(target_arcmin: float | None) -> dict[Eye, EyeTrials]:
+        return eye_trials(results, [*trials, former], target_arcmin)
+
+    over = judged(mean - 0.1)
+    assert trial_row(over).cells == (f"⚠ {mean:.1f}′ n=2", "–")
     for target_arcmin in (mean + 0.1, None):
-        row = trial_row(trials, target_arcmin)
+        row = trial_row(judged(target_arcmin))
         assert row.cells == (f"{mean:.1f}′ n=2", "–")
+    accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
+    left, right = (row.cells for row in verdict_rows(accepted, over))
+    assert left[0] == f"⚠ Accept, trials over {mean - 0.1:g}′"
+    assert left[1] == f"As told. Trials found {mean:.1f}′: look at them, or calibrate again"
+    assert right == ("✓ Accept", "As told")
+    repeated = replace(results, verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")))
+    assert verdict_rows(repeated, over)[0].cells[0] == "↻ Repeat"
+    assert [verdict_color(name, over["left"]) for name in ("accept", "keep", "implausible")] == [
+        "warning",
+        "warning",
+        "red",
+    ]
+    assert verdict_color("accept", None) == "good"
     labels = [one.label for one in result_rows(results, rig, row)]
     assert labels.index("Trials") == labels.index("One more alignment") + 1

@@ -18,7 +18,7 @@ from handcal.rig_types import Rig
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
-from handcal.types import EYES, Alignment, Verdict
+from handcal.types import EYES, Alignment, Verdict, VerdictName
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.panel import ResultsPanel
@@ -86,9 +86,13 @@ def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
     panel: ResultsPanel, snapshot: Make, rig: Rig
 ) -> None:
     seen = snapshot(State.APPLIED)
+    results = seen.procedure.results
+    assert results is not None
+    accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
+    seen = replace(seen, procedure=replace(seen.procedure, results=accepted))
     panel.resize(360, 416)
     both = {
-        number: make_trial(rig.eyes[eye], eye, 0.4, np.zeros(3), [0.02, 0.0, 0.0])
+        number: make_trial(rig.eyes[eye], eye, 0.4, accepted.eyes[eye].shift_m, [0.05, 0.0, 0.0])
         for number, eye in enumerate(EYES)
     }
     settings = {"calibration": {"solve": {"verdict": {"target_arcmin": 8.0}}}}
@@ -99,6 +103,11 @@ def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
         assert table.horizontalScrollBar().maximum() == 0
         rows = child(panel, NumberTable, "numbers-of-both-eyes").as_text()
         assert ("Trials\t⚠ " in rows) == told
+        for card in panel.findChildren(VerdictCard):
+            words = [label.text() for label in card.findChildren(QLabel)]
+            assert ("⚠ Accept, trials over 8′" in words) == told
+            assert ("✓ Accept" in words) != told
+        assert ("trials over 8′" in panel.as_text()) == told
 
 
 def test_without_alignments_no_tab_is_of_them(
@@ -150,11 +159,14 @@ def test_the_numbers_are_the_results(solved: ResultsPanel, results: Results) -> 
         ("contradicted", "✕ Contradicted"),
     ],
 )
-def test_a_verdict_is_a_sign_a_word_and_a_reason(qtbot: QtBot, name: str, word: str) -> None:
+def test_a_verdict_is_a_sign_a_word_and_a_reason(
+    qtbot: QtBot, results: Results, name: VerdictName, word: str
+) -> None:
     card = VerdictCard("left")
     qtbot.addWidget(card)
     height = card.sizeHint().height()
-    card.show_verdict(Verdict(name, "because of this"))  # type: ignore[arg-type]
+    given = replace(results, verdicts={"left": Verdict(name, "because of this")}, advice={})
+    card.show_verdict(given, "left")
     texts = [label.text() for label in card.findChildren(QLabel)]
     assert texts == ["Left eye", word, "Because of this"]
     assert card.sizeHint().height() == height
@@ -341,7 +353,7 @@ def test_everything_is_copied_as_text(
     qtbot.waitUntil(table.hasFocus)
     QTest.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
     text = QGuiApplication.clipboard().text()
-    assert results.verdicts["left"].reason in text
+    assert results.verdicts["left"].reason[1:] in text
     assert "\nφ1 (mm)\t" in text
     assert "\n2 right\t" in text
     assert "\tconsistent\ticp\tΔ\n" in text
