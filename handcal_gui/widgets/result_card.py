@@ -121,11 +121,9 @@ class ResultCard(QWidget):
         self._columns = {eye: _Column(eye) for eye in EYES}
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(2 * SPACING_PX)
-        grid.setVerticalSpacing(SPACING_PX // 2)
+        grid.setSpacing(2 * SPACING_PX)
         for i, column in enumerate(self._columns.values()):
-            grid.addWidget(column.verdict, 0, i)
-            grid.addWidget(column, 1, i)
+            grid.addWidget(column, 0, i)
             grid.setColumnStretch(i, 1)
         follow_theme(self, self._refresh)
 
@@ -155,23 +153,23 @@ class ResultCard(QWidget):
 
 
 class _Column(QWidget):
-    """One eye: bars, depth, effect of another alignment, reason; its verdict stands above."""
+    """One eye: verdict, bars, depth, effect of another alignment, reason."""
 
     def __init__(self, eye: Eye) -> None:
         super().__init__()
         self._eye = eye
         self._result: EyeResult | None = None
-        self.verdict = QLabel(wordWrap=True)
-        self.verdict.setObjectName(f"card-verdict-{eye}")
+        self._verdict = QLabel()
+        self._verdict.setObjectName(f"card-verdict-{eye}")
         bold = QFont()
         bold.setBold(True)
-        self.verdict.setFont(bold)  # its size is the card's
-        self.verdict.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._verdict.setFont(bold)  # its size is the card's
         self._bars = _Bars()
         self.details = QLabel(wordWrap=True)
         self._reason = paragraph(f"card-reason-{eye}")
         self._reason.setAlignment(Qt.AlignmentFlag.AlignTop)
         vbox(
+            self._verdict,
             self._bars,
             self.details,
             (self._reason, 1),
@@ -185,7 +183,7 @@ class _Column(QWidget):
     ) -> None:
         self._result = result
         word = tr("– Not solved") if result is None else result.word
-        self.verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
+        self._verdict.setText(f"{EYE_NAMES[self._eye]}: {word}")
         self._reason.setText(result.reason if result else "")
         self.details.setText("\n".join(result.details) if result else "")
         self._bars.show_bars(result, target_arcmin, scale_arcmin)
@@ -194,7 +192,7 @@ class _Column(QWidget):
     def refresh(self) -> None:
         """Take the colours of the theme; style sheets would keep the size of the text."""
         shade = self._result.shade if self._result else "muted"
-        for label, role in ((self.verdict, shade), (self.details, "muted")):
+        for label, role in ((self._verdict, shade), (self.details, "muted")):
             palette = QPalette()
             palette.setColor(QPalette.ColorRole.WindowText, QColor(getattr(colors(), role)))
             label.setPalette(palette)

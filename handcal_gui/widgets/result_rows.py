@@ -230,13 +230,13 @@ def eyes_text(eyes: Sequence[Eye]) -> str:
 def verdict_word(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:
     """Return an eye's verdict in a word: what a result to be repeated needs may be to verify.
 
-    Nothing is ticked whose trials are over the target.
+    An accepted eye whose trials are over the target is not ticked.
     """
     name, advice = results.verdicts[eye].name, results.advice.get(eye)
     if name == "repeat" and advice is not None and advice.verify and not advice.alignments:
         return tr("↻ Verify")
     if name == "accept" and trials is not None and trials.is_over:
-        return tr("⚠ Accept, trials over {:g}′").format(trials.target_arcmin)
+        return tr("⚠ Trials over {:g}′").format(trials.target_arcmin)
     return VERDICT_WORDS[name]
 
 

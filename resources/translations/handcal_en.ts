@@ -4064,6 +4064,10 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>⚠ Trials over {:g}′</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>One more alignment</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4134,10 +4138,6 @@ lab&apos;s target; look at the trials, and calibrate again if φ was set well by
     </message>
     <message>
         <source>↻ Verify</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>⚠ Accept, trials over {:g}′</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

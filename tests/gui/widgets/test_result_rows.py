@@ -169,7 +169,7 @@ def test_trials_over_the_target_are_marked(results: Results, rig: Rig) -> None:
         assert row.cells == (f"{mean:.1f}′ n=2", "–")
     accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
     left, right = (row.cells for row in verdict_rows(accepted, over))
-    assert left[0] == f"⚠ Accept, trials over {mean - 0.1:g}′"
+    assert left[0] == f"⚠ Trials over {mean - 0.1:g}′"
     assert left[1] == f"As told. Trials found {mean:.1f}′: look at them, or calibrate again"
     assert right == ("✓ Accept", "As told")
     repeated = replace(results, verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")))
