@@ -24,7 +24,7 @@ class ProgressRing(QWidget):
         self._text = self._unit = ""
         self._part = 0
         self._waited: int | None = None
-        self.set_diameter(8 * SPACING_PX)
+        self.set_diameter(9 * SPACING_PX)
 
     @property
     def share(self) -> float | None:
@@ -56,7 +56,7 @@ class ProgressRing(QWidget):
         """Draw the ring, what has filled of it from the top, and the text."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        width = self.width() / 9
+        width = self.width() / 11
         ring = QRectF(self.rect()).adjusted(width, width, -width, -width)
         faint = QColor(colors().muted)
         faint.setAlphaF(0.3)
@@ -68,7 +68,7 @@ class ProgressRing(QWidget):
         painter.setPen(self.palette().windowText().color())
         upper = ring.adjusted(0, 0, 0, -ring.height() / 4 if self._unit else 0)
         self._write(painter, upper, self._text, self.width() // 4)
-        lower = ring.adjusted(1.6 * width, ring.height() / 2.2, -1.6 * width, -ring.height() / 6)
+        lower = ring.adjusted(1.8 * width, ring.height() / 2.1, -1.8 * width, -ring.height() / 6)
         self._write(painter, lower, self._unit, self.width() // 6)
 
     def _fill(self, painter: QPainter, ring: QRectF, part: int, color: str, width: float) -> None:

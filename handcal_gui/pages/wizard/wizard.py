@@ -35,7 +35,7 @@ _COMPARING = {
 }
 """Beside the panels, and in the station, which shows no trials."""
 _NO_TRIALS = tr("Trials are recorded once φ is solved, beside the panels: press F11, then T")
-_RING_PX = 8 * SPACING_PX, 10 * SPACING_PX, 16 * SPACING_PX
+_RING_PX = 9 * SPACING_PX, 10 * SPACING_PX, 16 * SPACING_PX
 _SENTENCE_SCALE, _ROW_SCALE = (1.2, 1.5, 2.0), (1.0, 1.1, 1.3)
 """Size of the ring and scales of texts: beside panels, without them in a small window, and in a
 large one."""
