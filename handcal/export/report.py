@@ -24,7 +24,7 @@ from handcal.export.trial_sections import (
     user_test_section,
 )
 from handcal.register.benefit import expected_error_arcmin
-from handcal.register.results import Results
+from handcal.register.results import Results, read_rendered_shift_m
 from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
@@ -85,7 +85,7 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
 
 
 def _verdict(outcome: SessionOutcome) -> str:
-    """Return the verdict in one sentence, and another of each eye whose trials contradict it."""
+    """Return the verdict in one sentence, and another of each eye with trials over the target."""
     if outcome.results is None:
         return "Nothing is solved: the session holds no alignment."
     parts = [
@@ -101,13 +101,16 @@ def _verdict(outcome: SessionOutcome) -> str:
 
 def _doubts(outcome: SessionOutcome, results: Results) -> str:
     """Return a sentence on each eye whose trials are over the lab's target."""
-    trials = outcome.record.trials.values()
-    target_arcmin = outcome.settings.verdict.target_arcmin
+    record, target_arcmin = outcome.record, outcome.settings.verdict.target_arcmin
+    errors = trial_errors_arcmin(
+        record.trials.values(), results.rendered_shift_m, read_rendered_shift_m(record.results)
+    )
     return "".join(
-        f" The trials of the {eye} eye found {mean_arcmin:.1f} arcmin on average, over the lab's "
-        f"target of {target_arcmin:g}."
-        for eye, found in trial_errors_arcmin(trials, results.rendered_shift_m).items()
-        if (mean_arcmin := sum(found) / max(len(found), 1)) > target_arcmin
+        f" In the trials of the {eye} eye, its calibrated φ was wrong by {mean_arcmin:.1f} arcmin "
+        f"on average (n = {len(found)}), over the lab's target of {target_arcmin:g}: calibrate "
+        "again if φ was set well by hand."
+        for eye, found in errors.items()
+        if (mean_arcmin := sum(found) / len(found)) > target_arcmin
     )
 
 

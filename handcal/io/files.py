@@ -215,7 +215,7 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     data = read_limited(path, MAX_JSON_BYTES)
     try:
-        value = json.loads(data, parse_int=_whole_number)
+        value = json.loads(data, parse_int=whole_number)
     except UnicodeDecodeError as error:
         raise FileError(f"{path} is not valid JSON: not a text file") from error
     except (ValueError, RecursionError) as error:
@@ -225,7 +225,8 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
-def _whole_number(digits: str) -> int:
+def whole_number(digits: str) -> int:
+    """Return a whole number of JSON that a float can hold; ValueError if it is larger."""
     if len(digits) > _MOST_DIGITS:
         raise ValueError("a whole number is too large")
     return int(digits)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -274,6 +275,22 @@ def results_json(results: Results) -> dict[str, Any]:
             for shifts in results.alignments.values()
         ],
     }
+
+
+def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float64]:
+    """Return φ as rendered, (3,), of each eye in what `results_json` made.
+
+    Eyes without three numbers are left out: results come from files, and None are no results.
+    """
+    eyes = (results or {}).get("eyes")
+    found: dict[Eye, Float64] = {}
+    for eye in EYES:
+        one = eyes.get(eye) if isinstance(eyes, dict) else None
+        if isinstance(one, dict):
+            with suppress(TypeError, ValueError):
+                shift_m = np.array(one.get("shift_m"), np.float64).reshape(3)
+                found[eye] = shift_m if one.get("verdict") in USED else np.zeros(3)
+    return found
 
 
 def _benefit_json(benefit: Benefit) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from handcal.errors import FileError
-from handcal.io.files import read_limited, write_atomic
+from handcal.io.files import read_limited, whole_number, write_atomic
 
 JOURNAL_VERSION = 3
 """Version 3 added checksums and facts; 2 deletion, trials and fine-tuning; all can be read."""
@@ -254,7 +254,7 @@ def _parse_sound(line: bytes) -> dict[str, Any]:
         If it is damaged.
     """
     try:
-        fields: dict[str, Any] = json.loads(line)
+        fields: dict[str, Any] = json.loads(line, parse_int=whole_number)
         version, has_checksum = fields["version"], "sha256" in fields
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise ValueError("is not an event of a session") from error

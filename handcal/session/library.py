@@ -15,7 +15,7 @@ from handcal.errors import FileError
 from handcal.io.files import make_folder, read_json, read_limited, sync_folder
 from handcal.io.lock import FileLock
 from handcal.progress import Progress
-from handcal.register.results import USED
+from handcal.register.results import read_rendered_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.journal import JOURNAL, JOURNAL_VERSION, find_journals
 from handcal.session.record import (
@@ -28,7 +28,7 @@ from handcal.session.record import (
 from handcal.session.session import Session
 from handcal.session.state import SessionEvent, SessionState, clean_wearer
 from handcal.session.trial import Trial, trial_errors_arcmin
-from handcal.types import EYES, Eye, Float64
+from handcal.types import EYES, Eye
 
 DELETED = ".deleted"
 """Folder, inside the folder of sessions, to which deleted sessions are moved."""
@@ -220,7 +220,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         alignments=len(state.alignments.active),
         trials=len(trials),
         trials_arcmin=_mean_arcmin(trials),
-        target_arcmin=lab_target_arcmin(state.settings),
+        target_arcmin=_lab_target_arcmin(state.settings),
         is_finished=state.is_finished,
         is_repaired=any(one.name == SessionEvent.REPAIRED for one in replayed.journal.events),
         damaged=len(replayed.damaged) + _damaged_files(path, state),
@@ -229,14 +229,13 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
 
 def eye_outcomes(path: Path, replayed: Replayed) -> dict[Eye, EyeOutcome]:
     """Return the results of a session's eyes; those that it does not hold are left out."""
-    found = _results(path, replayed).get("eyes")
+    results = _results(path, replayed)
+    found = results.get("eyes")
     eyes = found if isinstance(found, dict) else {}
-    outcomes = {eye: _outcome(eyes[eye]) for eye in EYES if isinstance(eyes.get(eye), dict)}
-    shifts_m = {eye: _calibrated_m(eyes[eye]) for eye in outcomes}
-    errors = trial_errors_arcmin(replayed.state.trials.active.values(), shifts_m)
+    trials = replayed.state.trials.active.values()
+    errors = trial_errors_arcmin(trials, read_rendered_shift_m(results))
     return {
-        eye: replace(one, trials_arcmin=float(np.mean(errors[eye]))) if errors[eye] else one
-        for eye, one in outcomes.items()
+        eye: _outcome(eyes[eye], errors.get(eye)) for eye in EYES if isinstance(eyes.get(eye), dict)
     }
 
 
@@ -260,7 +259,7 @@ def _mean_arcmin(trials: Sequence[Trial]) -> float | None:
     return float(np.mean([trial.error_arcmin.mean() for trial in trials])) if trials else None
 
 
-def lab_target_arcmin(settings: Mapping[str, Any] | None) -> float | None:
+def _lab_target_arcmin(settings: Mapping[str, Any] | None) -> float | None:
     """Return the lab's target of a session's settings; None if they have none."""
     found: object = settings
     for name in ("calibration", "solve", "verdict", "target_arcmin"):
@@ -289,23 +288,14 @@ def _results(path: Path, replayed: Replayed) -> dict[str, Any]:
     return state.results or {}
 
 
-def _calibrated_m(one: Mapping[str, Any]) -> Float64:
-    """Return φ of an eye's result as rendered, (3,); not a number if it is unknown."""
-    if one.get("verdict") not in USED:
-        return np.zeros(3)
-    try:
-        return np.array(one.get("shift_m"), np.float64).reshape(3)
-    except (TypeError, ValueError):
-        return np.full(3, np.nan)
-
-
-def _outcome(one: Mapping[str, Any]) -> EyeOutcome:
+def _outcome(one: Mapping[str, Any], errors_arcmin: Sequence[float] | None) -> EyeOutcome:
     """Return an eye's result; whatever is missing or not a number is unknown."""
     benefit, measured = one.get("benefit"), one.get("measured_arcmin")
     verdict, expected = str(one.get("verdict", "")), benefit if isinstance(benefit, dict) else {}
     before_arcmin = _number(expected.get("without_arcmin"))
+    trials_arcmin = float(np.mean(errors_arcmin)) if errors_arcmin else None
     if verdict == "keep":  # whatever was solved and verified is not used
-        return EyeOutcome(verdict, before_arcmin, before_arcmin, None)
+        return EyeOutcome(verdict, before_arcmin, before_arcmin, None, None, trials_arcmin)
     found, left = measured if isinstance(measured, list) and len(measured) == 2 else (None, None)
     return EyeOutcome(
         verdict,
@@ -313,6 +303,7 @@ def _outcome(one: Mapping[str, Any]) -> EyeOutcome:
         _number(expected.get("after_arcmin")),
         _number(left),
         _number(found),
+        trials_arcmin,
     )
 
 

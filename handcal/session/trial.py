@@ -142,22 +142,22 @@ def make_trial(
 
 
 def trial_errors_arcmin(
-    trials: Iterable[Trial], shifts_m: Mapping[Eye, Float64]
+    trials: Iterable[Trial], *shifts_m: Mapping[Eye, Float64]
 ) -> dict[Eye, list[float]]:
-    """Return the mean error of each trial that judges a calibrated φ, by eye.
+    """Return the mean error of each trial that judges a calibration, of each eye that has some.
 
     Parameters
     ----------
     trials : iterable of Trial
         Those of another φ, such as of a calibration that was then repeated, are left out.
     shifts_m : mapping of Eye to (3,) float64
-        The calibrated φ.
+        The calibrated φ, as solved by this version and as stored by that of the session.
     """
-    found: dict[Eye, list[float]] = {eye: [] for eye in shifts_m}
+    found: dict[Eye, list[float]] = {}
     for one in trials:
-        shift_m = shifts_m.get(one.eye)
-        if shift_m is not None and np.abs(one.calibrated_shift_m - shift_m).max() < SAME_SHIFT_M:
-            found[one.eye].append(float(one.error_arcmin.mean()))
+        calibrated_m = [shift_m[one.eye] for shift_m in shifts_m if one.eye in shift_m]
+        if any(np.abs(one.calibrated_shift_m - m).max() < SAME_SHIFT_M for m in calibrated_m):
+            found.setdefault(one.eye, []).append(float(one.error_arcmin.mean()))
     return found
 
 

@@ -22,7 +22,7 @@ from handcal.geometry import transform
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
 from handcal.progress import Progress
-from handcal.register.results import USED
+from handcal.register.results import read_rendered_shift_m
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import read_cube
 from handcal.rig.cube_track import TrackedCube, facing_corners_m
@@ -217,16 +217,11 @@ def adjust_prompt(eye: Eye) -> str:
 
 def calibrated_shifts_m(record: SessionRecord, eyes: Sequence[Eye]) -> Mapping[Eye, Float64]:
     """Return the calibrated φ of each eye of a session; FileError if one is not solved."""
-    solved = {} if record.results is None else record.results["eyes"]
-    missing = [eye for eye in eyes if eye not in solved]
+    solved_m = read_rendered_shift_m(record.results)
+    missing = [eye for eye in eyes if eye not in solved_m]
     if missing:
         raise FileError(f"{record.path}: the {missing[0]} eye is not solved; calibrate it first")
-    return {
-        eye: np.array(solved[eye]["shift_m"], np.float64)
-        if solved[eye]["verdict"] in USED
-        else np.zeros(3)
-        for eye in eyes
-    }
+    return {eye: solved_m[eye] for eye in eyes}
 
 
 def wait_for_cube(

@@ -133,6 +133,7 @@ class ReviewController(QObject):
         panels = self._window.panels
         lack = _without_alignments(record)
         target_arcmin = stored.settings.verdict.target_arcmin
+        panels.results.set_target(target_arcmin)
         panels.results.show_results(
             stored.results, record.alignments, record.rig, has_verdicts=False
         )

@@ -112,7 +112,7 @@ class ReviewPage(QWidget):
         self._export.setEnabled(record.is_solvable)
         self._again.setEnabled(results is not None)
         self._task.setText(_EXPORT if record.is_solvable else _RESUME)
-        trials = eye_trials(results, record.trials.values(), target_arcmin) if results else {}
+        trials = eye_trials(results, record, target_arcmin) if results else {}
         self._card.show_results(results, target_arcmin, trials)
         self._card.setVisible(results is not None)
         if results is not None:

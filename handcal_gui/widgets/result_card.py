@@ -23,8 +23,6 @@ from handcal_gui.widgets.result_rows import (
     verdict_word,
 )
 
-_NOT_VERIFIED = tr("not verified")
-
 
 @dataclass(frozen=True, slots=True)
 class Bar:
@@ -32,14 +30,16 @@ class Bar:
 
     name: str
     arcmin: float | None
-    """None if it was not verified."""
+    """None if it was not measured."""
     is_judged: bool = True
     """False for an error that the target does not concern."""
+    absent: str = ""
+    """Text instead of an error that was not measured."""
 
     @property
     def text(self) -> str:
         """The error with its unit."""
-        return _NOT_VERIFIED if self.arcmin is None else f"{self.arcmin:.1f}′"
+        return self.absent if self.arcmin is None else f"{self.arcmin:.1f}′"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +69,13 @@ def eye_results(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list[
         if eye in results.measured_arcmin:
             verified, left = results.measured_arcmin[eye]
             after = Bar(after_name, left, is_used)
-            bars = before, Bar(tr("Verification found"), verified), after
+            bars = [before, Bar(tr("Verification found"), verified), after]
         else:
             after = Bar(after_name, benefit.after_arcmin, is_used)
-            bars = before, after, Bar(tr("Verification"), None)
+            bars = [before, after, Bar(tr("Verification"), None, absent=tr("not verified"))]
+        if trials:
+            bars.append(_trials_bar(trials.get(eye)))
+            bars.sort(key=lambda bar: bar.arcmin is None)  # the target's line ends before these
         another = tr("One more alignment: {:.1f}′ expected").format(
             results.expected_after_another_arcmin[eye]
         )
@@ -80,8 +83,14 @@ def eye_results(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list[
         given = results, eye, trials.get(eye)
         word, reason = verdict_word(*given), verdict_reason(*given)
         shade = verdict_color(verdict.name, trials.get(eye))
-        found.append(EyeResult(eye, shade, word, reason, bars, details))
+        found.append(EyeResult(eye, shade, word, reason, tuple(bars), details))
     return found
+
+
+def _trials_bar(found: EyeTrials | None) -> Bar:
+    if found is None:
+        return Bar(tr("Trials"), None, absent=tr("none"))
+    return Bar(tr("Trials, n = {}").format(found.count), found.mean_arcmin)
 
 
 def result_text(
@@ -216,7 +225,8 @@ class _Bars(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        return QSize(26 * SPACING_PX, 4 * self._line_px())
+        lines = 1 + (len(self._result.bars) if self._result else 3)
+        return QSize(26 * SPACING_PX, lines * self._line_px())
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -224,14 +234,15 @@ class _Bars(QWidget):
     def paintEvent(self, _: QPaintEvent) -> None:
         if self._result is None:
             return
+        bars = self._result.bars
         painter = QPainter(self)
         line, metrics = self._line_px(), self.fontMetrics()
-        name_px = max(metrics.horizontalAdvance(b.name) for b in self._result.bars) + SPACING_PX
+        name_px = max(metrics.horizontalAdvance(b.name) for b in bars) + SPACING_PX
         text_px = metrics.horizontalAdvance("888.8′") + SPACING_PX
         room = max(self.width() - name_px - text_px, 1)
         text = self.palette().windowText().color()
         good, late = QColor(colors().good), QColor(colors().warning)
-        for i, bar in enumerate(self._result.bars):
+        for i, bar in enumerate(bars):
             top = i * line
             painter.setPen(text)
             row = QRectF(0, top, self.width(), line)
@@ -251,8 +262,8 @@ class _Bars(QWidget):
             painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | side, bar.text)
         x = name_px + room * self._target / self._scale
         painter.setPen(QPen(text, 1.5, Qt.PenStyle.DashLine))
-        count = len(self._result.bars)
-        known = sum(bar.arcmin is not None for bar in self._result.bars)
+        count = len(bars)
+        known = sum(bar.arcmin is not None for bar in bars)
         painter.drawLine(round(x), 0, round(x), known * line)
         painter.setPen(text)
         label = tr("target {:g}′").format(self._target)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from handcal.register.benefit import expected_error_arcmin
-from handcal.register.results import Results
+from handcal.register.results import Results, read_rendered_shift_m
 from handcal.report.cells import signed
 from handcal.rig_types import EyeDisplay, Rig
-from handcal.session.trial import Trial, trial_errors_arcmin
+from handcal.session.record import SessionRecord
+from handcal.session.trial import trial_errors_arcmin
 from handcal.types import EYES, Eye, EyeShift, VerdictName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
@@ -153,30 +154,24 @@ class EyeTrials:
 
     count: int
     mean_arcmin: float
-    target_arcmin: float | None
-    """None for a session without a target."""
+    target_arcmin: float
 
     @property
     def is_over(self) -> bool:
         """True if the mean error is over the target."""
-        return self.target_arcmin is not None and self.mean_arcmin > self.target_arcmin
-
-    @property
-    def doubt(self) -> str:
-        """Advice on trials over the target; empty for others."""
-        asked = tr("Trials found {:.1f}′: look at them, or calibrate again")
-        return asked.format(self.mean_arcmin) if self.is_over else ""
+        return self.mean_arcmin > self.target_arcmin
 
 
 def eye_trials(
-    results: Results, trials: Iterable[Trial], target_arcmin: float | None
+    results: Results, record: SessionRecord, target_arcmin: float
 ) -> dict[Eye, EyeTrials]:
-    """Return the trials of the results' φ, of each eye that has some."""
-    errors = trial_errors_arcmin(trials, results.rendered_shift_m)
+    """Return the trials of a session's results, of each eye that has some."""
+    errors = trial_errors_arcmin(
+        record.trials.values(), results.rendered_shift_m, read_rendered_shift_m(record.results)
+    )
     return {
         eye: EyeTrials(len(found), sum(found) / len(found), target_arcmin)
         for eye, found in errors.items()
-        if found
     }
 
 
@@ -227,29 +222,38 @@ def eyes_text(eyes: Sequence[Eye]) -> str:
     return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
 
 
-def verdict_word(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:
-    """Return an eye's verdict in a word: what a result to be repeated needs may be to verify.
+def is_doubted(verdict: VerdictName, trials: EyeTrials | None) -> bool:
+    """Return whether an accepted eye must not be ticked, as its trials are over the target."""
+    return verdict == "accept" and trials is not None and trials.is_over
 
-    An accepted eye whose trials are over the target is not ticked.
-    """
+
+def verdict_word(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:
+    """Return an eye's verdict in a word: what a result to be repeated needs may be to verify."""
     name, advice = results.verdicts[eye].name, results.advice.get(eye)
     if name == "repeat" and advice is not None and advice.verify and not advice.alignments:
         return tr("↻ Verify")
-    if name == "accept" and trials is not None and trials.is_over:
-        return tr("⚠ Trials over {:g}′").format(trials.target_arcmin)
+    if trials is not None and is_doubted(name, trials):
+        return doubt_word(trials.target_arcmin)
     return VERDICT_WORDS[name]
+
+
+def doubt_word(target_arcmin: float) -> str:
+    """Return the word for an accepted eye whose trials are over the target."""
+    return tr("⚠ Trials over {:g}′").format(target_arcmin)
 
 
 def verdict_color(verdict: VerdictName, trials: EyeTrials | None) -> str:
     """Return the name of the theme's colour for a verdict."""
-    is_doubted = trials is not None and trials.is_over and verdict == "accept"
-    return "warning" if is_doubted else VERDICT_COLORS[verdict]
+    return "warning" if is_doubted(verdict, trials) else VERDICT_COLORS[verdict]
 
 
 def verdict_reason(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:
-    """Return the reason of an eye's verdict, and what trials over the target ask for."""
-    reason = sentence(results.verdicts[eye].reason)
-    return f"{reason}. {trials.doubt}" if trials is not None and trials.doubt else reason
+    """Return the reason of an eye's verdict, or advice on trials over the target."""
+    verdict = results.verdicts[eye]
+    if trials is None or not is_doubted(verdict.name, trials):
+        return sentence(verdict.reason)
+    advice = tr("Trials found {:.1f}′: calibrate again if φ was set well in them")
+    return advice.format(trials.mean_arcmin)
 
 
 def verdict_rows(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list[Row]:

@@ -3964,6 +3964,10 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Trials, n = {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Target: {:.1f}′</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4105,10 +4109,6 @@ lab&apos;s target; look at the trials, and calibrate again if φ was set well by
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Trials found {:.1f}′: look at them, or calibrate again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>⚠ {:.1f}′ n={}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4138,6 +4138,10 @@ lab&apos;s target; look at the trials, and calibrate again if φ was set well by
     </message>
     <message>
         <source>↻ Verify</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials found {:.1f}′: calibrate again if φ was set well in them</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4404,19 +4408,11 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>⚠ Accept</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Not solved</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{}, trials over {:g}′</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Of the newest results; ⚠ the mean over all trials is over the lab&apos;s target</source>
+        <source>Of the newest results; ⚠ trials of an accepted φ are over the lab&apos;s target on average</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -104,8 +104,8 @@ def test_the_verdict_says_that_trials_contradict_it(outcome: SessionOutcome) -> 
         record = replace(outcome.record, trials={number: changed})
         return session_report(replace(outcome, record=record)).lead
 
-    said = "The trials of the left eye found 20.7 arcmin on average, over the lab's target of 8."
-    assert lead(calibrated_shift_m=shift_m).endswith(f". {said}")
+    said = "In the trials of the left eye, its calibrated φ was wrong by 20.7 arcmin on average"
+    assert f". {said} (n = 1), over the lab's target of 8:" in lead(calibrated_shift_m=shift_m)
     assert said not in lead(calibrated_shift_m=shift_m + 1e-3), "a former calibration's"
     assert said not in session_report(outcome).lead
 

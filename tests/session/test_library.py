@@ -87,8 +87,22 @@ def test_the_trials_of_an_eye_are_those_of_its_calibration(
     assert found(verdict="accept", shift_m=[0.0, 0.0, 0.0]) == mean
     assert found(verdict="keep", shift_m=[0.001, 0.0, 0.0]) == mean, "offline is kept"
     assert found(verdict="accept", shift_m=[0.001, 0.0, 0.0]) is None
-    assert found(verdict="accept", shift_m=["?"]) is None
+    wrong: object
+    for wrong in (["?"], [0, 0], [[0], 0, 0], {}):
+        assert found(verdict="accept", shift_m=wrong) is None
     assert found(verdict="accept") is None
+
+
+@pytest.mark.parametrize("name", ["shift_m", "measured_arcmin"])
+def test_a_number_too_large_for_a_float_hides_no_other_session(
+    make: Callable[..., Path], tmp_path: Path, name: str
+) -> None:
+    make("sound", "Bo")
+    with Session(make("one", "Ada", solved=False)) as session:
+        session.save_results({"eyes": {"left": {"verdict": "accept", name: [10**400, 0, 0]}}})
+    entries = {entry.wearer: entry for entry in read_library(tmp_path)}
+    assert entries["Ada"].damaged == 1
+    assert not entries["Bo"].damaged
 
 
 @pytest.mark.parametrize(

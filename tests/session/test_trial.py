@@ -148,7 +148,10 @@ def test_trials_of_another_shift_judge_nothing_of_this_one() -> None:
     trials = [trial("left", 0.0), trial("left", 1e-9), trial("left", 1e-3), trial("right", 1e-3)]
     errors = [float(trial.error_arcmin.mean()) for trial in trials]
     both = dict.fromkeys(EYES, CALIBRATED_M)
-    assert trial_errors_arcmin(trials, both) == {"left": errors[:2], "right": []}
+    assert trial_errors_arcmin(trials, both) == {"left": errors[:2]}
     assert trial_errors_arcmin(trials, {"right": CALIBRATED_M + 1e-3}) == {"right": errors[3:]}
     unknown = dict.fromkeys(EYES, np.full(3, np.nan))
-    assert trial_errors_arcmin(trials, unknown) == {"left": [], "right": []}
+    assert trial_errors_arcmin(trials, unknown) == {}
+    assert trial_errors_arcmin(trials) == {}
+    of_either = trial_errors_arcmin(trials, both, {"right": CALIBRATED_M + 1e-3})
+    assert of_either == {"left": errors[:2], "right": errors[3:]}

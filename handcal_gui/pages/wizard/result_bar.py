@@ -66,9 +66,9 @@ class ResultBar(QWidget):
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the results of a snapshot if they have changed."""
         results, shown = snapshot.procedure.results, self._record
-        has_new_trials = shown is None or snapshot.record.trials is not shown.trials
+        is_written = shown is None or snapshot.record.trials is not shown.trials
         self._record = snapshot.record
-        if results is not self._results or has_new_trials:
+        if results is not self._results or is_written:
             self._results = results
             self.card.show_results(results, self._target_arcmin, self._trials())
 
@@ -88,7 +88,7 @@ class ResultBar(QWidget):
     def _trials(self) -> Mapping[Eye, EyeTrials]:
         if self._results is None or self._record is None:
             return {}
-        return eye_trials(self._results, self._record.trials.values(), self._target_arcmin)
+        return eye_trials(self._results, self._record, self._target_arcmin)
 
     def copy(self) -> None:
         """Copy the result as text."""

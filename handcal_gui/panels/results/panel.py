@@ -9,8 +9,8 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
+from handcal.register.verdict import VerdictSettings
 from handcal.rig_types import Rig
-from handcal.session.library import lab_target_arcmin
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial
 from handcal.station.snapshot import Snapshot
@@ -73,6 +73,7 @@ class ResultsPanel(QWidget):
         self._results: Results | None = None
         self._trials: Mapping[int, Trial] = {}
         self._judged: Mapping[Eye, EyeTrials] = {}
+        self._target_arcmin = VerdictSettings().target_arcmin
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
         self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
@@ -88,6 +89,10 @@ class ResultsPanel(QWidget):
         self._fit_soon = fit_soon(self._fit, self)
         self._lay_out()
         self._add_copy()
+
+    def set_target(self, target_arcmin: float) -> None:
+        """Set the lab's target for the trials shown next."""
+        self._target_arcmin = target_arcmin
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the results of a snapshot if they have changed."""
@@ -138,15 +143,14 @@ class ResultsPanel(QWidget):
         """Show the errors of a session's trials among the numbers, if there are any."""
         if self._results is not None and record.trials is not self._trials:
             self._trials = record.trials
-            target_arcmin = lab_target_arcmin(record.settings)
-            self._judged = eye_trials(self._results, record.trials.values(), target_arcmin)
+            self._judged = eye_trials(self._results, record, self._target_arcmin)
             self._show_eyes(self._results, record.rig)
             self._fit()
 
     def _show_eyes(self, results: Results, rig: Rig) -> None:
         """Show the verdicts and the numbers of both eyes, with those of their trials."""
         for eye, card in self._cards.items():
-            card.show_verdict(results, eye, self._judged.get(eye))
+            card.show_verdict(results, self._judged.get(eye))
         row = trial_row(self._judged) if self._judged else None
         names = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(names, result_rows(results, rig, row))

@@ -30,6 +30,7 @@ class VerdictCard(QFrame):
         super().__init__(parent)
         self.setObjectName(f"verdict-{eye}")
         self.setFrameShape(QFrame.Shape.StyledPanel)
+        self._eye = eye
         self._shade = ""
         self._word = QLabel()
         scale_font(self._word, 1.25, is_bold=True)
@@ -46,13 +47,12 @@ class VerdictCard(QFrame):
             margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
             spacing=SPACING_PX // 2,
         )
-        self.show_verdict(None, eye)
+        self.show_verdict(None)
         follow_theme(self, self._recolor)
 
-    def show_verdict(
-        self, results: Results | None, eye: Eye, trials: EyeTrials | None = None
-    ) -> None:
-        """Show an eye's verdict, with the doubt that its trials cast on it."""
+    def show_verdict(self, results: Results | None, trials: EyeTrials | None = None) -> None:
+        """Show the eye's verdict, with the doubt that its trials cast on it."""
+        eye = self._eye
         if results is None or eye not in results.verdicts:
             self._shade = ""
             self._word.setText(tr("{} Not solved").format(NOTHING))

@@ -21,7 +21,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.error_bars import after_arcmin, error_bars, error_text, picture_text
 from handcal_gui.widgets.fields import plain_tooltip
 from handcal_gui.widgets.numbers import pluralize
-from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS
+from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_WORDS, doubt_word
 from handcal_gui.widgets.times import local_time
 
 Filter: TypeAlias = Literal["all", "accepted", "repeat", "unfinished", "damaged"]
@@ -81,26 +81,22 @@ def _state(entry: LibraryEntry) -> str:
 
 
 def _verdicts(entry: LibraryEntry) -> str:
-    is_over = _is_over_target(entry)
     words = {
-        eye: tr("⚠ Accept")
-        if is_over and one.verdict == "accept"
+        eye: doubt_word(entry.target_arcmin)
+        if one.verdict == "accept" and entry.target_arcmin is not None and _is_over(one, entry)
         else VERDICT_WORDS.get(cast(VerdictName, one.verdict), one.verdict)
         for eye, one in entry.eyes.items()
     }
     if len(words) == len(EYES) and len(set(words.values())) == 1:
-        said = words[EYES[0]]
-    else:
-        each = ", ".join(f"{EYE_NAMES[eye].split()[0]} {word}" for eye, word in words.items())
-        said = each or (NOTHING if entry.problem else tr("Not solved"))
-    return tr("{}, trials over {:g}′").format(said, entry.target_arcmin) if is_over else said
+        return words[EYES[0]]
+    each = ", ".join(f"{EYE_NAMES[eye].split()[0]} {word}" for eye, word in words.items())
+    return each or (NOTHING if entry.problem else tr("Not solved"))
 
 
-def _is_over_target(entry: LibraryEntry) -> bool:
-    """Return whether the mean of the trials of an eye's φ is over the lab's target."""
-    target_arcmin = entry.target_arcmin
-    found = [one.trials_arcmin for one in entry.eyes.values() if one.trials_arcmin is not None]
-    return target_arcmin is not None and max(found, default=0.0) > target_arcmin
+def _is_over(one: EyeOutcome, entry: LibraryEntry) -> bool:
+    """Return whether the trials of an eye's φ are over the lab's target on average."""
+    mean_arcmin, target_arcmin = one.trials_arcmin, entry.target_arcmin
+    return mean_arcmin is not None and target_arcmin is not None and mean_arcmin > target_arcmin
 
 
 def _errors(kind: _Kind) -> Callable[[LibraryEntry], str]:
@@ -116,7 +112,8 @@ def _errors(kind: _Kind) -> Callable[[LibraryEntry], str]:
 def _trials(entry: LibraryEntry) -> str:
     if entry.trials_arcmin is None:
         return NOTHING
-    said = tr("⚠ {:.1f} (n = {})") if _is_over_target(entry) else tr("{:.1f} (n = {})")
+    is_over = any(_is_over(one, entry) for one in entry.eyes.values())
+    said = tr("⚠ {:.1f} (n = {})") if is_over else tr("{:.1f} (n = {})")
     return said.format(entry.trials_arcmin, entry.trials)
 
 
@@ -148,7 +145,7 @@ COLUMNS = (
     ),
     _Column(
         tr("Verdict"),
-        tr("Of the newest results; ⚠ the mean over all trials is over the lab's target"),
+        tr("Of the newest results; ⚠ trials of an accepted φ are over the lab's target on average"),
         _verdicts,
         _verdicts,
     ),

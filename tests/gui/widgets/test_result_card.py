@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
 from handcal.register.verdict import Advice
-from handcal.types import EYES, Verdict, VerdictName, phi_text
+from handcal.types import EYES, Eye, Verdict, VerdictName, phi_text
 from handcal_gui.theme import colors
 from handcal_gui.widgets.result_card import ResultCard, eye_results, result_text
 from handcal_gui.widgets.result_rows import EyeTrials
@@ -59,7 +59,8 @@ def test_the_card_shows_the_verdicts(qtbot: QtBot, results: Results) -> None:
 def test_no_eye_is_ticked_whose_trials_are_over_the_target(qtbot: QtBot, results: Results) -> None:
     card = show(qtbot, ResultCard(), 600, 240)
     accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
-    card.show_results(accepted, 8.0, {"left": EyeTrials(2, 20.7, 8.0)})
+    over: dict[Eye, EyeTrials] = {"left": EyeTrials(2, 20.7, 8.0)}
+    card.show_results(accepted, 8.0, over)
     assert text(card, "card-verdict-left") == "Left eye: ⚠ Trials over 8′"
     assert text(card, "card-verdict-right") == "Right eye: ✓ Accept"
     shades = [
@@ -67,8 +68,12 @@ def test_no_eye_is_ticked_whose_trials_are_over_the_target(qtbot: QtBot, results
         for eye in EYES
     ]
     assert shades == [QColor(colors().warning), QColor(colors().good)]
-    assert "Trials found 20.7′" in text(card, "card-reason-left")
-    assert "⚠ Trials over 8′" in card.accessibleDescription()
+    reason = "Trials found 20.7′: calibrate again if φ was set well in them"
+    assert text(card, "card-reason-left") == reason
+    assert text(card, "card-reason-right") == "As told"
+    lines = result_text(accepted, 8.0, trials=over).splitlines()
+    assert "Trials, n = 2: 20.7′" in lines
+    assert "Trials: none" in lines
 
 
 def test_a_bar_within_the_target_is_painted_otherwise(qtbot: QtBot, results: Results) -> None:

@@ -9,6 +9,7 @@ import pytest
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig_types import Rig
+from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial, make_trial
 from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verdict
 from handcal_gui.widgets.number_table import Row
@@ -149,7 +150,9 @@ def test_only_eyes_that_both_solved_are_compared(
     assert not {"Right eye", "Eye distance"} & set(labels)
 
 
-def test_trials_over_the_target_are_marked(results: Results, rig: Rig) -> None:
+def test_trials_over_the_target_are_marked(
+    results: Results, rig: Rig, record: SessionRecord
+) -> None:
     def trial(eye: Eye, phi1_mm: float, calibrated_m: Float64) -> Trial:
         adjusted_m = np.add(calibrated_m, [1e-3 * phi1_mm, 0.0, 0.0])
         return make_trial(rig.eyes[eye], eye, 0.4, calibrated_m, adjusted_m)
@@ -159,26 +162,30 @@ def test_trials_over_the_target_are_marked(results: Results, rig: Rig) -> None:
     former = trial("right", 9.0, shifts_m["right"] + 1e-3)
     mean = float(np.mean([one.error_arcmin.mean() for one in trials]))
 
-    def judged(target_arcmin: float | None) -> dict[Eye, EyeTrials]:
-        return eye_trials(results, [*trials, former], target_arcmin)
+    shown = replace(record, trials=dict(enumerate([*trials, former])), results=None)
+
+    def judged(target_arcmin: float) -> dict[Eye, EyeTrials]:
+        return eye_trials(results, shown, target_arcmin)
 
     over = judged(mean - 0.1)
     assert trial_row(over).cells == (f"⚠ {mean:.1f}′ n=2", "–")
-    for target_arcmin in (mean + 0.1, None):
-        row = trial_row(judged(target_arcmin))
-        assert row.cells == (f"{mean:.1f}′ n=2", "–")
+    row = trial_row(judged(mean + 0.1))
+    assert row.cells == (f"{mean:.1f}′ n=2", "–")
     accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
     left, right = (row.cells for row in verdict_rows(accepted, over))
     assert left[0] == f"⚠ Trials over {mean - 0.1:g}′"
-    assert left[1] == f"As told. Trials found {mean:.1f}′: look at them, or calibrate again"
+    assert left[1] == f"Trials found {mean:.1f}′: calibrate again if φ was set well in them"
     assert right == ("✓ Accept", "As told")
     repeated = replace(results, verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")))
-    assert verdict_rows(repeated, over)[0].cells[0] == "↻ Repeat"
+    assert verdict_rows(repeated, over)[0].cells == ("↻ Repeat", "As told")
     assert [verdict_color(name, over["left"]) for name in ("accept", "keep", "implausible")] == [
         "warning",
         "warning",
         "red",
     ]
     assert verdict_color("accept", None) == "good"
+    stored = {"eyes": {"right": {"shift_m": list(former.calibrated_shift_m), "verdict": "accept"}}}
+    held = eye_trials(results, replace(shown, results=stored), 8.0)
+    assert held["right"].count == 1, "as stored by a version that solves otherwise"
     labels = [one.label for one in result_rows(results, rig, row)]
     assert labels.index("Trials") == labels.index("One more alignment") + 1

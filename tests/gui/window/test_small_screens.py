@@ -21,8 +21,9 @@ from pytestqt.qtbot import QtBot
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
+from handcal.session.trial import make_trial
 from handcal.station.states import State
-from handcal.types import Method
+from handcal.types import EYES, Method, Verdict
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT
 from handcal_gui.pages.wizard.step_views import align_view, verification_view
@@ -31,8 +32,8 @@ from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.program import Program
 from handcal_gui.widgets.result_card import ResultCard
-from handcal_gui.window import MainWindow
-from tests.gui.helpers import child
+from handcal_gui.window import MainWindow, Page
+from tests.gui.helpers import child, text
 from tests.gui.views import NUDGED, all_views
 from tests.gui.window.conftest import Maker, main_button, say, shown
 
@@ -49,6 +50,26 @@ def texts_of(view: WizardView) -> list[str]:
     return [one.text for one in view.preconditions]
 
 
+_ACCEPTED = Verdict(
+    "accept",
+    "the verification found an error of 10.6′ and corrected it; expected error 12.8′ instead of "
+    "29.6′; 99 % sure to be better than none",
+)
+
+
+def accepted(results: Results) -> Results:
+    return replace(results, verdicts=dict.fromkeys(EYES, _ACCEPTED))
+
+
+def with_trials(record: SessionRecord, results: Results) -> SessionRecord:
+    """Return a record with a trial of each eye, far over any target."""
+    trials = {}
+    for number, (eye, calibrated_m) in enumerate(results.rendered_shift_m.items()):
+        display = record.rig.eyes[eye]
+        trials[number] = make_trial(display, eye, 0.4, calibrated_m, [0.05, 0.0, 0.0])
+    return replace(record, trials=trials)
+
+
 SMALL_PX = [(960, 510), (1280, 690), (1366, 738)]
 EACH_TEXT = pytest.mark.parametrize("text_scale", [1.0, 1.25], indirect=True)
 
@@ -61,6 +82,7 @@ def test_no_step_needs_scrolling(
     snapshot: Maker,
     size_px: tuple[int, int],
     arrangement: Literal["panels", "station"],
+    results: Results,
 ) -> None:
     window, guide = program.window, program.wizard_panel
     window.show_page("start")
@@ -71,12 +93,14 @@ def test_no_step_needs_scrolling(
     viewport = guide.parent()
     assert viewport is not None
     area = viewport.parent()
-    states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED)
-    for state in states:
-        seen = snapshot(state)
+    applied = snapshot(State.APPLIED)
+    states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED)
+    procedure = replace(applied.procedure, results=accepted(results))
+    tried = replace(applied, record=with_trials(applied.record, results), procedure=procedure)
+    for seen in (*map(snapshot, states), applied, tried):
         guide.show_snapshot(seen)
         guide.picture.show_snapshot(seen)
-        assert scrolled_px(area) == [0, 0], state
+        assert scrolled_px(area) == [0, 0], seen.procedure.state
         assert window.size().toTuple() == size_px
     card = guide.findChild(ResultCard)
     assert isinstance(card, ResultCard)
@@ -115,7 +139,7 @@ def test_with_larger_texts_no_view_of_a_small_window_needs_scrolling(
 
 
 def test_a_result_below_messages_needs_no_scrolling(
-    program: Program, snapshot: Maker, record: SessionRecord
+    program: Program, snapshot: Maker, record: SessionRecord, results: Results
 ) -> None:
     window, guide = program.window, program.wizard_panel
     window.resize(*SMALL_PX[0])
@@ -123,6 +147,8 @@ def test_a_result_below_messages_needs_no_scrolling(
     viewport = guide.parent()
     assert viewport is not None
     seen = snapshot(State.APPLIED)
+    procedure = replace(seen.procedure, results=accepted(results))
+    seen = replace(seen, record=with_trials(seen.record, results), procedure=procedure)
     for view in all_views(snapshot, record):
         is_done = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
         if not is_done or any(one.verdict is None for one in view.preconditions):
@@ -236,12 +262,19 @@ def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
     qtbot.waitUntil(start.isEnabled)  # all findings are shown
     review = window.findChild(ReviewPage)
     assert isinstance(review, ReviewPage)
-    review.show_session(replace(record, wearer=100 * "W"), results, 8.0)
-    for page in ("start", "review"):
+    named, tried = replace(record, wearer=100 * "W"), with_trials(record, results)
+    shown: tuple[tuple[Page, SessionRecord, Results, str], ...] = (
+        ("start", named, results, "↻ Repeat"),
+        ("review", named, results, "↻ Repeat"),
+        ("review", tried, accepted(results), "⚠ Trials over 8′"),
+    )
+    for page, one, found, word in shown:
+        review.show_session(one, found, 8.0)
         window.show_page(page)
+        assert text(review, "card-verdict-left") == f"Left eye: {word}"
         for area in window.findChildren(QScrollArea):
             if area.isVisible():
-                assert scrolled_px(area) == [0, 0], page
+                assert scrolled_px(area) == [0, 0], (page, word)
 
 
 @pytest.mark.parametrize("size_px", SMALL_PX)

@@ -12,8 +12,11 @@ from PySide6.QtPrintSupport import QPrinter
 from PySide6.QtWidgets import QApplication, QToolButton
 from pytestqt.qtbot import QtBot
 
+from handcal.rig_types import Rig
+from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
+from handcal.types import EYES, Verdict
 from handcal_gui.pages.wizard.picture import GuidePicture
 from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step
@@ -42,6 +45,22 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     printer.setOutputFileName(str(tmp_path / "result.pdf"))
     bar.print_to(printer)
     assert (tmp_path / "result.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_it_follows_the_trials(qtbot: QtBot, snapshot: Maker, rig: Rig) -> None:
+    seen = snapshot(State.APPLIED)
+    results = seen.procedure.results
+    assert results is not None
+    accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
+    seen = replace(seen, procedure=replace(seen.procedure, results=accepted))
+    calibrated_m = accepted.eyes["left"].shift_m
+    trial = make_trial(rig.eyes["left"], "left", 0.4, calibrated_m, [0.05, 0.0, 0.0])
+    bar = show(qtbot, ResultBar(), 700, 300)
+    for trials, word in (({}, "✓ Accept"), ({1: trial}, "⚠ Trials over 8′"), ({}, "✓ Accept")):
+        bar.show_snapshot(replace(seen, record=replace(seen.record, trials=trials)))
+        assert text(bar, "card-verdict-left") == f"Left eye: {word}"
+        assert text(bar, "card-verdict-right") == "Right eye: ✓ Accept"
+        assert f"Left eye: {word}" in bar.text()
 
 
 def test_the_camera_is_shown_until_an_eye_s_view_helps(qtbot: QtBot, snapshot: Maker) -> None:

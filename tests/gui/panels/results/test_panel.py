@@ -7,7 +7,7 @@ import numpy as np
 import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QPushButton, QTabWidget
 from pytestqt.qtbot import QtBot
@@ -24,6 +24,7 @@ from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.panel import ResultsPanel
 from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.panels.results.verdict_card import VerdictCard
+from handcal_gui.theme import colors
 from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.result_rows import QUANTITIES
 from tests.gui.helpers import child, show
@@ -95,19 +96,22 @@ def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
         number: make_trial(rig.eyes[eye], eye, 0.4, accepted.eyes[eye].shift_m, [0.05, 0.0, 0.0])
         for number, eye in enumerate(EYES)
     }
-    settings = {"calibration": {"solve": {"verdict": {"target_arcmin": 8.0}}}}
+    panel.set_target(7.5)
     for trials, told in (({}, False), (both, True), ({}, False)):
-        record = replace(seen.record, trials=trials, settings=settings)
+        record = replace(seen.record, trials=trials)
         panel.show_snapshot(replace(seen, record=record))
         table = child(panel, NumberTable, "numbers-of-both-eyes")
         assert table.horizontalScrollBar().maximum() == 0
         rows = child(panel, NumberTable, "numbers-of-both-eyes").as_text()
         assert ("Trials\t⚠ " in rows) == told
         for card in panel.findChildren(VerdictCard):
-            words = [label.text() for label in card.findChildren(QLabel)]
-            assert ("⚠ Trials over 8′" in words) == told
+            labels = card.findChildren(QLabel)
+            words = [label.text() for label in labels]
+            shade = labels[1].palette().windowText().color()
+            assert shade == QColor(colors().warning if told else colors().good)
+            assert ("⚠ Trials over 7.5′" in words) == told
             assert ("✓ Accept" in words) != told
-        assert ("Trials over 8′" in panel.as_text()) == told
+        assert ("Trials over 7.5′" in panel.as_text()) == told
 
 
 def test_without_alignments_no_tab_is_of_them(
@@ -166,7 +170,7 @@ def test_a_verdict_is_a_sign_a_word_and_a_reason(
     qtbot.addWidget(card)
     height = card.sizeHint().height()
     given = replace(results, verdicts={"left": Verdict(name, "because of this")}, advice={})
-    card.show_verdict(given, "left")
+    card.show_verdict(given)
     texts = [label.text() for label in card.findChildren(QLabel)]
     assert texts == ["Left eye", word, "Because of this"]
     assert card.sizeHint().height() == height

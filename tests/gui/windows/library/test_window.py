@@ -113,25 +113,28 @@ def test_the_trend_has_a_line_at_the_newest_target(qtbot: QtBot, tmp_path: Path)
 
 def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_path: Path) -> None:
     def said(arcmin: float, target_arcmin: float | None, *verdicts: str) -> tuple[str, str]:
-        left, *others = (EyeOutcome(one, 20, 5, None) for one in verdicts)
+        left, right = (EyeOutcome(one, 20, 5, None) for one in verdicts)
         entry = LibraryEntry(
             tmp_path,
             (0, 0),
             trials=2,
             trials_arcmin=6.0,
             target_arcmin=target_arcmin,
-            eyes=dict(zip(EYES, (replace(left, trials_arcmin=arcmin), *others), strict=False)),
+            eyes={
+                "left": replace(left, trials_arcmin=arcmin),
+                "right": replace(right, trials_arcmin=2.0),
+            },
         )
         row = make_row(entry)
         return row.texts[4], row.texts[8]
 
     both = "accept", "accept"
-    assert said(10.4, 8.0, *both) == ("⚠ Accept, trials over 8′", "⚠ 6.0 (n = 2)")
+    over = "⚠ Trials over 8′"
+    assert said(10.4, 8.0, *both) == (f"Left {over}, Right ✓ Accept", "⚠ 6.0 (n = 2)")
     assert said(7.9, 8.0, *both) == ("✓ Accept", "6.0 (n = 2)")
     assert said(10.4, None, *both) == ("✓ Accept", "6.0 (n = 2)")  # of an older version
-    assert said(10.4, 8.0, "accept", "repeat")[0] == (
-        "Left ⚠ Accept, Right ↻ Repeat, trials over 8′"
-    )
+    assert said(10.4, 8.0, "accept", "repeat")[0] == f"Left {over}, Right ↻ Repeat"
+    assert said(10.4, 8.0, "repeat", "accept")[0] == "Left ↻ Repeat, Right ✓ Accept"
 
 
 def test_sessions_whose_trials_contradict_the_verdict_are_found_and_stand_together() -> None:
