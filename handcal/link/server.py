@@ -241,6 +241,7 @@ class HeadsetServer(Sender):
         """Return the link's counters and estimates."""
         with self._changed:
             channel, fit = self._channel, self._clock.fit
+            given_up = self._outbox.given_up if self.connected else ()
             return LinkStatistics(
                 connected=self.connected,
                 sent=self._sent["datagrams"],
@@ -256,13 +257,12 @@ class HeadsetServer(Sender):
                 latency_ms=fit.round_trip_ns / 2e6 if fit else None,
                 clock_offset_ms=fit.offset_ns / 1e6 if fit else None,
                 clock_drift_ppm=fit.drift * 1e6 if fit else None,
+                clock_drift_uncertainty_ppm=fit.drift_uncertainty * 1e6 if fit else None,
                 clock_uncertainty_ms=fit.uncertainty_ns / 1e6 if fit else None,
                 bytes_sent=self._sent["bytes"],
                 bytes_received=self._received["bytes"],
                 given_up=dict(self._given_up),
-                missing=tuple(slot.label for slot in self._outbox.given_up)
-                if self.connected
-                else (),
+                missing=tuple(slot.label for slot in given_up),
                 notice=self._notice if time.monotonic() < self._notice_until_s else "",
             )
 

@@ -31,6 +31,7 @@ class LinkStatistics:
     """Half the median round trip."""
     clock_offset_ms: float | None
     clock_drift_ppm: float | None
+    clock_drift_uncertainty_ppm: float | None
     clock_uncertainty_ms: float | None
     """Headset's clock minus the host's; None until it is known."""
     bytes_sent: int

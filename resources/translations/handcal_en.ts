@@ -1741,10 +1741,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{} eye&apos;s outline moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Do not use this result: keep the offline calibration of {}, and follow the advice below.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1778,6 +1774,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Outline shown for {:g} s</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} eye&apos;s outline moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {}&#xa0;%</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2643,10 +2643,6 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Drift of the headset&apos;s clock, in parts per million; positive is fast</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Poses</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2708,6 +2704,10 @@ The slider goes to ±{:g} mm</source>
     </message>
     <message>
         <source>Datagrams that were not accepted, for the reasons below</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drift of the headset&apos;s clock over the last 30 seconds, in parts per million; positive is fast</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -61,7 +61,7 @@ def snapshot(tmp_path: Path) -> Iterator[Snapshot]:
             observation=Observation(State.SHOW_HAND, placed_hand(), "", True),
             camera=CameraStatus("Camera of the tests"),
             link=LinkStatistics(
-                True, 0, 0, 0, 0, 0, 0, 0, 0, {}, 60.0, None, None, None, None, 0, 0
+                True, 0, 0, 0, 0, 0, 0, 0, 0, {}, 60.0, None, None, None, None, None, 0, 0
             ),
             link_problem="",
             problem="",

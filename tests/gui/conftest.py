@@ -81,6 +81,7 @@ LINK = LinkStatistics(
     latency_ms=2.4,
     clock_offset_ms=5000.123,
     clock_drift_ppm=-12.0,
+    clock_drift_uncertainty_ppm=3.0,
     clock_uncertainty_ms=0.31,
     bytes_sent=4_500_000,
     bytes_received=650_000,

@@ -41,6 +41,9 @@ def test_offset_and_drift_through_asymmetric_jitter(seed: int) -> None:
         out = MS + round(chance.expovariate(1 / (4 * MS)))
         back = MS + round(chance.expovariate(1 / (0.5 * MS)))
         headset.ping(clock, START_NS + 100 * MS * i, out, back)
+        if clock.fit is not None:
+            apart = abs(clock.fit.drift - 80e-6)
+            assert apart < 3 * clock.fit.drift_uncertainty, "as wrong as it says, from the start"
     now = START_NS + 30_000 * MS
     assert clock.fit is not None
     error_ns = abs(clock.to_headset_ns(now) - headset.at(now))

@@ -22,6 +22,7 @@ START = LinkStatistics(
     latency_ms=None,
     clock_offset_ms=None,
     clock_drift_ppm=None,
+    clock_drift_uncertainty_ppm=None,
     clock_uncertainty_ms=None,
     bytes_sent=100_000,
     bytes_received=50_000,

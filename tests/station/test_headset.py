@@ -42,7 +42,8 @@ DEVICE = HeadsetIdentity("c" * 16, "Lab 9", "runtime 1", "app 3", VERSION)
 GOOD = LinkStatistics(
     connected=True, sent=1000, received=1000, lost=1, lost_inbound=2, resent=0, acked=9, unacked=0,
     failed=0, rejected={}, pose_rate_hz=60.2, latency_ms=3.0, clock_offset_ms=5.0,
-    clock_drift_ppm=1.0, clock_uncertainty_ms=0.1, bytes_sent=0, bytes_received=0,
+    clock_drift_ppm=1.0, clock_drift_uncertainty_ppm=1.0, clock_uncertainty_ms=0.1,
+    bytes_sent=0, bytes_received=0,
 )  # fmt: skip
 ABSENT = replace(GOOD, connected=False)
 VIEW = HeadsetView(np.eye(4), np.array([-0.3, 0.3, -0.2, 0.2]), 1440, 936)

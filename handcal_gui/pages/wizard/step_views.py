@@ -246,7 +246,7 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
             ButtonSpec(Action.SKIP, tr("&Skip")),
         ),
         snapshot.procedure.refusal,
-        fact=tr("{} eye's outline moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {} %").format(
+        fact=tr("{} eye's outline moved by {:.1f}′: {:.1f}′ {}, {:.1f}′ {}, size {}\u00a0%").format(
             EYE_WORDS[eye].capitalize(),
             total_arcmin,
             abs(moved.right_arcmin),

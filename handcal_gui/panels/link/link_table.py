@@ -64,7 +64,10 @@ _ROWS = {
         )
     },
     "clock-drift": {
-        _BOTH: tr("Drift of the headset's clock, in parts per million; positive is fast")
+        _BOTH: tr(
+            "Drift of the headset's clock over the last 30 seconds, in parts per million; positive "
+            "is fast"
+        )
     },
 }
 """Meaning of the numbers of each row, by half."""
@@ -151,11 +154,10 @@ class LinkTable(QWidget):
 def _texts(link: LinkStatistics, rates: LinkRates | None) -> dict[tuple[str, int], str]:
     """Return the texts of the numbers above, by name and half; those of a lost headset are past."""
     is_here = link.connected
-    drift_ppm = link.clock_drift_ppm if is_here else None
     texts = {
         ("latency", _IN): _text(link.latency_ms if is_here else None, "ms"),
         ("clock", _BOTH): _clock(link) if is_here else UNKNOWN,
-        ("clock-drift", _BOTH): UNKNOWN if drift_ppm is None else f"{signed(drift_ppm, 1)} ppm",
+        ("clock-drift", _BOTH): _drift(link) if is_here else UNKNOWN,
         ("poses", _IN): _text(link.pose_rate_hz if is_here else None, "Hz"),
         ("resent", _OUT): str(link.resent),
         ("in-flight", _OUT): str(link.unacked),
@@ -177,6 +179,13 @@ def _clock(link: LinkStatistics) -> str:
     if offset_ms is None or uncertainty_ms is None:
         return UNKNOWN
     return f"{signed(offset_ms / 1e3, 3)} s ± {uncertainty_ms:.1f} ms"
+
+
+def _drift(link: LinkStatistics) -> str:
+    drift_ppm, uncertainty_ppm = link.clock_drift_ppm, link.clock_drift_uncertainty_ppm
+    if drift_ppm is None or uncertainty_ppm is None:
+        return UNKNOWN
+    return f"{signed(drift_ppm, 0)} ± {uncertainty_ppm:.0f} ppm"
 
 
 def _text(value: float | None, unit: str, units_per_value: float = 1.0) -> str:

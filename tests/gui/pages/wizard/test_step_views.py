@@ -197,7 +197,7 @@ def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> 
     view = Wizard().view(seen)
     assert view.step is Step.VERIFY
     assert view.sentence.startswith("Close the right eye.")
-    assert view.fact == "Left eye's outline moved by 5.0′: 3.0′ left, 4.0′ down, size −0.6 %"
+    assert view.fact == "Left eye's outline moved by 5.0′: 3.0′ left, 4.0′ down, size −0.6\u00a0%"
     assert view.note == "Hold your hand still."
     assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
     assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]

@@ -76,7 +76,7 @@ def test_it_tells_how_the_link_does(panel: LinkPanel, snapshot: Maker) -> None:
     assert text(panel, "latency-2") == "2.4 ms"
     assert text(panel, "poses-2") == "60.0 Hz"
     assert text(panel, "clock-3") == "−5.000 s ± 0.3 ms"
-    assert text(panel, "clock-drift-3") == "−12.0 ppm"
+    assert text(panel, "clock-drift-3") == "−12 ± 3 ppm"
     assert text(panel, "in-flight-1") == "2"
     assert text(panel, "failed-1") == "1"
     assert text(panel, "resent-1") == "7"
@@ -110,7 +110,13 @@ def test_a_low_panel_shows_everything_without_scrolling(panel: LinkPanel, snapsh
 
 def test_what_is_not_known_is_a_dash(panel: LinkPanel, snapshot: Maker) -> None:
     unknown = dict.fromkeys(
-        ["latency_ms", "clock_offset_ms", "clock_drift_ppm", "clock_uncertainty_ms"]
+        [
+            "latency_ms",
+            "clock_offset_ms",
+            "clock_drift_ppm",
+            "clock_drift_uncertainty_ppm",
+            "clock_uncertainty_ms",
+        ]
     )
     panel.show_snapshot(snapshot(link=unknown))
     for name in ("latency-2", "clock-3", "clock-drift-3"):
