@@ -278,9 +278,6 @@ class Program(QObject):
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
-        verdict = self.preferences.station.calibration.solve.verdict
-        self.wizard_panel.picture.result.set_target(verdict.target_arcmin)
-        self.window.panels.results.set_target(verdict.target_arcmin)
         is_held = not self.preferences.runs_itself
         chosen = self.preferences
         self.live.start(open_station, chosen.plan, bridges=chosen.bridges, is_held=is_held)

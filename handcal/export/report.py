@@ -24,12 +24,12 @@ from handcal.export.trial_sections import (
     user_test_section,
 )
 from handcal.register.benefit import expected_error_arcmin
-from handcal.register.results import Results, read_rendered_shift_m
+from handcal.register.results import Results
 from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.session.comparison import read_comparisons
-from handcal.session.trial import trial_errors_arcmin
+from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
 from handcal.types import EYES, Alignment, Eye, EyeShift, Verdict, VerdictName
 
 _ORIGINS: Mapping[ShiftOrigin, str] = {
@@ -85,32 +85,28 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
 
 
 def _verdict(outcome: SessionOutcome) -> str:
-    """Return the verdict in one sentence, and another of each eye with trials over the target."""
+    """Return the verdict in one sentence, with what contradicts it in the trials."""
     if outcome.results is None:
         return "Nothing is solved: the session holds no alignment."
+    trials = eye_trials(outcome.results, outcome.record, outcome.settings.verdict.target_arcmin)
     parts = [
-        f"{eye} eye {_VERDICTS[verdict.name]}: {verdict.reason}"
+        f"{eye} eye {_VERDICTS[verdict.name]}{_doubt(verdict, trials.get(eye))}: {verdict.reason}"
         for eye, verdict in outcome.results.verdicts.items()
     ]
     tuned = [eye for eye in EYES if outcome.final(eye) == "fine_tuned"]
     if tuned:
         parts.append(f"{' and '.join(tuned)} fine-tuned by hand since")
     sentence = "; ".join(parts)
-    return f"{sentence[0].upper()}{sentence[1:]}.{_doubts(outcome, outcome.results)}"
+    return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def _doubts(outcome: SessionOutcome, results: Results) -> str:
-    """Return a sentence on each eye whose trials are over the lab's target."""
-    record, target_arcmin = outcome.record, outcome.settings.verdict.target_arcmin
-    errors = trial_errors_arcmin(
-        record.trials.values(), results.rendered_shift_m, read_rendered_shift_m(record.results)
-    )
-    return "".join(
-        f" In the trials of the {eye} eye, its calibrated φ was wrong by {mean_arcmin:.1f} arcmin "
-        f"on average (n = {len(found)}), over the lab's target of {target_arcmin:g}: calibrate "
-        "again if φ was set well by hand."
-        for eye, found in errors.items()
-        if (mean_arcmin := sum(found) / len(found)) > target_arcmin
+def _doubt(verdict: Verdict, trials: EyeTrials | None) -> str:
+    """Return that an accepted eye's trials are over the lab's target; empty for others."""
+    if trials is None or not is_doubted(verdict.name, trials):
+        return ""
+    return (
+        f", but wrong by {trials.mean_arcmin:.1f} arcmin in its trials (n = {trials.count}), over "
+        f"the lab's target of {trials.target_arcmin:g}"
     )
 
 

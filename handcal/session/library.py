@@ -27,7 +27,7 @@ from handcal.session.record import (
 )
 from handcal.session.session import Session
 from handcal.session.state import SessionEvent, SessionState, clean_wearer
-from handcal.session.trial import Trial, trial_errors_arcmin
+from handcal.session.trial import trial_errors_arcmin
 from handcal.types import EYES, Eye
 
 DELETED = ".deleted"
@@ -73,8 +73,6 @@ class LibraryEntry:
     alignments: int = 0
     trials: int = 0
     """Numbers of those that are not deleted."""
-    trials_arcmin: float | None = None
-    """Mean error of all trials, each counting once."""
     target_arcmin: float | None = None
     """Largest expected error that the lab accepts, as set in the session; None if unknown."""
     is_finished: bool = False
@@ -207,7 +205,6 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
     except FileError as error:
         return LibraryEntry(path, stamp, problem=str(error))
     state = replayed.state
-    trials = tuple(state.trials.active.values())
     return LibraryEntry(
         path,
         stamp,
@@ -218,8 +215,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         headset=state.facts.headset.name if state.facts.headset else "",
         eyes=MappingProxyType(eye_outcomes(path, replayed)),
         alignments=len(state.alignments.active),
-        trials=len(trials),
-        trials_arcmin=_mean_arcmin(trials),
+        trials=len(state.trials.active),
         target_arcmin=_lab_target_arcmin(state.settings),
         is_finished=state.is_finished,
         is_repaired=any(one.name == SessionEvent.REPAIRED for one in replayed.journal.events),
@@ -253,10 +249,6 @@ def _is_sound(file: Path, checksum: str) -> bool:
         return sha256(read_limited(file, MAX_ALIGNMENT_BYTES)) == checksum
     except FileError:
         return False
-
-
-def _mean_arcmin(trials: Sequence[Trial]) -> float | None:
-    return float(np.mean([trial.error_arcmin.mean() for trial in trials])) if trials else None
 
 
 def _lab_target_arcmin(settings: Mapping[str, Any] | None) -> float | None:

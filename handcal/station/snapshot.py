@@ -10,6 +10,7 @@ from handcal.camera.feed import CameraStatus
 from handcal.hand.settings import SegmentSettings
 from handcal.link.statistics import LinkStatistics
 from handcal.register.results import Results
+from handcal.register.verdict import VerdictSettings
 from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
 from handcal.station.hands import PlacedHand
@@ -52,6 +53,8 @@ class Procedure:
     """The newest verification of each eye."""
     former_shift_m: Mapping[Eye, Float64] = field(default_factory=dict)
     """each (3,); φ to which `Calibration.go_back` returns."""
+    target_arcmin: float = VerdictSettings().target_arcmin
+    """The lab's target for the error."""
     refused_for: str = ""
     """`refusal` in the past tense, if the live hand shows whether its cause lasts; else empty."""
 
@@ -79,6 +82,7 @@ def read_procedure(
         verifying=None if calibration.verifying is None else calibration.verifying.view(),
         verifications=dict(calibration.verifications),
         former_shift_m=calibration.former_shift_m,
+        target_arcmin=settings.solve.verdict.target_arcmin,
         refused_for=calibration.refused_for,
     )
 

@@ -133,11 +133,10 @@ class ReviewController(QObject):
         panels = self._window.panels
         lack = _without_alignments(record)
         target_arcmin = stored.settings.verdict.target_arcmin
-        panels.results.set_target(target_arcmin)
         panels.results.show_results(
             stored.results, record.alignments, record.rig, has_verdicts=False
         )
-        panels.results.show_trials(record)
+        panels.results.show_trials(record, target_arcmin)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)
         panels.trials.set_read_only(True)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.register.results import Results
+from handcal.session.judged_trials import eye_trials
 from handcal.session.session import SessionRecord
+from handcal.types import Eye
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.translation import tr
@@ -18,7 +20,7 @@ from handcal_gui.widgets.fields import button, main_button, paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.result_card import ResultCard
-from handcal_gui.widgets.result_rows import eye_trials
+from handcal_gui.widgets.result_rows import eyes_text, fine_tuned_texts
 from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.session_rows import RESUME_HELP
 from handcal_gui.widgets.times import local_time
@@ -121,7 +123,8 @@ class ReviewPage(QWidget):
         self._fit()
         while self._facts.rowCount():
             self._facts.removeRow(0)
-        for name, caption, fact in _facts(record, note):
+        tuned = list(fine_tuned_texts(results, record)) if results else []
+        for name, caption, fact in _facts(record, tuned, note):
             text = paragraph(f"review{name}", fact)
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._facts.addRow(QLabel(caption, alignment=Qt.AlignmentFlag.AlignTop), text)
@@ -147,7 +150,9 @@ class ReviewPage(QWidget):
         self.residuals.setVisible(self._has_maps and room_px > _LEAST_MAP_PX)
 
 
-def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str, str]]:
+def _facts(
+    record: SessionRecord, tuned: Sequence[Eye], note: str
+) -> Iterator[tuple[str, str, str]]:
     """Yield the name, the caption and the text of each fact about a session."""
     yield "Started", tr("Started"), local_time(record.events[0].time)
     yield "Rig", tr("Rig"), record.rig.name
@@ -159,7 +164,8 @@ def _facts(record: SessionRecord, note: str) -> Iterator[tuple[str, str, str]]:
         else pluralize(alignments, tr("alignment"), tr("alignments")),
         pluralize(len(record.trials), tr("trial"), tr("trials")),
     )
-    yield "Contents", tr("Contents"), f"{', '.join(counts)}; {state}"
+    by_hand = (tr("{} fine-tuned").format(eyes_text(tuned).lower()),) if tuned else ()
+    yield "Contents", tr("Contents"), f"{', '.join((*counts, *by_hand))}; {state}"
     yield "Folder", tr("Folder"), str(record.path)
     if note:
         yield "Note", tr("Note"), note

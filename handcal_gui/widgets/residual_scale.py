@@ -15,17 +15,20 @@ from handcal_gui.widgets.splat import rgb
 
 LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
 """End of the colour scale: the RMS that the verdict rejects. Fixed, so that views compare."""
-_VIRIDIS = ("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b")
-"""Matplotlib's map without its ends, which have too little contrast with the canvas."""
+_VIRIDIS = (
+    *("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b"),
+    "#fde725",
+)
+"""Matplotlib's map without its darkest colour."""
 OUTLIER = "#ff00ff"
 """Points without a partner. Of no theme, as colour-blind people must tell it from the whole map."""
 _BAR_PX = 12
 
 
 def residual_ramp() -> UInt8:
-    """Return (8, 3) RGB from 0 to `LARGEST_MM`, in increasing contrast with the canvas."""
+    """Return (N, 3) RGB from 0 to `LARGEST_MM`, in increasing contrast with the canvas."""
     ramp = np.array([rgb(stop) for stop in _VIRIDIS], np.uint8)
-    return ramp if is_dark() else ramp[::-1]
+    return ramp[2:] if is_dark() else ramp[-2::-1]  # without what the canvas nearly hides
 
 
 def residual_colors(residuals_m: Float64) -> UInt8:

@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.register.results import USED, Results
+from handcal.session.judged_trials import EyeTrials
 from handcal.types import EYES, Eye, phi_text
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
@@ -17,7 +18,6 @@ from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
-    EyeTrials,
     verdict_color,
     verdict_reason,
     verdict_word,

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from handcal.register.benefit import expected_error_arcmin
-from handcal.register.results import Results, read_rendered_shift_m
+from handcal.register.results import Results
 from handcal.report.cells import signed
 from handcal.rig_types import EyeDisplay, Rig
+from handcal.session.judged_trials import EyeTrials, is_doubted
 from handcal.session.record import SessionRecord
-from handcal.session.trial import trial_errors_arcmin
+from handcal.session.trial import SAME_SHIFT_M, Trial
 from handcal.types import EYES, Eye, EyeShift, VerdictName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
@@ -141,49 +145,27 @@ QUANTITIES = (
 _ANOTHER = tr("Expected error after one more alignment like these")
 _ALONE: Mapping[Eye, str] = {"left": tr("{} left"), "right": tr("{} right")}
 _TRIALS = tr(
-    "Error of this φ in the user-test trials, the mean, and their number. ⚠: over the\n"
-    "lab's target; look at the trials, and calibrate again if φ was set well by hand."
+    "Error of this φ in the user-test trials, the mean, and their number; trials of an earlier φ\n"
+    "are only counted. ⚠: over the lab's target; look at the trials, and calibrate again if φ was\n"
+    "set well by hand."
 )
 _EYE_DISTANCE = tr("Eye distance")
 _EYE_DISTANCE_MEANING = tr("Distance between the two solved eye positions")
 
 
-@dataclass(frozen=True, slots=True)
-class EyeTrials:
-    """The trials of one eye's φ, against the lab's target."""
+def trial_row(judged: Mapping[Eye, EyeTrials], trials: Iterable[Trial]) -> Row:
+    """Return the mean error of each eye's trials; ⚠ marks one over the lab's target.
 
-    count: int
-    mean_arcmin: float
-    target_arcmin: float
-
-    @property
-    def is_over(self) -> bool:
-        """True if the mean error is over the target."""
-        return self.mean_arcmin > self.target_arcmin
-
-
-def eye_trials(
-    results: Results, record: SessionRecord, target_arcmin: float
-) -> dict[Eye, EyeTrials]:
-    """Return the trials of a session's results, of each eye that has some."""
-    errors = trial_errors_arcmin(
-        record.trials.values(), results.rendered_shift_m, read_rendered_shift_m(record.results)
-    )
-    return {
-        eye: EyeTrials(len(found), sum(found) / len(found), target_arcmin)
-        for eye, found in errors.items()
-    }
-
-
-def trial_row(trials: Mapping[Eye, EyeTrials]) -> Row:
-    """Return the mean error of each eye's trials; ⚠ marks one over the lab's target."""
-    cells = (_trials_cell(trials.get(eye)) for eye in EYES)
+    Of an eye with trials of an earlier φ only, their number.
+    """
+    counts = Counter(one.eye for one in trials)
+    cells = (_trials_cell(judged.get(eye), counts[eye]) for eye in EYES)
     return Row(tr("Trials"), tuple(cells), _TRIALS)
 
 
-def _trials_cell(found: EyeTrials | None) -> str:
+def _trials_cell(found: EyeTrials | None, count: int) -> str:
     if found is None:
-        return NOTHING
+        return tr("{} of earlier φ").format(count) if count else NOTHING
     text = tr("⚠ {:.1f}′ n={}") if found.is_over else tr("{:.1f}′ n={}")
     return text.format(found.mean_arcmin, found.count)
 
@@ -217,14 +199,19 @@ def result_rows(results: Results, rig: Rig, trials: Row | None = None) -> list[R
     return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
 
 
+def fine_tuned_texts(results: Results, record: SessionRecord) -> dict[Eye, str]:
+    """Return φ of each eye whose final φ was set by hand after the results."""
+    calibrated_m = results.rendered_shift_m
+    return {
+        eye: tr("φ = ({}) mm").format(", ".join(signed(1e3 * float(one), 2) for one in tuned_m))
+        for eye, tuned_m in (record.fine_tuned or {}).items()
+        if eye in calibrated_m and np.abs(tuned_m - calibrated_m[eye]).max() >= SAME_SHIFT_M
+    }
+
+
 def eyes_text(eyes: Sequence[Eye]) -> str:
     """Return the name of one eye, or of both."""
     return EYE_NAMES[eyes[0]] if len(eyes) == 1 else tr("Both eyes")
-
-
-def is_doubted(verdict: VerdictName, trials: EyeTrials | None) -> bool:
-    """Return whether an accepted eye must not be ticked, as its trials are over the target."""
-    return verdict == "accept" and trials is not None and trials.is_over
 
 
 def verdict_word(results: Results, eye: Eye, trials: EyeTrials | None = None) -> str:

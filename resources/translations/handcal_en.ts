@@ -959,6 +959,10 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} fine-tuned</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Contents</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1505,6 +1509,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Verified, and tested in trials, before the alignments changed. Finish, or verify an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The wearer has verified and corrected the result. Finish, or verify an eye again.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1634,6 +1642,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Print… (Ctrl+P)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, fine-tuned</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1785,6 +1797,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The session is finished, but trials of {} are over the target: go back to measure more, or continue with the next wearer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Everything is already saved. The session finishes by itself; Hold keeps it open.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1793,7 +1809,15 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Trials of {} are over the target. Go back to measure more, or finish as it is; all is saved.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Solve the problem below, then finish the session.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials of {} are over the target. Add an alignment, or finish as it is.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4060,11 +4084,25 @@ root mean square over the inliers</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Error of this φ in the user-test trials, the mean, and their number; trials of an earlier φ
+are only counted. ⚠: over the lab&apos;s target; look at the trials, and calibrate again if φ was
+set well by hand.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Eye distance</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{} of earlier φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Eye distance, solved</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>φ = ({}) mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4097,11 +4135,6 @@ root mean square over the inliers</source>
     </message>
     <message>
         <source>Expected error after one more alignment like these</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Error of this φ in the user-test trials, the mean, and their number. ⚠: over the
-lab&apos;s target; look at the trials, and calibrate again if φ was set well by hand.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4412,6 +4445,14 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>⚠ {} (n = {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} (n = {})</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Of the newest results; ⚠ trials of an accepted φ are over the lab&apos;s target on average</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4436,11 +4477,14 @@ the coloured bars of the small picture</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>{:.1f} (n = {})</source>
+        <source>Trials ′
+left / right</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>⚠ {:.1f} (n = {})</source>
+        <source>Error of each eye&apos;s last calibrated φ relative to φ set by hand, left / right, in arcminutes:
+the mean over its trials; and the number of all trials of the session.
+⚠ over the lab&apos;s target: look at the trials; if φ was set well by hand, calibrate again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4471,17 +4515,6 @@ left / right</source>
     <message>
         <source>Error of the calibration that the wearer&apos;s verification found, and corrected, left / right,
 in arcminutes; – was not verified</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Trials ′</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all trials
-of the session, also of a calibration that was then repeated, and their number.
-⚠ those of an eye&apos;s last calibration are over the lab&apos;s target: look at the trials;
-if φ was set well by hand, calibrate again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

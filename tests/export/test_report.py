@@ -25,7 +25,7 @@ from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, co
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
 from handcal.session.trial import Trial
-from handcal.types import Eye, Float64
+from handcal.types import EYES, Eye, Float64, Verdict
 
 COMPARED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0])}
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]
@@ -104,8 +104,12 @@ def test_the_verdict_says_that_trials_contradict_it(outcome: SessionOutcome) -> 
         record = replace(outcome.record, trials={number: changed})
         return session_report(replace(outcome, record=record)).lead
 
-    said = "In the trials of the left eye, its calibrated φ was wrong by 20.7 arcmin on average"
-    assert f". {said} (n = 1), over the lab's target of 8:" in lead(calibrated_shift_m=shift_m)
+    accepted = dict.fromkeys(EYES, Verdict("accept", "as told"))
+    outcome = replace(outcome, results=replace(outcome.results, verdicts=accepted))
+    said = ", but wrong by 20.7 arcmin in its trials (n = 1), over the lab's target of 8: as told;"
+    assert f"Left eye accepted{said} right eye accepted: as told" in lead(
+        calibrated_shift_m=shift_m
+    )
     assert said not in lead(calibrated_shift_m=shift_m + 1e-3), "a former calibration's"
     assert said not in session_report(outcome).lead
 

@@ -8,12 +8,14 @@ from typing import Any
 
 from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
+from handcal.session.trial import make_trial
 from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import EYES, Eye, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.planned import PlannedWizard
+from handcal_gui.pages.wizard.step_views import save_view
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
 from handcal_gui.pages.wizard.view import Action, Step, WizardView
 
@@ -49,6 +51,15 @@ def judged(
     return replace(seen, procedure=replace(seen.procedure, results=results))
 
 
+def tried(seen: Snapshot) -> Snapshot:
+    """Return a snapshot with a trial of the left eye's result, far over any target."""
+    assert seen.procedure.results is not None
+    calibrated_m = seen.procedure.results.rendered_shift_m["left"]
+    display = seen.record.rig.eyes["left"]
+    trials = {1: make_trial(display, "left", 0.4, calibrated_m, [0.05, 0.0, 0.0])}
+    return replace(seen, record=replace(seen.record, trials=trials))
+
+
 def actions(view: WizardView) -> list[Action]:
     return [offer.action for offer in view.others]
 
@@ -78,6 +89,10 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
         for is_finished in (False, True):
             finished = replace(record, is_finished=is_finished)
             views.append(wizard.view(snapshot(State.APPLIED, record=finished)))
+    doubted = tried(judged(snapshot, "accept", "accept", State.APPLIED))
+    for is_finished in (False, True):
+        seen = replace(doubted, record=replace(doubted.record, is_finished=is_finished))
+        views.append(save_view(seen, is_held=True))
     for is_held in (False, True):
         views.extend(_planned_views(snapshot, record, is_held=is_held))
     assert {view.step for view in views} == set(Step)

@@ -27,6 +27,7 @@ from handcal_gui.pages.wizard.step_views import (
     align_view,
     connect_view,
     distance,
+    doubt_sentence,
     eye_names,
     falsified_view,
     kept_fact,
@@ -243,6 +244,11 @@ class PlannedWizard(Wizard):
         main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
         if set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
+            if snapshot.record.trials:
+                text = tr(
+                    "Verified, and tested in trials, before the alignments changed. Finish, or "
+                    "verify an eye again."
+                )
             if snapshot.record.verified_now >= set(self.usable_eyes):
                 text = tr(
                     "The wearer has verified and corrected the result. Finish, or verify an eye "
@@ -253,6 +259,8 @@ class PlannedWizard(Wizard):
                         "Verified; the result is not used for every eye. Finish, or verify again."
                     )
             main = ButtonSpec(Action.NEXT, tr("Finish"))
+        if doubt := doubt_sentence(snapshot):
+            text, main = doubt, ButtonSpec(Action.NEXT, tr("Finish as it is"))
         verify = (VERIFY_AGAIN[eye] for eye in self.usable_eyes)
         others = (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *verify)
         return WizardView(Step.VERIFY, text, preconditions, main, others)

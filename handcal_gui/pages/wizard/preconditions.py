@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from handcal.session.judged_trials import eye_trials, is_doubted
 from handcal.station.snapshot import Snapshot
+from handcal.types import Eye
 from handcal_gui.pages.wizard.view import EYE_WORDS, Precondition
 from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence
@@ -43,6 +45,16 @@ def hand_found(snapshot: Snapshot) -> Precondition:
         return Precondition(tr("Hand found"), True)
     without = tr("No image from the camera") if snapshot.camera.problem else tr("No hand in view")
     return Precondition((seen and sentence(seen.problem)) or without, False)
+
+
+def doubted_eyes(snapshot: Snapshot) -> list[Eye]:
+    """Return the accepted eyes whose user-test trials are over the lab's target."""
+    procedure = snapshot.procedure
+    results = procedure.results
+    if results is None:
+        return []
+    trials = eye_trials(results, snapshot.record, procedure.target_arcmin)
+    return [eye for eye, one in results.verdicts.items() if is_doubted(one.name, trials.get(eye))]
 
 
 def eyes_accepted(snapshot: Snapshot) -> tuple[Precondition, ...]:

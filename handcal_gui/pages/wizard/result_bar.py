@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.register.results import Results
 from handcal.register.verdict import VerdictSettings
+from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal.types import Eye
@@ -21,7 +22,7 @@ from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.printing import ask_printer
 from handcal_gui.widgets.result_card import ResultCard, result_text
-from handcal_gui.widgets.result_rows import EyeTrials, eye_trials
+from handcal_gui.widgets.result_rows import EYE_NAMES, fine_tuned_texts
 from handcal_gui.widgets.times import local_time
 
 
@@ -59,15 +60,11 @@ class ResultBar(QWidget):
         hbox(self._blink_button, *others, on=self.buttons, margins=0, spacing=SPACING_PX)
         vbox(self.card, on=self, margins=0)
 
-    def set_target(self, target_arcmin: float) -> None:
-        """Set the lab's target for the error."""
-        self._target_arcmin = target_arcmin
-
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the results of a snapshot if they have changed."""
         results, shown = snapshot.procedure.results, self._record
         is_written = shown is None or snapshot.record.trials is not shown.trials
-        self._record = snapshot.record
+        self._record, self._target_arcmin = snapshot.record, snapshot.procedure.target_arcmin
         if results is not self._results or is_written:
             self._results = results
             self.card.show_results(results, self._target_arcmin, self._trials())
@@ -82,7 +79,9 @@ class ResultBar(QWidget):
         """Return the result as text; empty if there is none."""
         if self._results is None or self._record is None:
             return ""
-        head = _head(self._record)
+        head = dict(_head(self._record))
+        for eye, phi in fine_tuned_texts(self._results, self._record).items():
+            head[tr("{}, fine-tuned").format(EYE_NAMES[eye])] = phi
         return result_text(self._results, self._target_arcmin, head, self._trials())
 
     def _trials(self) -> Mapping[Eye, EyeTrials]:

@@ -14,6 +14,7 @@ from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName
 from handcal_gui.pages.wizard.preconditions import (
+    doubted_eyes,
     eyes_accepted,
     hand_found,
     hand_still,
@@ -279,6 +280,7 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
     )
     others = (ButtonSpec(Action.EXPORT, tr("E&xport…")), ButtonSpec(Action.BACK, tr("&Back")))
     judged = preconditions[1:]
+    doubted = doubted_eyes(snapshot)
     is_settled = bool(judged) and all(one.verdict in SETTLED for one in judged)
     is_verified = is_settled and len(snapshot.record.verified_now) == len(judged)
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
@@ -291,6 +293,11 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
                 "The session is finished, its result not accepted: go back to measure more, or "
                 "continue with the next wearer."
             )
+        elif doubted:
+            ended = tr(
+                "The session is finished, but trials of {} are over the target: go back to measure "
+                "more, or continue with the next wearer."
+            ).format(eye_names(doubted))
         return WizardView(
             Step.SAVE,
             ended,
@@ -305,6 +312,11 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         finish = tr("Everything is already saved. Finish the session when you are done.")
     if judged and not is_settled:
         finish = tr("Not accepted. Go back to measure more, or finish as it is; all is saved.")
+    elif doubted:
+        finish = tr(
+            "Trials of {} are over the target. Go back to measure more, or finish as it is; all is "
+            "saved."
+        ).format(eye_names(doubted))
     if snapshot.problem:
         finish = tr("Solve the problem below, then finish the session.")
     return WizardView(
@@ -314,9 +326,16 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         ButtonSpec(Action.FINISH, tr("Finish session")),
         others,
         fact=kept_fact(snapshot.procedure),
-        runs_after_s=READ_S if is_settled and not snapshot.problem else None,
+        runs_after_s=READ_S if is_settled and not (doubted or snapshot.problem) else None,
         unearned=unearned,
     )
+
+
+def doubt_sentence(snapshot: Snapshot) -> str:
+    """Return the next step of a verified result that its trials contradict; else empty."""
+    doubted = doubted_eyes(snapshot)
+    text = tr("Trials of {} are over the target. Add an alignment, or finish as it is.")
+    return text.format(eye_names(doubted)) if doubted else ""
 
 
 def kept_fact(procedure: Procedure) -> str:

@@ -29,6 +29,7 @@ from handcal_gui.pages.wizard.step_views import (
     align_view,
     connect_view,
     distance,
+    doubt_sentence,
     eye_names,
     falsified_view,
     kept_fact,
@@ -273,14 +274,16 @@ class Wizard:
                 ButtonSpec(Action.ANOTHER, tr("Add alignment")),
                 (ButtonSpec(Action.NEXT, tr("Finish a&s it is")), *each),
             )
-        if not self._skipped:
+        doubt = doubt_sentence(snapshot)
+        if doubt or not self._skipped:
             return WizardView(
                 Step.VERIFY,
-                tr(
+                doubt
+                or tr(
                     "The wearer has verified and corrected the result. Finish, or add an alignment."
                 ),
                 preconditions,
-                ButtonSpec(Action.NEXT, tr("Finish")),
+                ButtonSpec(Action.NEXT, tr("Finish as it is") if doubt else tr("Finish")),
                 (ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *each),
             )
         return WizardView(

@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QWidget
 
 from handcal.station.snapshot import Snapshot
+from handcal.station.states import State
 from handcal.types import EYES, EyePlan
 from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.action_bar import ActionBar
@@ -290,12 +291,15 @@ class WizardPanel(QWidget):
 
     def _count(self, snapshot: Snapshot, view: WizardView) -> tuple[int, int, str]:
         """Return the alignments made and planned, or the eyes verified, and their name."""
+        procedure = snapshot.procedure
         if view.omitted or view.step in OF_THE_RESULT:
             eyes = 1 if self.wizard.plan in EYES else 2
-            return len(snapshot.record.verified_now), eyes, tr("verified")
-        done = len(snapshot.procedure.alignments)
+            again = {procedure.verifying.eye} if procedure.verifying is not None else set()
+            return len(snapshot.record.verified_now - again), eyes, tr("verified")
+        done = len(procedure.alignments)
         planned = 2 if self.wizard.plan == "each" else 1
-        return done, max(planned, done), tr("aligned")
+        more = procedure.state is State.ALIGN
+        return done, max(planned, done + more), tr("aligned")
 
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)

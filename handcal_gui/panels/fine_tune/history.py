@@ -13,6 +13,7 @@ from handcal.types import Eye, Float64
 
 Shifts: TypeAlias = Mapping[Eye, Float64]
 """φ of each eye, (3,) float64, metres."""
+_NONE: Shifts = MappingProxyType({})
 
 
 def same_shifts(one: Shifts, other: Shifts) -> bool:
@@ -57,8 +58,10 @@ class ShiftHistory:
     """
 
     def __init__(self, shifts_m: Shifts) -> None:
-        self._steps = [_frozen(shifts_m)]
+        self._base = _frozen(shifts_m)
+        self._steps = [self._base]
         self._at = 0
+        self._before = self._base, self._steps, self._at
         self.is_replaced = False
 
     @property
@@ -93,16 +96,45 @@ class ShiftHistory:
         self._at += not (goes_on and self.can_undo)
         self._steps[self._at :] = [_frozen(shifts_m)]
 
-    def after(self, shifts_m: Shifts) -> ShiftHistory:
-        """Return the history with shifts set by others: an undo away from any set by hand."""
-        if not self.can_undo:
-            return ShiftHistory(shifts_m)
-        if self.is_replaced and same_shifts(shifts_m, self._steps[self._at - 1]):
-            self.undo()  # others set what had been set by hand
-        else:
-            self.change(shifts_m, goes_on=self.is_replaced)
-            self.is_replaced = True
+    def after(
+        self, shifts_m: Shifts, calibrated_m: Shifts = _NONE, by_hand_m: Shifts = _NONE
+    ) -> ShiftHistory:
+        """Return the history with shifts set by others: an undo away from any set by hand.
+
+        In all steps, the eyes that were not set by hand have the new shifts.
+
+        Parameters
+        ----------
+        shifts_m : mapping of eye to (3,) float64
+        calibrated_m, by_hand_m : mapping of eye to (3,) float64
+            Calibrated shifts, and those last set by hand: the shifts of a resumed session.
+        """
+        if self.is_replaced:
+            self._base, self._steps, self._at = self._before
+            self.is_replaced = False
+            if same_shifts(shifts_m, self.present):
+                return self  # others set again what had been set by hand
+        if same_shifts(self.present, self._base):
+            if not same_shifts(shifts_m, by_hand_m):
+                return ShiftHistory(shifts_m)
+            resumed = ShiftHistory({**shifts_m, **calibrated_m})
+            resumed.change(shifts_m)
+            return resumed
+        self._before = self._base, self._steps, self._at
+        self._steps = [self._on(shifts_m, one) for one in self._steps[: self._at + 1]]
+        self._base = _frozen(shifts_m)
+        self.change(shifts_m)
+        self.is_replaced = True
         return self
+
+    def _on(self, base_m: Shifts, shifts_m: Shifts) -> Shifts:
+        """Return a step as if it had been set by hand upon other shifts."""
+        by_hand = {
+            eye: one
+            for eye, one in shifts_m.items()
+            if eye not in base_m or not np.array_equal(one, self._base[eye])
+        }
+        return _frozen({**base_m, **by_hand})
 
     def undo(self) -> None:
         """Undo the last change, if there is one."""

@@ -148,7 +148,8 @@ class FineTunePanel(QWidget):
         obstacle = find_obstacle(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:
-            self._begin(self._history.after(snapshot.procedure.applied_shift_m))
+            applied, by_hand = snapshot.procedure.applied_shift_m, snapshot.record.fine_tuned
+            self._begin(self._history.after(applied, calibrated, by_hand or {}))
         is_same = same_shifts(solved, self._solved) and same_shifts(calibrated, self._calibrated)
         if is_new or obstacle != self._obstacle or not is_same:
             self._obstacle, self._solved, self._calibrated = obstacle, solved, calibrated

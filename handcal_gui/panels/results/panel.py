@@ -9,8 +9,8 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
-from handcal.register.verdict import VerdictSettings
 from handcal.rig_types import Rig
+from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial
 from handcal.station.snapshot import Snapshot
@@ -29,9 +29,7 @@ from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     PHI,
-    EyeTrials,
     another_text,
-    eye_trials,
     result_rows,
     single_alignment_rows,
     trial_row,
@@ -73,7 +71,6 @@ class ResultsPanel(QWidget):
         self._results: Results | None = None
         self._trials: Mapping[int, Trial] = {}
         self._judged: Mapping[Eye, EyeTrials] = {}
-        self._target_arcmin = VerdictSettings().target_arcmin
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
         self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
@@ -90,16 +87,12 @@ class ResultsPanel(QWidget):
         self._lay_out()
         self._add_copy()
 
-    def set_target(self, target_arcmin: float) -> None:
-        """Set the lab's target for the trials shown next."""
-        self._target_arcmin = target_arcmin
-
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the results of a snapshot if they have changed."""
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
             self.show_results(procedure.results, record.alignments, record.rig)
-        self.show_trials(record)
+        self.show_trials(record, procedure.target_arcmin)
 
     def show_results(
         self,
@@ -139,11 +132,11 @@ class ResultsPanel(QWidget):
         self._compare.show_results(results, rig)
         self._fit()
 
-    def show_trials(self, record: SessionRecord) -> None:
-        """Show the errors of a session's trials among the numbers, if there are any."""
+    def show_trials(self, record: SessionRecord, target_arcmin: float) -> None:
+        """Show the errors of a session's trials among the numbers, against the lab's target."""
         if self._results is not None and record.trials is not self._trials:
             self._trials = record.trials
-            self._judged = eye_trials(self._results, record, self._target_arcmin)
+            self._judged = eye_trials(self._results, record, target_arcmin)
             self._show_eyes(self._results, record.rig)
             self._fit()
 
@@ -151,7 +144,7 @@ class ResultsPanel(QWidget):
         """Show the verdicts and the numbers of both eyes, with those of their trials."""
         for eye, card in self._cards.items():
             card.show_verdict(results, self._judged.get(eye))
-        row = trial_row(self._judged) if self._judged else None
+        row = trial_row(self._judged, self._trials.values()) if self._trials else None
         names = [EYE_NAMES[eye] for eye in EYES]
         self._numbers.show_rows(names, result_rows(results, rig, row))
 

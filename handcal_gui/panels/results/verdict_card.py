@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
 from handcal.register.results import Results
+from handcal.session.judged_trials import EyeTrials
 from handcal.types import Eye
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.translation import tr
@@ -14,7 +15,6 @@ from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     NOTHING,
-    EyeTrials,
     verdict_color,
     verdict_reason,
     verdict_word,

@@ -34,11 +34,12 @@ FILTERS: Mapping[Filter, str] = {
 }
 _Index: TypeAlias = QModelIndex | QPersistentModelIndex
 _NO_INDEX = QModelIndex()
-_Kind: TypeAlias = Literal["before", "found", "after"]
+_Kind: TypeAlias = Literal["before", "found", "after", "trials"]
 _KINDS: Mapping[_Kind, Callable[[EyeOutcome], float | None]] = {
     "before": lambda one: one.before_arcmin,
     "found": lambda one: one.found_arcmin,
     "after": after_arcmin,
+    "trials": lambda one: one.trials_arcmin,
 }
 
 
@@ -110,11 +111,16 @@ def _errors(kind: _Kind) -> Callable[[LibraryEntry], str]:
 
 
 def _trials(entry: LibraryEntry) -> str:
-    if entry.trials_arcmin is None:
+    if not entry.trials:
         return NOTHING
     is_over = any(_is_over(one, entry) for one in entry.eyes.values())
-    said = tr("⚠ {:.1f} (n = {})") if is_over else tr("{:.1f} (n = {})")
-    return said.format(entry.trials_arcmin, entry.trials)
+    said = tr("⚠ {} (n = {})") if is_over else tr("{} (n = {})")
+    return said.format(_errors("trials")(entry) if entry.eyes else NOTHING, entry.trials)
+
+
+def _worst_trials_arcmin(entry: LibraryEntry) -> float | None:
+    found = (one.trials_arcmin for one in entry.eyes.values())
+    return max((one for one in found if one is not None), default=None)
 
 
 def _known_first(value: float | None) -> float:
@@ -180,15 +186,15 @@ COLUMNS = (
         is_number=True,
     ),
     _Column(
-        tr("Trials ′"),
+        tr("Trials ′\nleft / right"),
         tr(
-            "Error of the calibrated φ relative to φ set by hand, in arcminutes: the mean over all "
-            "trials\nof the session, also of a calibration that was then repeated, and their "
-            "number.\n⚠ those of an eye's last calibration are over the lab's target: look at the "
-            "trials;\nif φ was set well by hand, calibrate again"
+            "Error of each eye's last calibrated φ relative to φ set by hand, left / right, in "
+            "arcminutes:\nthe mean over its trials; and the number of all trials of the session.\n"
+            "⚠ over the lab's target: look at the trials; if φ was set well by hand, calibrate "
+            "again"
         ),
         _trials,
-        lambda e: _known_first(e.trials_arcmin),
+        lambda e: _known_first(_worst_trials_arcmin(e)),
         is_number=True,
     ),
     _Column(tr("State"), tr("Check lists what is damaged; Repair copies the rest"), _state, _state),

@@ -9,6 +9,7 @@ import pytest
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig_types import Rig
+from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial, make_trial
 from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verdict
@@ -16,10 +17,8 @@ from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
     PHI,
-    EyeTrials,
     another_text,
     comparison_rows,
-    eye_trials,
     result_rows,
     single_alignment_rows,
     trial_row,
@@ -168,8 +167,10 @@ def test_trials_over_the_target_are_marked(
         return eye_trials(results, shown, target_arcmin)
 
     over = judged(mean - 0.1)
-    assert trial_row(over).cells == (f"⚠ {mean:.1f}′ n=2", "–")
-    row = trial_row(judged(mean + 0.1))
+    assert trial_row(over, trials).cells == (f"⚠ {mean:.1f}′ n=2", "–")
+    every = [*trials, former]
+    assert trial_row(over, every).cells == (f"⚠ {mean:.1f}′ n=2", "1 of earlier φ")
+    row = trial_row(judged(mean + 0.1), trials)
     assert row.cells == (f"{mean:.1f}′ n=2", "–")
     accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
     left, right = (row.cells for row in verdict_rows(accepted, over))

@@ -263,15 +263,18 @@ def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
     review = window.findChild(ReviewPage)
     assert isinstance(review, ReviewPage)
     named, tried = replace(record, wearer=100 * "W"), with_trials(record, results)
+    tuned = replace(tried, fine_tuned={eye: np.full(3, 0.001) for eye in EYES})
     shown: tuple[tuple[Page, SessionRecord, Results, str], ...] = (
         ("start", named, results, "↻ Repeat"),
         ("review", named, results, "↻ Repeat"),
         ("review", tried, accepted(results), "⚠ Trials over 8′"),
+        ("review", tuned, accepted(results), "⚠ Trials over 8′"),
     )
     for page, one, found, word in shown:
         review.show_session(one, found, 8.0)
         window.show_page(page)
         assert text(review, "card-verdict-left") == f"Left eye: {word}"
+        assert ("both eyes fine-tuned" in text(review, "reviewContents")) == (one is tuned)
         for area in window.findChildren(QScrollArea):
             if area.isVisible():
                 assert scrolled_px(area) == [0, 0], (page, word)

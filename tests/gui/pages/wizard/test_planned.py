@@ -17,7 +17,7 @@ from handcal.station.states import State
 from handcal.types import EYES, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.view import Action, Step
-from tests.gui.views import planned_snapshot
+from tests.gui.views import planned_snapshot, tried
 
 Maker = Callable[..., Snapshot]
 VERIFIED = dict.fromkeys(EYES, Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0)))
@@ -171,6 +171,14 @@ def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot:
     aligned = replace(done, record=replace(done.record, verified_now=frozenset()))
     view = begun(snapshot).view(aligned)
     assert view.sentence.startswith("Verified before the alignments changed.")
+    doubted = tried(done)
+    view = begun(snapshot).view(doubted)
+    assert view.sentence.startswith("Trials of the left eye are over the target. Add an alignment")
+    assert view.main.label == "Finish as it is"
+    shifted = replace(doubted.record.trials[1], calibrated_shift_m=np.full(3, 0.01))
+    record = replace(doubted.record, trials={1: shifted}, verified_now=frozenset())
+    view = begun(snapshot).view(replace(doubted, record=record))
+    assert view.sentence.startswith("Verified, and tested in trials, before the alignments")
     solving = planned_snapshot(snapshot, StepName.SOLVE, verifications=VERIFIED)
     assert begun(snapshot).view(solving).step is Step.VERIFY
     solving = replace(solving, record=aligned.record)

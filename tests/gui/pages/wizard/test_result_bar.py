@@ -5,6 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QGuiApplication
@@ -33,8 +34,7 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     bar = show(qtbot, ResultBar(), 700, 300)
     qtbot.addWidget(bar.buttons)
     assert bar.text() == ""
-    bar.set_target(6.5)
-    bar.show_snapshot(snapshot(State.APPLIED))
+    bar.show_snapshot(snapshot(State.APPLIED, procedure={"target_arcmin": 6.5}))
     button(bar.buttons, QToolButton, "Copy").click()
     copied = QGuiApplication.clipboard().text()
     assert copied.startswith("Wearer: without a name\n")
@@ -45,6 +45,17 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     printer.setOutputFileName(str(tmp_path / "result.pdf"))
     bar.print_to(printer)
     assert (tmp_path / "result.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_copy_has_a_fine_tuned_shift(qtbot: QtBot, snapshot: Maker) -> None:
+    seen = snapshot(State.APPLIED)
+    assert seen.procedure.results is not None
+    calibrated_m = seen.procedure.results.rendered_shift_m
+    tuned_m = {**calibrated_m, "left": np.array([0.001, -0.002, 0.0])}
+    bar = show(qtbot, ResultBar(), 700, 300)
+    bar.show_snapshot(replace(seen, record=replace(seen.record, fine_tuned=tuned_m)))
+    assert "Left eye, fine-tuned: φ = (+1.00, −2.00, +0.00) mm" in bar.text().splitlines()
+    assert "Right eye, fine-tuned" not in bar.text()
 
 
 def test_it_follows_the_trials(qtbot: QtBot, snapshot: Maker, rig: Rig) -> None:

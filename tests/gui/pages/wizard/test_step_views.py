@@ -19,7 +19,7 @@ from handcal_gui.pages.wizard.preconditions import hand_found
 from handcal_gui.pages.wizard.step_views import connect_view, distance, save_view
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, ButtonSpec, Precondition, Step
-from tests.gui.views import NUDGED, Maker, actions, judged
+from tests.gui.views import NUDGED, Maker, actions, judged, tried
 
 
 @pytest.mark.parametrize(
@@ -270,6 +270,18 @@ def test_a_session_that_is_held_does_not_finish_by_itself(snapshot: Maker) -> No
     seen = judged(snapshot, "accept", "accept", State.APPLIED)
     assert "finishes by itself" in save_view(seen, is_held=False).sentence
     assert "Finish the session when you are done" in save_view(seen, is_held=True).sentence
+
+
+def test_a_result_that_trials_contradict_does_not_finish_by_itself(snapshot: Maker) -> None:
+    seen = tried(judged(snapshot, "accept", "accept", State.APPLIED))
+    view = save_view(seen, is_held=False)
+    assert view.sentence.startswith("Trials of the left eye are over the target. Go back to")
+    assert view.runs_after_s is None
+    finished = replace(seen, record=replace(seen.record, is_finished=True))
+    said = save_view(finished, is_held=False).sentence
+    assert said.startswith("The session is finished, but trials of the left eye are over")
+    mild = replace(seen, procedure=replace(seen.procedure, target_arcmin=1e3))
+    assert "finishes by itself" in save_view(mild, is_held=False).sentence
 
 
 def test_a_kept_offline_calibration_is_named_and_not_unearned(snapshot: Maker) -> None:

@@ -287,6 +287,9 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_ey
     panel.show_snapshot(first)
     assert "✓ Align" in _texts(panel)
     assert ring.accessibleDescription() == "2/2 aligned"
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.ALIGN))
+    assert ring.accessibleDescription().startswith("2/3 aligned"), "one more is being made"
+    panel.show_snapshot(first)
     panel.show_snapshot(planned_snapshot(snapshot, StepName.VERIFY))
     assert ring.accessibleDescription() == "0/2 verified"
     again = replace(
@@ -306,6 +309,9 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_ey
     assert "✓ Show hand" in texts
     assert {"Make cursor", "Align", "Solve"} <= texts
     assert ring.accessibleDescription().startswith("1/2 verified")
+    once_more = replace(slipped.procedure, state=State.VERIFY, verifying=NUDGED)
+    panel.show_snapshot(replace(slipped, procedure=once_more))
+    assert ring.accessibleDescription().startswith("0/2 verified"), "the left eye once more"
 
 
 def test_names_and_paths_like_markup_are_shown_as_they_are(

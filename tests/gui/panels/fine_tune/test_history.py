@@ -98,3 +98,49 @@ def test_one_eye_moves_alone(shifts_m: Shifts, axis: int) -> None:
 
 def test_shifts_of_other_eyes_differ() -> None:
     assert not same_shifts(shifts_of(0.0), {"left": np.zeros(3)})
+
+
+def test_shifts_of_others_replace_only_the_eye_set_by_hand() -> None:
+    history = ShiftHistory(shifts_of(0.0))
+    by_hand_m = {**shifts_of(0.0), "left": np.array([0.002, 0.0, 0.0])}
+    history.change(by_hand_m)
+    history = history.after(shifts_of(0.001))
+    assert history.is_replaced
+    assert same_shifts(history.present, shifts_of(0.001))
+    history.undo()
+    assert same_shifts(history.present, {**shifts_of(0.001), "left": by_hand_m["left"]})
+    history.undo()
+    assert same_shifts(history.present, shifts_of(0.001)), "nobody set the old right eye by hand"
+    history.redo()
+    history.redo()
+    history = history.after(shifts_of(0.003))
+    assert not history.is_replaced
+    assert not history.can_undo, "nothing was set by hand since"
+
+
+def test_what_was_set_by_hand_before_a_session_was_resumed_is_not_lost() -> None:
+    by_hand_m = {**shifts_of(0.001), "left": np.array([0.002, 0.0, 0.0])}
+    resumed = ShiftHistory(shifts_of(0.0)).after(by_hand_m, shifts_of(0.001), by_hand_m)
+    assert same_shifts(resumed.present, by_hand_m)
+    assert not resumed.is_replaced
+    resumed = resumed.after(shifts_of(0.003), shifts_of(0.003), by_hand_m)
+    assert resumed.is_replaced
+    resumed.undo()
+    assert same_shifts(resumed.present, {**shifts_of(0.003), "left": by_hand_m["left"]})
+
+
+def test_a_replaced_shift_survives_another_replacement() -> None:
+    history = ShiftHistory(shifts_of(0.0))
+    by_hand_m = {**shifts_of(0.0), "left": np.array([0.002, 0.0, 0.0])}
+    history.change(by_hand_m)
+    history = history.after(shifts_of(0.001)).after(shifts_of(0.003))
+    assert history.is_replaced
+    history.undo()
+    assert same_shifts(history.present, {**shifts_of(0.003), "left": by_hand_m["left"]})
+    again = ShiftHistory(shifts_of(0.0))
+    again.change(by_hand_m)
+    again = again.after(shifts_of(0.001)).after(by_hand_m)
+    assert not again.is_replaced
+    assert same_shifts(again.present, by_hand_m)
+    again.undo()
+    assert same_shifts(again.present, shifts_of(0.0))

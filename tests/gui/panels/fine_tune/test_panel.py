@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from pytestqt.qtbot import QtBot
 from handcal.display import DrawnMove, effect_at
 from handcal.register.results import Results
 from handcal.rig_types import Rig
+from handcal.session.record import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import MAX_HAND_SET_SHIFT_M, State
 from handcal.types import EYES
@@ -97,6 +99,21 @@ def test_a_session_resumed_with_the_same_phi_begins_with_it(
             np.testing.assert_allclose(fields_mm(panel, eye), solved_mm, atol=0.005)
         panel.set_rig(rig)  # the next session
         assert not field(panel, "left", 1).isEnabled()
+
+
+def test_what_was_fine_tuned_before_a_resume_is_an_undo_away(
+    panel: FineTunePanel, show: Show, record: SessionRecord, results: Results
+) -> None:
+    solved_m = results.rendered_shift_m
+    tuned_m = {**solved_m, "left": solved_m["left"] + np.array([0.002, 0.0, 0.0])}
+    resumed = replace(record, fine_tuned=tuned_m)
+    show(procedure={"applied_shift_m": tuned_m}, record=resumed)
+    show(procedure={"applied_shift_m": solved_m}, record=record)  # an alignment more
+    assert "The φ you set was replaced" in status(panel)
+    QTest.keyClick(panel, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    tuned_mm, solved_mm = (1e3 * one for one in (tuned_m["left"], solved_m["right"]))
+    np.testing.assert_allclose(fields_mm(panel, "left"), tuned_mm, atol=0.005)
+    np.testing.assert_allclose(fields_mm(panel, "right"), solved_mm, atol=0.005)
 
 
 def test_a_comparison_is_not_ended_by_accident(panel: FineTunePanel, show: Show) -> None:

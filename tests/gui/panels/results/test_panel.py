@@ -90,13 +90,13 @@ def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
     results = seen.procedure.results
     assert results is not None
     accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
-    seen = replace(seen, procedure=replace(seen.procedure, results=accepted))
+    procedure = replace(seen.procedure, results=accepted, target_arcmin=7.5)
+    seen = replace(seen, procedure=procedure)
     panel.resize(360, 416)
     both = {
         number: make_trial(rig.eyes[eye], eye, 0.4, accepted.eyes[eye].shift_m, [0.05, 0.0, 0.0])
         for number, eye in enumerate(EYES)
     }
-    panel.set_target(7.5)
     for trials, told in (({}, False), (both, True), ({}, False)):
         record = replace(seen.record, trials=trials)
         panel.show_snapshot(replace(seen, record=record))
