@@ -4445,14 +4445,6 @@ one turns out.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>⚠ {} (n = {})</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{} (n = {})</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Of the newest results; ⚠ trials of an accepted φ are over the lab&apos;s target on average</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4489,6 +4481,14 @@ the mean over its trials; and the number of all trials of the session.
     </message>
     <message>
         <source>Name or code; of a session that cannot be read, its folder</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>⚠ {} n={}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} n={}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

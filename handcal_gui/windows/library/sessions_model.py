@@ -114,7 +114,7 @@ def _trials(entry: LibraryEntry) -> str:
     if not entry.trials:
         return NOTHING
     is_over = any(_is_over(one, entry) for one in entry.eyes.values())
-    said = tr("⚠ {} (n = {})") if is_over else tr("{} (n = {})")
+    said = tr("⚠ {} n={}") if is_over else tr("{} n={}")
     return said.format(_errors("trials")(entry) if entry.eyes else NOTHING, entry.trials)
 
 

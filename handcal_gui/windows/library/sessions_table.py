@@ -178,7 +178,10 @@ class SessionsTable(QTableView):
         """Return the width of a column by its longest text: Qt would measure every cell."""
         font = number_font() if COLUMNS[column].is_number else self.font()
         text_px = QFontMetrics(font).horizontalAdvance(self._sessions.longest_text(column))
-        title_px = self.horizontalHeader().sectionSizeHint(column)
+        # Qt's hint for a title in two lines is wider by 40 pixels.
+        across = self.horizontalHeader().fontMetrics()
+        lines = COLUMNS[column].title.split("\n")
+        title_px = max(map(across.horizontalAdvance, lines)) + 3 * SPACING_PX  # with the arrow
         # The trials fill their column, and the text of the next one would touch them.
         apart_px = (3 if column == _TRIALS else 2) * SPACING_PX
         return max(text_px + _picture_px(column) + apart_px, title_px)

@@ -129,9 +129,9 @@ def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_pa
 
     both = "accept", "accept"
     over = "⚠ Trials over 8′"
-    assert said(10.4, 8.0, *both) == (f"Left {over}, Right ✓ Accept", "⚠ 10.4 / 2.0 (n = 2)")
-    assert said(7.9, 8.0, *both) == ("✓ Accept", "7.9 / 2.0 (n = 2)")
-    assert said(10.4, None, *both) == ("✓ Accept", "10.4 / 2.0 (n = 2)")  # of an older version
+    assert said(10.4, 8.0, *both) == (f"Left {over}, Right ✓ Accept", "⚠ 10.4 / 2.0 n=2")
+    assert said(7.9, 8.0, *both) == ("✓ Accept", "7.9 / 2.0 n=2")
+    assert said(10.4, None, *both) == ("✓ Accept", "10.4 / 2.0 n=2")  # of an older version
     assert said(10.4, 8.0, "accept", "repeat")[0] == f"Left {over}, Right ↻ Repeat"
     assert said(10.4, 8.0, "repeat", "accept")[0] == "Left ↻ Repeat, Right ✓ Accept"
 
@@ -181,7 +181,7 @@ def test_trials_stand_apart_from_the_state(window: LibraryWindow) -> None:
     one = LibraryEntry(Path("a"), (0, 0), trials=222, eyes=dict.fromkeys(EYES, tried))
     window._sessions.show_rows([make_row(one)])
     child(window, SessionsTable).fit_columns()
-    text_px = QFontMetrics(number_font()).horizontalAdvance("111.1 / 111.1 (n = 222)")
+    text_px = QFontMetrics(number_font()).horizontalAdvance("111.1 / 111.1 n=222")
     assert table(window).columnWidth(8) - text_px >= 24
 
 
