@@ -28,8 +28,8 @@ class ClockFit:
     """Half the shortest round trip, which bounds the effect of asymmetric delays, plus the standard
     error of the fit."""
     drift_uncertainty: float
-    """Half the median ping's extra delay over the time that the pings span, s/s. The standard error
-    is several times too small, as delays are not normal."""
+    """Half the median ping's extra delay, and the clock's resolution, over the time that the pings
+    span, s/s. The standard error is several times too small, as delays are not normal."""
 
 
 class ClockEstimator:
@@ -108,5 +108,5 @@ def _fit(samples: deque[tuple[int, int, int]]) -> ClockFit:
         float(drift_ns_per_s) / 1e9,
         float(np.median(round_trip)),
         float(0.5 * shortest + np.sqrt(covariance[0, 0])),
-        float(0.5 * (np.median(round_trip) - shortest) / max(np.ptp(elapsed), 1.0)),
+        float((1e3 + 0.5 * (np.median(round_trip) - shortest)) / max(np.ptp(elapsed), 1.0)),
     )

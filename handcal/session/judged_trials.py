@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from handcal.register.results import Results, read_rendered_shift_m
 from handcal.session.record import SessionRecord
 from handcal.session.trial import trial_errors_arcmin
-from handcal.types import Eye, VerdictName
+from handcal.types import Eye
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,16 +28,27 @@ class EyeTrials:
 def eye_trials(
     results: Results, record: SessionRecord, target_arcmin: float
 ) -> dict[Eye, EyeTrials]:
-    """Return the trials of a session's results, of each eye that has some."""
-    errors = trial_errors_arcmin(
-        record.trials.values(), results.rendered_shift_m, read_rendered_shift_m(record.results)
-    )
+    """Return the trials of a session's results, of each eye that has some.
+
+    Stored results count, too, if they are of all alignments: another version may have solved them
+    with another φ.
+    """
+    stored_m = read_rendered_shift_m(record.results if record.is_solved else None)
+    trials = record.trials.values()
+    errors = trial_errors_arcmin(trials, results.rendered_shift_m, stored_m)
+    return judge_trials(errors, target_arcmin)
+
+
+def judge_trials(
+    errors_arcmin: Mapping[Eye, Sequence[float]], target_arcmin: float
+) -> dict[Eye, EyeTrials]:
+    """Return the trials of each eye by their errors."""
     return {
         eye: EyeTrials(len(found), sum(found) / len(found), target_arcmin)
-        for eye, found in errors.items()
+        for eye, found in errors_arcmin.items()
     }
 
 
-def is_doubted(verdict: VerdictName, trials: EyeTrials | None) -> bool:
-    """Return whether an accepted eye must not be ticked, as its trials are over the target."""
+def is_doubted(verdict: str, trials: EyeTrials | None) -> bool:
+    """Return whether trials over the target contradict an acceptance."""
     return verdict == "accept" and trials is not None and trials.is_over

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
-
-import numpy as np
 
 from handcal.errors import FileError
 from handcal.io.files import make_folder, read_json, read_limited, sync_folder
@@ -18,6 +16,7 @@ from handcal.progress import Progress
 from handcal.register.results import read_rendered_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.journal import JOURNAL, JOURNAL_VERSION, find_journals
+from handcal.session.judged_trials import EyeTrials, judge_trials
 from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
     Replayed,
@@ -47,8 +46,8 @@ class EyeOutcome:
     """Error after the wearer's verification; None if the calibrated φ was not verified."""
     found_arcmin: float | None = None
     """Error that the verification found, and corrected."""
-    trials_arcmin: float | None = None
-    """Mean error of the trials of the calibrated φ; None without any."""
+    trials: EyeTrials | None = None
+    """Those of the calibrated φ; None without any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,8 +229,10 @@ def eye_outcomes(path: Path, replayed: Replayed) -> dict[Eye, EyeOutcome]:
     eyes = found if isinstance(found, dict) else {}
     trials = replayed.state.trials.active.values()
     errors = trial_errors_arcmin(trials, read_rendered_shift_m(results))
+    target_arcmin = _lab_target_arcmin(replayed.state.settings)
+    judged = judge_trials(errors, math.inf if target_arcmin is None else target_arcmin)
     return {
-        eye: _outcome(eyes[eye], errors.get(eye)) for eye in EYES if isinstance(eyes.get(eye), dict)
+        eye: _outcome(eyes[eye], judged.get(eye)) for eye in EYES if isinstance(eyes.get(eye), dict)
     }
 
 
@@ -280,14 +281,13 @@ def _results(path: Path, replayed: Replayed) -> dict[str, Any]:
     return state.results or {}
 
 
-def _outcome(one: Mapping[str, Any], errors_arcmin: Sequence[float] | None) -> EyeOutcome:
+def _outcome(one: Mapping[str, Any], trials: EyeTrials | None) -> EyeOutcome:
     """Return an eye's result; whatever is missing or not a number is unknown."""
     benefit, measured = one.get("benefit"), one.get("measured_arcmin")
     verdict, expected = str(one.get("verdict", "")), benefit if isinstance(benefit, dict) else {}
     before_arcmin = _number(expected.get("without_arcmin"))
-    trials_arcmin = float(np.mean(errors_arcmin)) if errors_arcmin else None
     if verdict == "keep":  # whatever was solved and verified is not used
-        return EyeOutcome(verdict, before_arcmin, before_arcmin, None, None, trials_arcmin)
+        return EyeOutcome(verdict, before_arcmin, before_arcmin, None, None, trials)
     found, left = measured if isinstance(measured, list) and len(measured) == 2 else (None, None)
     return EyeOutcome(
         verdict,
@@ -295,7 +295,7 @@ def _outcome(one: Mapping[str, Any], errors_arcmin: Sequence[float] | None) -> E
         _number(expected.get("after_arcmin")),
         _number(left),
         _number(found),
-        trials_arcmin,
+        trials,
     )
 
 

@@ -25,7 +25,7 @@ from handcal.session.journal import (
     JournalContent,
     read_journal,
 )
-from handcal.session.state import SessionEvent, SessionState
+from handcal.session.state import WENT_BACK, SessionEvent, SessionState
 from handcal.session.trial import Trial, make_trial
 from handcal.types import Alignment, Eye, Float64
 
@@ -93,6 +93,18 @@ class SessionRecord:
             return ""
         parts = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
         return ", ".join(what for name, value, what in parts if station.get(name) == value)
+
+    @property
+    def went_back(self) -> bool:
+        """True if φ was last set by going back to another, which records it as fine-tuned."""
+        setting = WENT_BACK, SessionEvent.FINE_TUNED
+        return [one.name for one in self.events if one.name in setting][-2:-1] == [WENT_BACK]
+
+    @property
+    def set_by_hand_m(self) -> Mapping[Eye, Float64]:
+        """Each (3,); φ last set by hand since the results, empty if it was set otherwise."""
+        is_former = bool(self.facts.former) and self.results is None  # of the session before
+        return {} if self.went_back or is_former else self.fine_tuned or {}
 
     @property
     def refused(self) -> int:

@@ -79,19 +79,23 @@ def with_session_prior(
 ) -> StationSettings:
     """Return the settings with the prior of the session that is resumed or begun.
 
+    A resumed session keeps the lab's target, too.
+
     Raises
     ------
     FileError
         If the session or the rig cannot be read.
     """
+    solve = settings.calibration.solve
     # A session keeps the prior that it began with, so that resuming does not change its results.
     if resume is not None:
-        prior = stored_solve_settings(Session.open(resume)).fuse.prior
+        stored = stored_solve_settings(Session.open(resume))
+        prior, target_arcmin = stored.fuse.prior, stored.verdict.target_arcmin
+        solve = replace(solve, verdict=replace(solve.verdict, target_arcmin=target_arcmin))
     elif begun.prior is not None:
-        prior = replace(settings.calibration.solve.fuse.prior, learned=begun.prior)
+        prior = replace(solve.fuse.prior, learned=begun.prior)
     else:
         prior = _lab_prior(settings)
-    solve = settings.calibration.solve
     solve = replace(solve, fuse=replace(solve.fuse, prior=prior))
     return replace(settings, calibration=replace(settings.calibration, solve=solve))
 

@@ -9,6 +9,7 @@ from typing import cast
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPixmap
 
+from handcal.session.judged_trials import is_doubted
 from handcal.session.library import EyeOutcome
 from handcal.types import EYES, Eye, VerdictName
 from handcal_gui.theme import Colors, colors
@@ -80,9 +81,11 @@ def _draw(eyes: tuple[EyeOutcome | None, ...], now: Colors, ratio: float) -> QPi
             continue
         top = 1.0 + i * (2 * _BAR_PX + 4)
         painter.fillRect(_bar(one.before_arcmin, top), QColor(now.muted))
-        shade = QColor(getattr(now, VERDICT_COLORS.get(cast(VerdictName, one.verdict), "muted")))
+        doubted = is_doubted(one.verdict, one.trials)
+        known = VERDICT_COLORS.get(cast(VerdictName, one.verdict), "muted")
+        shade = QColor(getattr(now, "warning" if doubted else known))
         after = _bar(after_arcmin(one), top + _BAR_PX + 1)
-        if one.verdict == "accept":
+        if one.verdict == "accept" and not doubted:
             painter.fillRect(after, shade)
         else:
             painter.setPen(shade)

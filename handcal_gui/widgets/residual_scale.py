@@ -28,7 +28,7 @@ _BAR_PX = 12
 def residual_ramp() -> UInt8:
     """Return (N, 3) RGB from 0 to `LARGEST_MM`, in increasing contrast with the canvas."""
     ramp = np.array([rgb(stop) for stop in _VIRIDIS], np.uint8)
-    return ramp[2:] if is_dark() else ramp[-2::-1]  # without what the canvas nearly hides
+    return ramp[2:] if is_dark() else ramp[-2::-1]  # without what hardly differs from the canvas
 
 
 def residual_colors(residuals_m: Float64) -> UInt8:

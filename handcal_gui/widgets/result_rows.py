@@ -204,7 +204,7 @@ def fine_tuned_texts(results: Results, record: SessionRecord) -> dict[Eye, str]:
     calibrated_m = results.rendered_shift_m
     return {
         eye: tr("φ = ({}) mm").format(", ".join(signed(1e3 * float(one), 2) for one in tuned_m))
-        for eye, tuned_m in (record.fine_tuned or {}).items()
+        for eye, tuned_m in record.set_by_hand_m.items()
         if eye in calibrated_m and np.abs(tuned_m - calibrated_m[eye]).max() >= SAME_SHIFT_M
     }
 
@@ -239,7 +239,7 @@ def verdict_reason(results: Results, eye: Eye, trials: EyeTrials | None = None) 
     verdict = results.verdicts[eye]
     if trials is None or not is_doubted(verdict.name, trials):
         return sentence(verdict.reason)
-    advice = tr("Trials found {:.1f}′: calibrate again if φ was set well in them")
+    advice = tr("Trials found {:.1f}′: if φ was set carefully in them, measure again")
     return advice.format(trials.mean_arcmin)
 
 

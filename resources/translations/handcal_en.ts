@@ -1797,19 +1797,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The session is finished, but trials of {} are over the target: go back to measure more, or continue with the next wearer.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Everything is already saved. The session finishes by itself; Hold keeps it open.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Everything is already saved. Finish the session when you are done.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Trials of {} are over the target. Go back to measure more, or finish as it is; all is saved.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1905,11 +1897,19 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>The session is finished, but trials of {} are over the target: go back to measure again, or continue with the next wearer.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Next wearer</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Not accepted. Go back to measure more, or finish as it is; all is saved.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Trials of {} are over the target. Go back to measure again, or finish as it is; all is saved.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2731,7 +2731,7 @@ The slider goes to ±{:g} mm</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Drift of the headset&apos;s clock over the last 30 seconds, in parts per million; positive is fast</source>
+        <source>Drift of the headset&apos;s clock over the last 30 seconds, in parts per million, and its uncertainty; positive is fast</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4174,7 +4174,7 @@ set well by hand.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Trials found {:.1f}′: calibrate again if φ was set well in them</source>
+        <source>Trials found {:.1f}′: if φ was set carefully in them, measure again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4474,12 +4474,6 @@ left / right</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Error of each eye&apos;s last calibrated φ relative to φ set by hand, left / right, in arcminutes:
-the mean over its trials; and the number of all trials of the session.
-⚠ over the lab&apos;s target: look at the trials; if φ was set well by hand, calibrate again</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Name or code; of a session that cannot be read, its folder</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4515,6 +4509,12 @@ left / right</source>
     <message>
         <source>Error of the calibration that the wearer&apos;s verification found, and corrected, left / right,
 in arcminutes; – was not verified</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error of each eye&apos;s last calibrated φ relative to φ set by hand, left / right, in arcminutes:
+the mean over its trials, and their numbers: 0 if all were of an earlier φ.
+⚠ over the lab&apos;s target: look at the trials; if φ was set well by hand, calibrate again</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -254,3 +254,5 @@ def test_colour_blind_people_tell_outliers_from_residuals(
             other = lab(np.array(seen) @ linear_rgb(QColor(*color)))
             assert np.linalg.norm(outlier - other) >= LEAST_DIFFERENCE, (who, color)
     assert contrast(QColor(OUTLIER), QColor(colors().canvas)) >= 3.0
+    if theme != "light":  # where the best points are the darkest
+        assert contrast(QColor(*residual_ramp()[0].tolist()), QColor(colors().canvas)) >= 2.5

@@ -50,6 +50,7 @@ def test_offset_and_drift_through_asymmetric_jitter(seed: int) -> None:
     assert error_ns < 0.5 * MS
     assert error_ns < clock.fit.uncertainty_ns
     assert abs(clock.fit.drift - 80e-6) < 25e-6
+    assert 1e-6 < clock.fit.drift_uncertainty < 80e-6
 
 
 def test_conversions_are_inverse() -> None:

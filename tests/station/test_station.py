@@ -305,16 +305,21 @@ def test_a_session_with_anything_in_it_is_kept_whatever_fails(
     assert files <= set(session.path.rglob("*"))
 
 
-def test_a_resumed_session_keeps_the_prior_it_began_with(
+def test_a_resumed_session_keeps_the_prior_and_the_target_it_began_with(
     settings: StationSettings, simulated: Callable[..., Alignment]
 ) -> None:
     learned = LearnedPrior((0.001,) * 6, tuple((1e-6 * np.eye(6)).ravel().tolist()), 12)
-    solve = replace(CALIBRATION.solve, fuse=FuseSettings(prior=PriorSettings(learned=learned)))
+    solve = replace(
+        CALIBRATION.solve,
+        fuse=FuseSettings(prior=PriorSettings(learned=learned)),
+        verdict=replace(CALIBRATION.solve.verdict, target_arcmin=6.5),
+    )
     stored = {"calibration": settings_json(replace(CALIBRATION, solve=solve))}
     with Session.create(Path(settings.sessions), example_rig(), stored) as session:
         session.save_alignment(simulated(1))
     with Station(settings, resume=session.path) as station:
         assert station.settings.calibration.solve.fuse.prior.learned == learned
+        assert station.step().procedure.target_arcmin == 6.5, "the lab's target, too"
 
 
 def test_a_resumed_session_keeps_its_usable_eyes_and_those_skipped(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from handcal.register.results import USED
-from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
@@ -18,6 +17,7 @@ from handcal_gui.pages.wizard.preconditions import (
     is_steady,
     is_unsolved,
     needs_look,
+    trials_of,
 )
 from handcal_gui.pages.wizard.step_views import (
     LOOK,
@@ -244,7 +244,7 @@ class PlannedWizard(Wizard):
         main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
         if set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
-            if snapshot.record.trials:
+            if snapshot.record.trials and not trials_of(snapshot):
                 text = tr(
                     "Verified, and tested in trials, before the alignments changed. Finish, or "
                     "verify an eye again."
@@ -323,10 +323,8 @@ def _drawn_otherwise(snapshot: Snapshot) -> str:
     others = [eye for eye in solved_m if (drawn_m[eye] != solved_m[eye]).any()]
     if not others:
         return ""
-    names = [one.name for one in snapshot.record.events]
-    set_by = [name for name in names if name in (WENT_BACK, SessionEvent.FINE_TUNED)]
     which = tr("a fine-tuned φ")
-    if set_by[-2:-1] == [WENT_BACK]:  # which records φ like a fine-tuning
+    if snapshot.record.went_back:
         is_offline = not any(drawn_m[eye].any() for eye in solved_m)
         which = tr("the offline calibration's φ") if is_offline else tr("an earlier φ")
     former_m = procedure.former_shift_m

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from handcal.session.judged_trials import eye_trials, is_doubted
+from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
 from handcal.station.snapshot import Snapshot
 from handcal.types import Eye
 from handcal_gui.pages.wizard.view import EYE_WORDS, Precondition
@@ -47,14 +47,19 @@ def hand_found(snapshot: Snapshot) -> Precondition:
     return Precondition((seen and sentence(seen.problem)) or without, False)
 
 
+def trials_of(snapshot: Snapshot) -> dict[Eye, EyeTrials]:
+    """Return the user-test trials of the present results."""
+    procedure = snapshot.procedure
+    if procedure.results is None:
+        return {}
+    return eye_trials(procedure.results, snapshot.record, procedure.target_arcmin)
+
+
 def doubted_eyes(snapshot: Snapshot) -> list[Eye]:
     """Return the accepted eyes whose user-test trials are over the lab's target."""
-    procedure = snapshot.procedure
-    results = procedure.results
-    if results is None:
-        return []
-    trials = eye_trials(results, snapshot.record, procedure.target_arcmin)
-    return [eye for eye, one in results.verdicts.items() if is_doubted(one.name, trials.get(eye))]
+    results = snapshot.procedure.results
+    verdicts = results.verdicts if results is not None else {}
+    return [eye for eye, one in trials_of(snapshot).items() if is_doubted(verdicts[eye].name, one)]
 
 
 def eyes_accepted(snapshot: Snapshot) -> tuple[Precondition, ...]:

@@ -296,7 +296,7 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         elif doubted:
             ended = tr(
                 "The session is finished, but trials of {} are over the target: go back to measure "
-                "more, or continue with the next wearer."
+                "again, or continue with the next wearer."
             ).format(eye_names(doubted))
         return WizardView(
             Step.SAVE,
@@ -314,8 +314,8 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
         finish = tr("Not accepted. Go back to measure more, or finish as it is; all is saved.")
     elif doubted:
         finish = tr(
-            "Trials of {} are over the target. Go back to measure more, or finish as it is; all is "
-            "saved."
+            "Trials of {} are over the target. Go back to measure again, or finish as it is; all "
+            "is saved."
         ).format(eye_names(doubted))
     if snapshot.problem:
         finish = tr("Solve the problem below, then finish the session.")
@@ -332,7 +332,7 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
 
 
 def doubt_sentence(snapshot: Snapshot) -> str:
-    """Return the next step of a verified result that its trials contradict; else empty."""
+    """Return the next step after a result that its trials contradict; else empty."""
     doubted = doubted_eyes(snapshot)
     text = tr("Trials of {} are over the target. Add an alignment, or finish as it is.")
     return text.format(eye_names(doubted)) if doubted else ""

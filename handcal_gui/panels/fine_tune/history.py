@@ -46,10 +46,14 @@ def moved(shifts_m: Shifts, eyes: Sequence[Eye], axis: int, by_m: float, limit_m
 class ShiftHistory:
     """The present shifts, the earlier ones, and the undone ones.
 
+    Each step holds the eyes set by hand, upon the shifts that others set.
+
     Parameters
     ----------
     shifts_m : mapping of eye to (3,) float64
         Initial shifts, which cannot be undone.
+    by_hand_m : mapping of eye to (3,) float64
+        Shifts set by hand upon them before.
 
     Attributes
     ----------
@@ -57,17 +61,17 @@ class ShiftHistory:
         True while the present shifts are those of others, in place of shifts set by hand.
     """
 
-    def __init__(self, shifts_m: Shifts) -> None:
-        self._base = _frozen(shifts_m)
-        self._steps = [self._base]
+    def __init__(self, shifts_m: Shifts, by_hand_m: Shifts = _NONE) -> None:
+        self._base = self._own_base = _frozen(shifts_m)  # the latter: before a replacement
+        self._steps = [_NONE]
         self._at = 0
-        self._before = self._base, self._steps, self._at
         self.is_replaced = False
+        self.change({**shifts_m, **by_hand_m})
 
     @property
     def present(self) -> Shifts:
         """The present shifts."""
-        return self._steps[self._at]
+        return MappingProxyType({**self._base, **self._steps[self._at]})
 
     @property
     def can_undo(self) -> bool:
@@ -90,51 +94,29 @@ class ShiftHistory:
             True if this continues the last change, as when a slider is dragged, so that both are
             undone together.
         """
-        if same_shifts(shifts_m, self.present):
+        present = self.present
+        by_hand = {eye: one for eye, one in shifts_m.items() if not _same(one, present[eye])}
+        if not by_hand:
             return
+        step = _frozen({**self._steps[self._at], **by_hand})
         self.is_replaced = False
         self._at += not (goes_on and self.can_undo)
-        self._steps[self._at :] = [_frozen(shifts_m)]
+        self._steps[self._at :] = [step]
 
-    def after(
-        self, shifts_m: Shifts, calibrated_m: Shifts = _NONE, by_hand_m: Shifts = _NONE
-    ) -> ShiftHistory:
-        """Return the history with shifts set by others: an undo away from any set by hand.
-
-        In all steps, the eyes that were not set by hand have the new shifts.
-
-        Parameters
-        ----------
-        shifts_m : mapping of eye to (3,) float64
-        calibrated_m, by_hand_m : mapping of eye to (3,) float64
-            Calibrated shifts, and those last set by hand: the shifts of a resumed session.
-        """
+    def see(self, shifts_m: Shifts) -> None:
+        """Take shifts set by others: what was set by hand and is not among them is an undo away."""
+        steps = self._steps[: self._at + 1]
         if self.is_replaced:
-            self._base, self._steps, self._at = self._before
-            self.is_replaced = False
-            if same_shifts(shifts_m, self.present):
-                return self  # others set again what had been set by hand
-        if same_shifts(self.present, self._base):
-            if not same_shifts(shifts_m, by_hand_m):
-                return ShiftHistory(shifts_m)
-            resumed = ShiftHistory({**shifts_m, **calibrated_m})
-            resumed.change(shifts_m)
-            return resumed
-        self._before = self._base, self._steps, self._at
-        self._steps = [self._on(shifts_m, one) for one in self._steps[: self._at + 1]]
-        self._base = _frozen(shifts_m)
-        self.change(shifts_m)
-        self.is_replaced = True
-        return self
-
-    def _on(self, base_m: Shifts, shifts_m: Shifts) -> Shifts:
-        """Return a step as if it had been set by hand upon other shifts."""
-        by_hand = {
-            eye: one
-            for eye, one in shifts_m.items()
-            if eye not in base_m or not np.array_equal(one, self._base[eye])
-        }
-        return _frozen({**base_m, **by_hand})
+            steps.pop()  # of the last replacement
+        else:
+            self._own_base = self._base
+        last = steps[-1]
+        kept = _frozen({eye: one for eye, one in last.items() if _same(one, shifts_m[eye])})
+        self._base = _frozen({**shifts_m, **{eye: self._own_base[eye] for eye in kept}})
+        self.is_replaced = len(kept) < len(last)
+        if self.is_replaced:
+            steps.append(kept)
+        self._steps, self._at = steps, len(steps) - 1
 
     def undo(self) -> None:
         """Undo the last change, if there is one."""
@@ -144,6 +126,10 @@ class ShiftHistory:
     def redo(self) -> None:
         """Redo the last undone change, if there is one."""
         self._at += self.can_redo
+
+
+def _same(one: Float64, other: Float64) -> bool:
+    return bool(np.array_equal(one, other))
 
 
 def _frozen(shifts_m: Shifts) -> Shifts:

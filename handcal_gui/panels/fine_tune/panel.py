@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.display import TARGET_DEPTHS_M, DrawnMove, effect_at
+from handcal.register.results import read_rendered_shift_m
 from handcal.rig_types import Rig
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import MAX_HAND_SET_SHIFT_M
@@ -148,8 +149,12 @@ class FineTunePanel(QWidget):
         obstacle = find_obstacle(snapshot)
         is_new = self._stream.see(snapshot)
         if is_new:
-            applied, by_hand = snapshot.procedure.applied_shift_m, snapshot.record.fine_tuned
-            self._begin(self._history.after(applied, calibrated, by_hand or {}))
+            applied, by_hand = snapshot.procedure.applied_shift_m, snapshot.record.set_by_hand_m
+            if self._obstacle == _NO_SESSION and same_shifts(applied, by_hand):  # it was resumed
+                stored = read_rendered_shift_m(snapshot.record.results)
+                self._history = ShiftHistory({**_OFFLINE, **stored}, by_hand)
+            self._history.see(applied)
+            self._begin(self._history)
         is_same = same_shifts(solved, self._solved) and same_shifts(calibrated, self._calibrated)
         if is_new or obstacle != self._obstacle or not is_same:
             self._obstacle, self._solved, self._calibrated = obstacle, solved, calibrated

@@ -65,8 +65,8 @@ _ROWS = {
     },
     "clock-drift": {
         _BOTH: tr(
-            "Drift of the headset's clock over the last 30 seconds, in parts per million; positive "
-            "is fast"
+            "Drift of the headset's clock over the last 30 seconds, in parts per million, and its "
+            "uncertainty; positive is fast"
         )
     },
 }

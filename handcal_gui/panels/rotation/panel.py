@@ -25,7 +25,10 @@ from handcal_gui.widgets.sentence import sentence
 
 _HISTORY_S = 10.0
 _HISTORY_PERIOD_S = 0.2
-"""Interval of redrawing the history."""
+"""Interval of redrawing the history while the hand is still."""
+_STEP_DEG = 0.3
+"""A change that redraws it at once, or it would contradict the dial."""
+_NEVER = -np.inf, np.nan
 _HISTORY_LIMITS = 2.0
 """End of the history's scale in multiples of the limit, as for the dial."""
 _PLOT_PX = 56
@@ -58,7 +61,7 @@ class RotationPanel(QWidget):
         self.setAccessibleName(tr("Rotation"))
         self._cursor: PlacedHand | None = None
         self._history: deque[tuple[float, float]] = deque()
-        self._history_drawn_s = -np.inf
+        self._history_drawn = _NEVER
         self._dial = RotationDial()
         self._hand = TurningHand()
         self._advice = _text_label("rotation-advice", scale=1.2)
@@ -88,7 +91,7 @@ class RotationPanel(QWidget):
         is_aligning = procedure.cursor is not None and procedure.state is State.ALIGN
         if self._history and not (is_aligning and procedure.cursor is self._cursor):
             self._history.clear()
-            self._history_drawn_s = -np.inf
+            self._history_drawn = _NEVER
             self._angle_line.clear()
         self._cursor = procedure.cursor
         if not is_aligning:
@@ -135,12 +138,15 @@ class RotationPanel(QWidget):
 
     def _show_history(self, now_s: float, rotation_rad: Float64 | None) -> None:
         angle_rad = np.nan if rotation_rad is None else np.linalg.norm(rotation_rad)
-        self._history.append((now_s, float(np.degrees(angle_rad))))
+        angle_deg = float(np.degrees(angle_rad))
+        self._history.append((now_s, angle_deg))
         while self._history[0][0] < now_s - _HISTORY_S:
             self._history.popleft()
-        if 0.0 <= now_s - self._history_drawn_s < _HISTORY_PERIOD_S:
+        drawn_s, drawn_deg = self._history_drawn
+        has_moved = abs(angle_deg - drawn_deg) >= _STEP_DEG  # also not while the hand is lost
+        if not has_moved and 0.0 <= now_s - drawn_s < _HISTORY_PERIOD_S:
             return
-        self._history_drawn_s = now_s
+        self._history_drawn = now_s, angle_deg
         times_s, angles_deg = np.array(self._history).T
         top_deg = _HISTORY_LIMITS * float(np.degrees(self._limit_rad))
         self._angle_line.setData(times_s - now_s, np.minimum(angles_deg, top_deg))

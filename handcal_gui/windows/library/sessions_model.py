@@ -14,6 +14,7 @@ from PySide6.QtCore import (
     Qt,
 )
 
+from handcal.session.judged_trials import is_doubted
 from handcal.session.library import EyeOutcome, LibraryEntry
 from handcal.types import EYES, VerdictName
 from handcal_gui.theme import number_font
@@ -34,12 +35,11 @@ FILTERS: Mapping[Filter, str] = {
 }
 _Index: TypeAlias = QModelIndex | QPersistentModelIndex
 _NO_INDEX = QModelIndex()
-_Kind: TypeAlias = Literal["before", "found", "after", "trials"]
+_Kind: TypeAlias = Literal["before", "found", "after"]
 _KINDS: Mapping[_Kind, Callable[[EyeOutcome], float | None]] = {
     "before": lambda one: one.before_arcmin,
     "found": lambda one: one.found_arcmin,
     "after": after_arcmin,
-    "trials": lambda one: one.trials_arcmin,
 }
 
 
@@ -83,8 +83,8 @@ def _state(entry: LibraryEntry) -> str:
 
 def _verdicts(entry: LibraryEntry) -> str:
     words = {
-        eye: doubt_word(entry.target_arcmin)
-        if one.verdict == "accept" and entry.target_arcmin is not None and _is_over(one, entry)
+        eye: doubt_word(one.trials.target_arcmin)
+        if one.trials is not None and is_doubted(one.verdict, one.trials)
         else VERDICT_WORDS.get(cast(VerdictName, one.verdict), one.verdict)
         for eye, one in entry.eyes.items()
     }
@@ -92,12 +92,6 @@ def _verdicts(entry: LibraryEntry) -> str:
         return words[EYES[0]]
     each = ", ".join(f"{EYE_NAMES[eye].split()[0]} {word}" for eye, word in words.items())
     return each or (NOTHING if entry.problem else tr("Not solved"))
-
-
-def _is_over(one: EyeOutcome, entry: LibraryEntry) -> bool:
-    """Return whether the trials of an eye's φ are over the lab's target on average."""
-    mean_arcmin, target_arcmin = one.trials_arcmin, entry.target_arcmin
-    return mean_arcmin is not None and target_arcmin is not None and mean_arcmin > target_arcmin
 
 
 def _errors(kind: _Kind) -> Callable[[LibraryEntry], str]:
@@ -111,16 +105,19 @@ def _errors(kind: _Kind) -> Callable[[LibraryEntry], str]:
 
 
 def _trials(entry: LibraryEntry) -> str:
+    """Return the mean errors of the trials of each eye's last calibration, and their numbers."""
     if not entry.trials:
         return NOTHING
-    is_over = any(_is_over(one, entry) for one in entry.eyes.values())
-    said = tr("⚠ {} n={}") if is_over else tr("{} n={}")
-    return said.format(_errors("trials")(entry) if entry.eyes else NOTHING, entry.trials)
+    trials = [entry.eyes[eye].trials if eye in entry.eyes else None for eye in EYES]
+    means = " / ".join(NOTHING if one is None else f"{one.mean_arcmin:.1f}" for one in trials)
+    counts = "/".join(str(one.count) if one else "0" for one in trials)
+    is_over = any(one is not None and one.is_over for one in trials)
+    return (tr("⚠ {} n={}") if is_over else tr("{} n={}")).format(means, counts)
 
 
 def _worst_trials_arcmin(entry: LibraryEntry) -> float | None:
-    found = (one.trials_arcmin for one in entry.eyes.values())
-    return max((one for one in found if one is not None), default=None)
+    found = (one.trials.mean_arcmin for one in entry.eyes.values() if one.trials is not None)
+    return max(found, default=None)
 
 
 def _known_first(value: float | None) -> float:
@@ -189,7 +186,8 @@ COLUMNS = (
         tr("Trials ′\nleft / right"),
         tr(
             "Error of each eye's last calibrated φ relative to φ set by hand, left / right, in "
-            "arcminutes:\nthe mean over its trials; and the number of all trials of the session.\n"
+            "arcminutes:\nthe mean over its trials, and their numbers: 0 if all were of an earlier "
+            "φ.\n"
             "⚠ over the lab's target: look at the trials; if φ was set well by hand, calibrate "
             "again"
         ),

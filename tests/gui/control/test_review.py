@@ -37,6 +37,7 @@ from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
+from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.views import VERIFIED
@@ -144,6 +145,8 @@ def test_the_example_is_opened_from_the_start_page(
     program.start.example_requested.emit(tmp_path / "sessions")
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
+    numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
+    assert "Trials\t⚠ 9.0′ n=3\t⚠ 12.2′ n=3" in numbers, "of the φ that it was solved with then"
     said = child(program, QLabel, "reviewNote").text()  # the example is of an older version
     assert said.startswith("Solved again by this version; when it was recorded, the verdict was")
     program.show_start()

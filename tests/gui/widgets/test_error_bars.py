@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtGui import QColor, QImage
 
+from handcal.session.judged_trials import EyeTrials
 from handcal.session.library import EyeOutcome
 from handcal.types import Eye
 from handcal_gui.theme import colors
@@ -28,6 +29,9 @@ def test_bars_are_as_long_as_the_errors_and_only_an_accepted_one_is_full() -> No
     assert drawn(accepted, colors().muted) == pytest.approx(
         2 * drawn(accepted, colors().good), abs=4
     )
+    doubted = EyeOutcome("accept", 20.0, 10.0, None, trials=EyeTrials(1, 20.7, 8.0))
+    assert drawn(bars({"left": doubted}), colors().good) == 0
+    assert drawn(bars({"left": doubted}), colors().warning) > 0
     measured = bars({"left": EyeOutcome("accept", 20.0, 10.0, 5.0)})
     assert drawn(measured, colors().good) < drawn(accepted, colors().good)
     repeated = bars({"left": EyeOutcome("repeat", 20.0, 10.0, None)})

@@ -68,9 +68,11 @@ def test_no_eye_is_ticked_whose_trials_are_over_the_target(qtbot: QtBot, results
         for eye in EYES
     ]
     assert shades == [QColor(colors().warning), QColor(colors().good)]
-    reason = "Trials found 20.7′: calibrate again if φ was set well in them"
+    reason = "Trials found 20.7′: if φ was set carefully in them, measure again"
     assert text(card, "card-reason-left") == reason
     assert text(card, "card-reason-right") == "As told"
+    left, _ = eye_results(accepted, over)
+    assert [bar.arcmin is None for bar in left.bars] == [False, False, False, True]
     lines = result_text(accepted, 8.0, trials=over).splitlines()
     assert "Trials, n = 2: 20.7′" in lines
     assert "Trials: none" in lines

@@ -14,7 +14,7 @@ from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard, is_complete, next_eyes
 from handcal_gui.pages.wizard.view import STEPS, Action, Step
-from tests.gui.views import VERIFIED, Maker, actions, judged
+from tests.gui.views import VERIFIED, Maker, actions, judged, tried
 
 
 def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
@@ -270,6 +270,10 @@ def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> 
         Action.REPEAT_LEFT,
         Action.REPEAT_RIGHT,
     ]
+    assert wizard.view(applied).main.label == "Finish"
+    doubted = wizard.view(tried(applied))
+    assert doubted.sentence.startswith("Trials of the left eye are over the target.")
+    assert doubted.main.label == "Finish as it is"
     wizard.move(Action.REPEAT_RIGHT, applied)
     assert wizard.step(applied) is Step.SHOW_HAND
     assert wizard.eyes(applied) == ("right",)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.types import EYES
+from handcal.types import EYES, Eye
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 
 LIMIT_M = 0.03
@@ -25,17 +25,17 @@ def test_undo_goes_back_to_the_start_and_redo_to_the_end(states: list[Shifts]) -
     seen = [history.present]
     for shifts_m in states[1:]:
         history.change(shifts_m)
-        if history.present is not seen[-1]:
+        if not same_shifts(history.present, seen[-1]):
             seen.append(history.present)
     for before in seen[-2::-1]:
         history.undo()
-        assert history.present is before
+        assert same_shifts(history.present, before)
     assert not history.can_undo
     history.undo()
-    assert history.present is seen[0]
+    assert same_shifts(history.present, seen[0])
     for after in seen[1:]:
         history.redo()
-        assert history.present is after
+        assert same_shifts(history.present, after)
     assert not history.can_redo
     history.redo()
     assert same_shifts(history.present, states[-1])
@@ -100,47 +100,82 @@ def test_shifts_of_other_eyes_differ() -> None:
     assert not same_shifts(shifts_of(0.0), {"left": np.zeros(3)})
 
 
-def test_shifts_of_others_replace_only_the_eye_set_by_hand() -> None:
+def test_an_undo_brings_back_only_the_eye_set_by_hand() -> None:
     history = ShiftHistory(shifts_of(0.0))
-    by_hand_m = {**shifts_of(0.0), "left": np.array([0.002, 0.0, 0.0])}
-    history.change(by_hand_m)
-    history = history.after(shifts_of(0.001))
-    assert history.is_replaced
-    assert same_shifts(history.present, shifts_of(0.001))
+    by_hand_m = np.array([0.002, 0.0, 0.0])
+    history.change({**shifts_of(0.0), "left": by_hand_m})
+    for others_m in (0.001, 0.003):
+        history.see(shifts_of(others_m))
+        assert history.is_replaced
+        assert same_shifts(history.present, shifts_of(others_m))
     history.undo()
-    assert same_shifts(history.present, {**shifts_of(0.001), "left": by_hand_m["left"]})
-    history.undo()
-    assert same_shifts(history.present, shifts_of(0.001)), "nobody set the old right eye by hand"
-    history.redo()
-    history.redo()
-    history = history.after(shifts_of(0.003))
     assert not history.is_replaced
-    assert not history.can_undo, "nothing was set by hand since"
+    assert same_shifts(history.present, {**shifts_of(0.003), "left": by_hand_m})
+    history.undo()
+    assert same_shifts(history.present, shifts_of(0.003)), "nobody set the old right eye by hand"
+    assert not history.can_undo
 
 
-def test_what_was_set_by_hand_before_a_session_was_resumed_is_not_lost() -> None:
-    by_hand_m = {**shifts_of(0.001), "left": np.array([0.002, 0.0, 0.0])}
-    resumed = ShiftHistory(shifts_of(0.0)).after(by_hand_m, shifts_of(0.001), by_hand_m)
-    assert same_shifts(resumed.present, by_hand_m)
-    assert not resumed.is_replaced
-    resumed = resumed.after(shifts_of(0.003), shifts_of(0.003), by_hand_m)
-    assert resumed.is_replaced
-    resumed.undo()
-    assert same_shifts(resumed.present, {**shifts_of(0.003), "left": by_hand_m["left"]})
-
-
-def test_a_replaced_shift_survives_another_replacement() -> None:
+def test_what_others_set_again_as_it_was_set_by_hand_is_not_replaced() -> None:
     history = ShiftHistory(shifts_of(0.0))
     by_hand_m = {**shifts_of(0.0), "left": np.array([0.002, 0.0, 0.0])}
     history.change(by_hand_m)
-    history = history.after(shifts_of(0.001)).after(shifts_of(0.003))
+    history.see(shifts_of(0.001))
+    history.see(by_hand_m)  # a deleted alignment was restored
+    assert not history.is_replaced
+    history.undo()
+    assert same_shifts(history.present, shifts_of(0.0)), "as it was before it was set by hand"
+
+
+def test_an_eye_that_others_leave_as_it_was_set_is_not_replaced() -> None:
+    history = ShiftHistory(shifts_of(0.0))
+    right_m = np.full(3, 0.002)
+    history.change({**shifts_of(0.0), "right": right_m})
+    history.see({"left": np.full(3, 0.004), "right": right_m})
+    assert not history.is_replaced
+    history.undo()
+    assert history.present["right"].tolist() == [0.0, 0.0, 0.0]
+    assert history.present["left"][0] == 0.004
+
+
+def test_what_was_set_by_hand_before_a_session_was_resumed_is_an_undo_away() -> None:
+    by_hand_m = {**shifts_of(0.001), "left": np.array([0.002, 0.0, 0.0])}
+    history = ShiftHistory(shifts_of(0.001), by_hand_m)
+    assert same_shifts(history.present, by_hand_m)
+    history.see(by_hand_m)
+    assert not history.is_replaced
+    history.see(shifts_of(0.003))
     assert history.is_replaced
     history.undo()
     assert same_shifts(history.present, {**shifts_of(0.003), "left": by_hand_m["left"]})
-    again = ShiftHistory(shifts_of(0.0))
-    again.change(by_hand_m)
-    again = again.after(shifts_of(0.001)).after(by_hand_m)
-    assert not again.is_replaced
-    assert same_shifts(again.present, by_hand_m)
-    again.undo()
-    assert same_shifts(again.present, shifts_of(0.0))
+
+
+STEPS = st.one_of(
+    st.tuples(st.just("hand"), st.sampled_from(EYES)),
+    st.tuples(st.sampled_from(["others", "undo", "redo"]), st.none()),
+)
+
+
+@given(st.lists(STEPS, max_size=12))
+def test_an_undo_sets_no_eye_that_nobody_touched(steps: list[tuple[str, Eye | None]]) -> None:
+    history = ShiftHistory(shifts_of(0.0))
+    by_hand: dict[Eye, set[float]] = {eye: set() for eye in EYES}
+    others_m = 0.0
+    for number, (step, eye) in enumerate(steps, 1):
+        before_m = history.present
+        if eye is not None:
+            by_hand[eye].add(1e-3 * number)
+            history.change({**before_m, eye: np.full(3, 1e-3 * number)})
+        elif step == "others":
+            others_m = -1e-3 * number
+            history.see(shifts_of(others_m))
+            lost = [one for one in EYES if before_m[one][0] in by_hand[one]]
+            if lost:
+                assert history.is_replaced
+                history.undo()
+                assert all(history.present[one][0] == before_m[one][0] for one in lost)
+                history.redo()
+        else:
+            getattr(history, step)()
+        for one in EYES:
+            assert history.present[one][0] in {others_m, *by_hand[one]}

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.display import DrawnMove, effect_at
-from handcal.register.results import Results
+from handcal.register.results import Results, results_json
 from handcal.rig_types import Rig
 from handcal.session.record import SessionRecord
 from handcal.station.snapshot import Snapshot
@@ -34,6 +34,7 @@ from handcal_gui.panels.fine_tune.history import Shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.fine_tune.stream import PERIOD_MS
 from handcal_gui.panels.trials.panel import TrialsPanel
+from handcal_gui.widgets.result_rows import fine_tuned_texts
 from tests.gui.helpers import child
 from tests.gui.panels.fine_tune.controls import (
     Show,
@@ -101,19 +102,38 @@ def test_a_session_resumed_with_the_same_phi_begins_with_it(
         assert not field(panel, "left", 1).isEnabled()
 
 
+@pytest.mark.parametrize("has_results", [True, False])
 def test_what_was_fine_tuned_before_a_resume_is_an_undo_away(
-    panel: FineTunePanel, show: Show, record: SessionRecord, results: Results
+    panel: FineTunePanel, show: Show, record: SessionRecord, results: Results, has_results: bool
 ) -> None:
     solved_m = results.rendered_shift_m
     tuned_m = {**solved_m, "left": solved_m["left"] + np.array([0.002, 0.0, 0.0])}
-    resumed = replace(record, fine_tuned=tuned_m)
-    show(procedure={"applied_shift_m": tuned_m}, record=resumed)
+    held = results_json(results) if has_results else None
+    resumed = replace(record, fine_tuned=tuned_m, results=held)
+    solved = results if has_results else None
+    show(procedure={"applied_shift_m": tuned_m, "results": solved}, record=resumed)
     show(procedure={"applied_shift_m": solved_m}, record=record)  # an alignment more
     assert "The φ you set was replaced" in status(panel)
     QTest.keyClick(panel, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     tuned_mm, solved_mm = (1e3 * one for one in (tuned_m["left"], solved_m["right"]))
     np.testing.assert_allclose(fields_mm(panel, "left"), tuned_mm, atol=0.005)
     np.testing.assert_allclose(fields_mm(panel, "right"), solved_mm, atol=0.005)
+
+
+def test_going_back_is_not_fine_tuning(
+    panel: FineTunePanel, show: Show, record: SessionRecord, results: Results
+) -> None:
+    offline_m = {eye: np.zeros(3) for eye in EYES}
+    events = (
+        *record.events,
+        *(replace(record.events[-1], name=n) for n in ("went_back", "fine_tuned")),
+    )
+    back = replace(record, fine_tuned=offline_m, events=events)
+    assert fine_tuned_texts(results, replace(back, events=record.events)), "else it would be"
+    assert not fine_tuned_texts(results, back)
+    show(procedure={"applied_shift_m": offline_m}, record=back)
+    show(procedure={"applied_shift_m": results.rendered_shift_m}, record=record)
+    assert "replaced" not in status(panel)
 
 
 def test_a_comparison_is_not_ended_by_accident(panel: FineTunePanel, show: Show) -> None:

@@ -134,6 +134,14 @@ def test_the_history_is_of_the_last_ten_seconds(panel: RotationPanel, snapshot: 
     np.testing.assert_allclose(angles_deg, np.arange(4, 15))
 
 
+def test_the_history_ends_at_the_angle_shown(panel: RotationPanel, snapshot: Make) -> None:
+    for t_s, angle_deg, ends_deg in ((1.0, 5.0, 5.0), (1.03, 5.2, 5.0), (1.06, 5.4, 5.4)):
+        panel.show_snapshot(turned(snapshot, (0, 0, angle_deg), t_s))
+        assert history(panel)[1][-1] == pytest.approx(ends_deg), "redrawn only if it has moved"
+    panel.show_snapshot(turned(snapshot, (0, 0, 5.5), 1.3))
+    assert history(panel)[1][-1] == pytest.approx(5.5)
+
+
 def test_what_is_beyond_the_scale_is_drawn_at_its_end(panel: RotationPanel, snapshot: Make) -> None:
     panel.show_snapshot(turned(snapshot, (0, 0, 40)))
     assert history(panel)[1].tolist() == pytest.approx([18.0])

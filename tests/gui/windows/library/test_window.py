@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +17,12 @@ from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushB
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
+from handcal.session.judged_trials import EyeTrials
 from handcal.session.library import EyeOutcome, LibraryEntry, delete_session, read_library
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.types import EYES
-from handcal_gui.theme import number_font
+from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.widgets.error_bars import LIBRARY_LEGEND, error_text
 from handcal_gui.windows.library.sessions_model import (
     COLUMNS,
@@ -111,6 +113,10 @@ def test_the_trend_has_a_line_at_the_newest_target(qtbot: QtBot, tmp_path: Path)
     assert plot._target.getData()[1] is None or not len(plot._target.getData()[1])
 
 
+def tried(mean_arcmin: float, target_arcmin: float | None) -> EyeTrials:
+    return EyeTrials(1, mean_arcmin, math.inf if target_arcmin is None else target_arcmin)
+
+
 def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_path: Path) -> None:
     def said(arcmin: float, target_arcmin: float | None, *verdicts: str) -> tuple[str, str]:
         left, right = (EyeOutcome(one, 20, 5, None) for one in verdicts)
@@ -120,8 +126,8 @@ def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_pa
             trials=2,
             target_arcmin=target_arcmin,
             eyes={
-                "left": replace(left, trials_arcmin=arcmin),
-                "right": replace(right, trials_arcmin=2.0),
+                "left": replace(left, trials=tried(arcmin, target_arcmin)),
+                "right": replace(right, trials=tried(2.0, target_arcmin)),
             },
         )
         row = make_row(entry)
@@ -129,9 +135,9 @@ def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_pa
 
     both = "accept", "accept"
     over = "⚠ Trials over 8′"
-    assert said(10.4, 8.0, *both) == (f"Left {over}, Right ✓ Accept", "⚠ 10.4 / 2.0 n=2")
-    assert said(7.9, 8.0, *both) == ("✓ Accept", "7.9 / 2.0 n=2")
-    assert said(10.4, None, *both) == ("✓ Accept", "10.4 / 2.0 n=2")  # of an older version
+    assert said(10.4, 8.0, *both) == (f"Left {over}, Right ✓ Accept", "⚠ 10.4 / 2.0 n=1/1")
+    assert said(7.9, 8.0, *both) == ("✓ Accept", "7.9 / 2.0 n=1/1")
+    assert said(10.4, None, *both) == ("✓ Accept", "10.4 / 2.0 n=1/1")  # of an older version
     assert said(10.4, 8.0, "accept", "repeat")[0] == f"Left {over}, Right ↻ Repeat"
     assert said(10.4, 8.0, "repeat", "accept")[0] == "Left ↻ Repeat, Right ✓ Accept"
 
@@ -140,12 +146,14 @@ def test_sessions_whose_trials_contradict_the_verdict_are_found_and_stand_togeth
     model = SessionsModel()
     entries = []
     for arcmin in (7.0, 9.0, 6.0, 10.0):
-        eyes = dict.fromkeys(EYES, EyeOutcome("accept", 20, 5, None, trials_arcmin=arcmin))
+        eyes = dict.fromkeys(EYES, EyeOutcome("accept", 20, 5, None, trials=tried(arcmin, 8.0)))
         entries.append(LibraryEntry(Path(f"{arcmin}"), (0, 0), eyes=eyes, target_arcmin=8.0))
     model.show_rows([make_row(one) for one in entries])
     model.search("", "accepted")
     model.sort(4)
     assert [row.texts[4][0] for row in model.shown] == [*"⚠⚠✓✓"]
+    model.sort(8)
+    assert [row.entry.path.name for row in model.shown] == ["6.0", "7.0", "9.0", "10.0"]
 
 
 def test_the_bars_and_the_columns_use_the_same_words_and_numbers() -> None:
@@ -157,6 +165,16 @@ def test_the_bars_and_the_columns_use_the_same_words_and_numbers() -> None:
     assert one.texts[5:8] == ("20.0 / –", "8.0 / –", "5.0 / –")  # of the left eye
     assert error_text(one.entry.eyes) == "Left eye: 20.0′ before, 5.0′ after"
     assert all(column.tooltip for column in COLUMNS)
+
+
+def test_titles_have_room_for_the_arrow(window: LibraryWindow) -> None:
+    window.resize(1900, 600)
+    window._sessions.show_rows([make_row(LibraryEntry(Path("a"), (0, 0)))])
+    child(window, SessionsTable).fit_columns()
+    across = table(window).horizontalHeader()
+    for number, column in enumerate(COLUMNS):
+        text_px = max(map(across.fontMetrics().horizontalAdvance, column.title.split("\n")))
+        assert across.sectionSize(number) >= text_px + 2 * SPACING_PX
 
 
 def test_search_and_kind_show_their_keys(window: LibraryWindow) -> None:
@@ -177,11 +195,11 @@ def test_numbers_stand_apart_from_the_text_of_the_next_column(window: LibraryWin
 
 def test_trials_stand_apart_from_the_state(window: LibraryWindow) -> None:
     window.resize(1600, 600)
-    tried = EyeOutcome("accept", 20, 5, None, trials_arcmin=111.1)
+    tried = EyeOutcome("accept", 20, 5, None, trials=EyeTrials(111, 111.1, 8.0))
     one = LibraryEntry(Path("a"), (0, 0), trials=222, eyes=dict.fromkeys(EYES, tried))
     window._sessions.show_rows([make_row(one)])
     child(window, SessionsTable).fit_columns()
-    text_px = QFontMetrics(number_font()).horizontalAdvance("111.1 / 111.1 n=222")
+    text_px = QFontMetrics(number_font()).horizontalAdvance("⚠ 111.1 / 111.1 n=111/111")
     assert table(window).columnWidth(8) - text_px >= 24
 
 
