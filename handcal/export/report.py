@@ -106,7 +106,7 @@ def _doubt(verdict: Verdict, trials: EyeTrials | None) -> str:
         return ""
     return (
         f", but wrong by {trials.mean_arcmin:.1f} arcmin in its trials (n = {trials.count}), over "
-        f"the lab's target of {trials.target_arcmin:g}"
+        f"the lab's target of {trials.target_arcmin:g} arcmin"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from handcal.export import figures
@@ -11,6 +12,7 @@ from handcal.export.tables import corner_rows
 from handcal.report.cells import extremes, interval_ends, length_mm, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Section, Table
 from handcal.session.comparison import Comparison, count_comparisons
+from handcal.session.judged_trials import eye_trials
 from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise_trials
 from handcal.statistics import mean_interval
 
@@ -54,17 +56,22 @@ def user_test_section(outcome: SessionOutcome) -> Section:
 
 
 def _interval(outcome: SessionOutcome) -> str:
-    """Return a sentence on the uncertainty of the mean error."""
+    """Return sentences on the calibrations that were tried and the uncertainty of the mean."""
     trials = outcome.record.trials
     calibrations = list(calibration_numbers(trials).values())
+    judged = eye_trials(outcome.results, outcome.record, math.inf) if outcome.results else {}
+    former = len(trials) - sum(one.count for one in judged.values())
+    said = (
+        f"{former} of {len(trials)} trials judge an earlier φ than the result. " if former else ""
+    )
     if len(set(calibrations)) < 2:
-        return (
+        return said + (
             "All trials judge one calibration, so how far another would differ is not known: no "
             "interval is given for the mean."
         )
     errors = [float(trial.error_arcmin.mean()) for trial in trials.values()]
     found = mean_interval(errors, calibrations)
-    return (
+    return said + (
         f"Mean over {found.clusters} calibrations of this wearer: {found.mean:.2f} arcmin "
         f"({100 * found.level:g} % interval {interval_ends(found)})."
     )

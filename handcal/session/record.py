@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from handcal.display import as_shifts
 from handcal.errors import FileError
 from handcal.io.files import read_json, read_limited
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
@@ -95,16 +96,28 @@ class SessionRecord:
         return ", ".join(what for name, value, what in parts if station.get(name) == value)
 
     @property
-    def went_back(self) -> bool:
-        """True if φ was last set by going back to another, which records it as fine-tuned."""
-        setting = WENT_BACK, SessionEvent.FINE_TUNED
-        return [one.name for one in self.events if one.name in setting][-2:-1] == [WENT_BACK]
+    def set_by_hand_m(self) -> Mapping[Eye, Float64]:
+        """Each (3,); φ last set by hand since the results; empty if another is drawn."""
+        by_hand: Mapping[Eye, Float64] = {}
+        went_back = bool(self.facts.former)  # whose φ is recorded like a fine-tuning
+        for event in self.events:
+            if event.name == SessionEvent.FINE_TUNED and not went_back:
+                by_hand = as_shifts(event.data["shift_m"])
+            elif event.name == SessionEvent.SOLVED:
+                by_hand = {}
+            if event.name in (WENT_BACK, SessionEvent.FINE_TUNED):
+                went_back = event.name == WENT_BACK
+        drawn = self.fine_tuned or {}
+        if drawn.keys() != by_hand.keys():
+            return {}
+        return drawn if all((drawn[eye] == by_hand[eye]).all() for eye in drawn) else {}
 
     @property
-    def set_by_hand_m(self) -> Mapping[Eye, Float64]:
-        """Each (3,); φ last set by hand since the results, empty if it was set otherwise."""
-        is_former = bool(self.facts.former) and self.results is None  # of the session before
-        return {} if self.went_back or is_former else self.fine_tuned or {}
+    def went_back(self) -> bool:
+        """True if φ was last set by going back to another than one set by hand."""
+        setting = WENT_BACK, SessionEvent.FINE_TUNED
+        last = [one.name for one in self.events if one.name in setting][-2:-1]
+        return last == [WENT_BACK] and not self.set_by_hand_m
 
     @property
     def refused(self) -> int:

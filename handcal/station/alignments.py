@@ -208,7 +208,7 @@ class AlignmentSteps:
             raise ProcedureError(f"a cursor cannot be made now ({self.state}): solve and apply")
         hand = self.raised if displacement_W_m is not None and self.raised else self.steady_hand
         if hand is None:
-            raise ProcedureError("hold the hand still in view of the camera, then make the cursor")
+            raise ProcedureError("hold the hand still in view of the camera, then try again")
         if self._delay.is_needed:
             raise ProcedureError(
                 "the delay of the camera's pictures is not known yet; let the wearer look slowly "

@@ -89,7 +89,7 @@ def eye_results(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list[
 
 def _trials_bar(found: EyeTrials | None) -> Bar:
     if found is None:
-        return Bar(tr("Trials"), None, absent=tr("none"))
+        return Bar(tr("Trials"), None, absent=tr("none of this φ"))
     return Bar(tr("Trials, n = {}").format(found.count), found.mean_arcmin)
 
 

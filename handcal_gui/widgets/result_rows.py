@@ -191,12 +191,14 @@ def result_rows(results: Results, rig: Rig, trials: Row | None = None) -> list[R
         rows.append(
             Row(tr("Prior"), (learned,), tr("Where eyes are expected before any alignment"))
         )
-    count = pluralize(len(results.alignments), tr("alignment"), tr("alignments"))
-    verified = pluralize(len(results.fused.verified), tr("verified eye"), tr("verified eyes"))
-    if results.alignments and results.fused.verified:
-        rows.append(Row(tr("Corrected by"), (verified,), tr("Verifications, fused with the rest")))
-    fused = f"{count if results.alignments else verified}, {results.method}"
-    return [*rows, Row(tr("Solved from"), (fused,), tr("What was fused, and the solver"))]
+    alignments, verified = len(results.alignments), len(results.fused.verified)
+    fused = pluralize(alignments, tr("alignment"), tr("alignments"))
+    if not alignments:
+        fused = pluralize(verified, tr("verified eye"), tr("verified eyes"))
+    elif verified:
+        fused = tr("{}, {} verified").format(fused, verified)
+    meaning = tr("Alignments and verified eyes that were fused; solver: {}").format(results.method)
+    return [*rows, Row(tr("Solved from"), (fused,), meaning)]
 
 
 def fine_tuned_texts(results: Results, record: SessionRecord) -> dict[Eye, str]:

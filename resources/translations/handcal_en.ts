@@ -1509,6 +1509,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Not every eye has been verified since the alignments changed. Finish, or verify an eye again.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Verified, and tested in trials, before the alignments changed. Finish, or verify an eye again.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -2029,7 +2033,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>another alignment</source>
+        <source>add an alignment</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3988,6 +3992,10 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>none of this φ</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Trials, n = {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4102,6 +4110,14 @@ set well by hand.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>{}, {} verified</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments and verified eyes that were fused; solver: {}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>φ = ({}) mm</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4119,10 +4135,6 @@ set well by hand.</source>
     </message>
     <message>
         <source>Solved from</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>What was fused, and the solver</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4159,14 +4171,6 @@ set well by hand.</source>
     </message>
     <message>
         <source>Where eyes are expected before any alignment</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Corrected by</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Verifications, fused with the rest</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -90,6 +90,7 @@ def test_how_sure_the_mean_error_is_takes_several_calibrations(outcome: SessionO
     again = replace(trials[-1], calibrated_shift_m=np.zeros(3), error_arcmin=np.full(4, 20.0))
     first = np.mean([trial.error_arcmin.mean() for trial in trials[:-1]])
     assert said([*trials[:-1], again]).startswith(
+        "1 of 4 trials judge an earlier φ than the result. "
         f"Mean over 2 calibrations of this wearer: {(first + 20.0) / 2.0:.2f} arcmin (95 % interval"
     )
 
@@ -106,8 +107,8 @@ def test_the_verdict_says_that_trials_contradict_it(outcome: SessionOutcome) -> 
 
     accepted = dict.fromkeys(EYES, Verdict("accept", "as told"))
     outcome = replace(outcome, results=replace(outcome.results, verdicts=accepted))
-    said = ", but wrong by 20.7 arcmin in its trials (n = 1), over the lab's target of 8: as told;"
-    assert f"Left eye accepted{said} right eye accepted: as told" in lead(
+    said = ", but wrong by 20.7 arcmin in its trials (n = 1), over the lab's target of 8 arcmin"
+    assert f"Left eye accepted{said}: as told; right eye accepted: as told" in lead(
         calibrated_shift_m=shift_m
     )
     assert said not in lead(calibrated_shift_m=shift_m + 1e-3), "a former calibration's"

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
+from handcal.session.state import SessionEvent
 from handcal.session.trial import make_trial
 from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
-from handcal.types import EYES, Eye, Verdict, VerdictName, Verification
+from handcal.types import EYES, Eye, Float64, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.step_views import save_view
 from handcal_gui.pages.wizard.steps import PLANS, Wizard
@@ -49,6 +50,13 @@ def judged(
     }
     results = replace(seen.procedure.results, verdicts=verdicts)
     return replace(seen, procedure=replace(seen.procedure, results=results))
+
+
+def fine_tuned(record: SessionRecord, shifts_m: Mapping[Eye, Float64]) -> SessionRecord:
+    """Return the record of a session with these shifts, set by hand."""
+    data = {"shift_m": {eye: one.tolist() for eye, one in shifts_m.items()}}
+    event = replace(record.events[-1], name=SessionEvent.FINE_TUNED, data=data)
+    return replace(record, fine_tuned=dict(shifts_m), events=(*record.events, event))
 
 
 def tried(seen: Snapshot) -> Snapshot:

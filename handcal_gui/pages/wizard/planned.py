@@ -244,7 +244,12 @@ class PlannedWizard(Wizard):
         main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
         if set(procedure.verifications) >= set(self.usable_eyes):
             text = tr("Verified before the alignments changed. Finish, or verify an eye again.")
-            if snapshot.record.trials and not trials_of(snapshot):
+            if snapshot.record.verified_now:
+                text = tr(
+                    "Not every eye has been verified since the alignments changed. Finish, or "
+                    "verify an eye again."
+                )
+            elif snapshot.record.trials and not trials_of(snapshot):
                 text = tr(
                     "Verified, and tested in trials, before the alignments changed. Finish, or "
                     "verify an eye again."

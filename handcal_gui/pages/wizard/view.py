@@ -72,7 +72,7 @@ ACTION_NAMES: dict[str, str] = {
     Action.CONFIRM: tr("confirm"),
     Action.SOLVE: tr("solve"),
     Action.APPLY: tr("apply"),
-    Action.ANOTHER: tr("another alignment"),
+    Action.ANOTHER: tr("add an alignment"),
     Action.REDO: tr("redo"),
     Action.VERIFY: tr("verify the eye"),
     Action.VERIFIED: tr("confirm the verification"),

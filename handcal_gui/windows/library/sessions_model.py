@@ -109,6 +109,8 @@ def _trials(entry: LibraryEntry) -> str:
     if not entry.trials:
         return NOTHING
     trials = [entry.eyes[eye].trials if eye in entry.eyes else None for eye in EYES]
+    if not any(trials):
+        return tr("{} of earlier φ").format(entry.trials)
     means = " / ".join(NOTHING if one is None else f"{one.mean_arcmin:.1f}" for one in trials)
     counts = "/".join(str(one.count) if one else "0" for one in trials)
     is_over = any(one is not None and one.is_over for one in trials)

@@ -75,7 +75,7 @@ def test_no_eye_is_ticked_whose_trials_are_over_the_target(qtbot: QtBot, results
     assert [bar.arcmin is None for bar in left.bars] == [False, False, False, True]
     lines = result_text(accepted, 8.0, trials=over).splitlines()
     assert "Trials, n = 2: 20.7′" in lines
-    assert "Trials: none" in lines
+    assert "Trials: none of this φ" in lines
 
 
 def test_a_bar_within_the_target_is_painted_otherwise(qtbot: QtBot, results: Results) -> None:

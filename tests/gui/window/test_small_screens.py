@@ -34,7 +34,7 @@ from handcal_gui.program import Program
 from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.window import MainWindow, Page
 from tests.gui.helpers import child, text
-from tests.gui.views import NUDGED, all_views
+from tests.gui.views import NUDGED, all_views, fine_tuned
 from tests.gui.window.conftest import Maker, main_button, say, shown
 
 
@@ -263,7 +263,7 @@ def test_neither_the_start_page_nor_a_stored_session_needs_scrolling(
     review = window.findChild(ReviewPage)
     assert isinstance(review, ReviewPage)
     named, tried = replace(record, wearer=100 * "W"), with_trials(record, results)
-    tuned = replace(tried, fine_tuned={eye: np.full(3, 0.001) for eye in EYES})
+    tuned = fine_tuned(tried, {eye: np.full(3, 0.001) for eye in EYES})
     shown: tuple[tuple[Page, SessionRecord, Results, str], ...] = (
         ("start", named, results, "↻ Repeat"),
         ("review", named, results, "↻ Repeat"),

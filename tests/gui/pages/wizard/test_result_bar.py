@@ -26,6 +26,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.legend import LegendEntry
 from tests.gui.helpers import button, child, show, text
+from tests.gui.views import fine_tuned
 
 Maker = Callable[..., Snapshot]
 
@@ -53,7 +54,7 @@ def test_the_copy_has_a_fine_tuned_shift(qtbot: QtBot, snapshot: Maker) -> None:
     calibrated_m = seen.procedure.results.rendered_shift_m
     tuned_m = {**calibrated_m, "left": np.array([0.001, -0.002, 0.0])}
     bar = show(qtbot, ResultBar(), 700, 300)
-    bar.show_snapshot(replace(seen, record=replace(seen.record, fine_tuned=tuned_m)))
+    bar.show_snapshot(replace(seen, record=fine_tuned(seen.record, tuned_m)))
     assert "Left eye, fine-tuned: φ = (+1.00, −2.00, +0.00) mm" in bar.text().splitlines()
     assert "Right eye, fine-tuned" not in bar.text()
 

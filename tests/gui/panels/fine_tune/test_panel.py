@@ -27,6 +27,7 @@ from handcal.display import DrawnMove, effect_at
 from handcal.register.results import Results, results_json
 from handcal.rig_types import Rig
 from handcal.session.record import SessionRecord
+from handcal.session.state import WENT_BACK
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import MAX_HAND_SET_SHIFT_M, State
 from handcal.types import EYES
@@ -45,6 +46,7 @@ from tests.gui.panels.fine_tune.controls import (
     status,
     texts,
 )
+from tests.gui.views import fine_tuned
 
 
 def test_empty_says_how_to_begin(panel: FineTunePanel) -> None:
@@ -109,7 +111,7 @@ def test_what_was_fine_tuned_before_a_resume_is_an_undo_away(
     solved_m = results.rendered_shift_m
     tuned_m = {**solved_m, "left": solved_m["left"] + np.array([0.002, 0.0, 0.0])}
     held = results_json(results) if has_results else None
-    resumed = replace(record, fine_tuned=tuned_m, results=held)
+    resumed = replace(fine_tuned(record, tuned_m), results=held)
     solved = results if has_results else None
     show(procedure={"applied_shift_m": tuned_m, "results": solved}, record=resumed)
     show(procedure={"applied_shift_m": solved_m}, record=record)  # an alignment more
@@ -123,15 +125,21 @@ def test_what_was_fine_tuned_before_a_resume_is_an_undo_away(
 def test_going_back_is_not_fine_tuning(
     panel: FineTunePanel, show: Show, record: SessionRecord, results: Results
 ) -> None:
+    tuned_m = {eye: np.full(3, 0.001) for eye in EYES}
     offline_m = {eye: np.zeros(3) for eye in EYES}
-    events = (
-        *record.events,
-        *(replace(record.events[-1], name=n) for n in ("went_back", "fine_tuned")),
-    )
-    back = replace(record, fine_tuned=offline_m, events=events)
-    assert fine_tuned_texts(results, replace(back, events=record.events)), "else it would be"
-    assert not fine_tuned_texts(results, back)
-    show(procedure={"applied_shift_m": offline_m}, record=back)
+
+    def went_back(before: SessionRecord, shifts_m: Shifts) -> SessionRecord:
+        event = replace(before.events[-1], name=WENT_BACK)
+        return fine_tuned(replace(before, events=(*before.events, event)), shifts_m)
+
+    by_hand = fine_tuned(record, tuned_m)
+    there = went_back(by_hand, offline_m)
+    back = went_back(there, tuned_m)
+    assert [bool(fine_tuned_texts(results, one)) for one in (by_hand, there, back)] == [1, 0, 1]
+    assert [one.went_back for one in (by_hand, there, back)] == [False, True, False]
+    former = replace(by_hand, facts=replace(record.facts, former="session-1"))
+    assert not former.set_by_hand_m, "set in the session before"
+    show(procedure={"applied_shift_m": offline_m}, record=went_back(record, offline_m))
     show(procedure={"applied_shift_m": results.rendered_shift_m}, record=record)
     assert "replaced" not in status(panel)
 
