@@ -93,9 +93,14 @@ def _verdict(outcome: SessionOutcome) -> str:
         f"{eye} eye {_VERDICTS[verdict.name]}{_doubt(verdict, trials.get(eye))}: {verdict.reason}"
         for eye, verdict in outcome.results.verdicts.items()
     ]
-    tuned = [eye for eye in EYES if outcome.final(eye) == "fine_tuned"]
-    if tuned:
-        parts.append(f"{' and '.join(tuned)} fine-tuned by hand since")
+    set_since = [eye for eye in EYES if outcome.final(eye) == "fine_tuned"]
+    by_hand = outcome.record.set_by_hand_m
+    for how, eyes in (
+        ("fine-tuned by hand since", [eye for eye in set_since if eye in by_hand]),
+        ("set to another φ since, by going back", [eye for eye in set_since if eye not in by_hand]),
+    ):
+        if eyes:
+            parts.append(f"{' and '.join(eyes)} {how}")
     sentence = "; ".join(parts)
     return f"{sentence[0].upper()}{sentence[1:]}."
 

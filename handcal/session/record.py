@@ -97,7 +97,7 @@ class SessionRecord:
 
     @property
     def set_by_hand_m(self) -> Mapping[Eye, Float64]:
-        """Each (3,); φ last set by hand since the results; empty if another is drawn."""
+        """Each (3,); φ last set by hand since the results, of the eyes that are drawn with it."""
         by_hand: Mapping[Eye, Float64] = {}
         went_back = bool(self.facts.former)  # whose φ is recorded like a fine-tuning
         for event in self.events:
@@ -107,17 +107,15 @@ class SessionRecord:
                 by_hand = {}
             if event.name in (WENT_BACK, SessionEvent.FINE_TUNED):
                 went_back = event.name == WENT_BACK
-        drawn = self.fine_tuned or {}
-        if drawn.keys() != by_hand.keys():
-            return {}
-        return drawn if all((drawn[eye] == by_hand[eye]).all() for eye in drawn) else {}
+        drawn = (self.fine_tuned or {}).items()
+        return {eye: one for eye, one in drawn if eye in by_hand and (one == by_hand[eye]).all()}
 
     @property
     def went_back(self) -> bool:
-        """True if φ was last set by going back to another than one set by hand."""
+        """True if φ was last set by going back, and not for every eye to one set by hand."""
         setting = WENT_BACK, SessionEvent.FINE_TUNED
         last = [one.name for one in self.events if one.name in setting][-2:-1]
-        return last == [WENT_BACK] and not self.set_by_hand_m
+        return last == [WENT_BACK] and len(self.set_by_hand_m) < len(self.fine_tuned or {})
 
     @property
     def refused(self) -> int:

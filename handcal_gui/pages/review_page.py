@@ -165,7 +165,8 @@ def _facts(
         pluralize(len(record.trials), tr("trial"), tr("trials")),
     )
     by_hand = (tr("{} fine-tuned").format(eyes_text(tuned).lower()),) if tuned else ()
-    yield "Contents", tr("Contents"), f"{', '.join((*counts, *by_hand))}; {state}"
+    back = (tr("with another φ after going back"),) if record.went_back else ()
+    yield "Contents", tr("Contents"), f"{', '.join((*counts, *by_hand, *back))}; {state}"
     yield "Folder", tr("Folder"), str(record.path)
     if note:
         yield "Note", tr("Note"), note

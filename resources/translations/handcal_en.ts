@@ -963,6 +963,10 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>with another φ after going back</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Contents</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1650,6 +1654,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>{}, fine-tuned</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Drawn and exported</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>with another φ, after going back</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

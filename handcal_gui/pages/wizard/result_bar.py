@@ -82,6 +82,8 @@ class ResultBar(QWidget):
         head = dict(_head(self._record))
         for eye, phi in fine_tuned_texts(self._results, self._record).items():
             head[tr("{}, fine-tuned").format(EYE_NAMES[eye])] = phi
+        if self._record.went_back:
+            head[tr("Drawn and exported")] = tr("with another φ, after going back")
         return result_text(self._results, self._target_arcmin, head, self._trials())
 
     def _trials(self) -> Mapping[Eye, EyeTrials]:

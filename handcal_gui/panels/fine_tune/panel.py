@@ -150,7 +150,7 @@ class FineTunePanel(QWidget):
         is_new = self._stream.see(snapshot)
         if is_new:
             applied, by_hand = snapshot.procedure.applied_shift_m, snapshot.record.set_by_hand_m
-            if self._obstacle == _NO_SESSION and same_shifts(applied, by_hand):  # it was resumed
+            if self._obstacle == _NO_SESSION and same_shifts({**applied, **by_hand}, applied):
                 stored = read_rendered_shift_m(snapshot.record.results)
                 self._history = ShiftHistory({**_OFFLINE, **stored}, by_hand)
             self._history.see(applied)

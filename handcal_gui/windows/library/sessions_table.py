@@ -16,6 +16,7 @@ from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.error_bars import PICTURE_PX
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.result_rows import NOTHING
 from handcal_gui.windows.library.sessions_model import (
     COLUMNS,
     NAMES,
@@ -139,7 +140,8 @@ class SessionsTable(QTableView):
         excess_px = sum(wanted_px.values()) - self.viewport().width()
         hidden = []
         for number in SPARED:
-            if excess_px > sum(spare_px.values()):
+            is_empty = self._sessions.longest_text(number) == NOTHING
+            if excess_px > (0 if is_empty else sum(spare_px.values())):
                 self.hideColumn(number)
                 hidden.append(number)
                 excess_px -= wanted_px[number]

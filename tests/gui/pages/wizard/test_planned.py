@@ -252,10 +252,11 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
         ),
         ([went_back, fine_tuned, fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
     ):
-        events = (*done.record.events, *(Event(99, "", name, {}) for name in names))
+        data = {"shift_m": {eye: one.tolist() for eye, one in drawn_m.items()}}
+        events = (*done.record.events, *(Event(99, "", name, data) for name in names))
         shifts_m = {"applied_shift_m": drawn_m, "former_shift_m": former_m}
         seen = planned_snapshot(snapshot, StepName.DONE, **shifts_m)
-        seen = replace(seen, record=replace(seen.record, events=events))
+        seen = replace(seen, record=replace(seen.record, events=events, fine_tuned=drawn_m))
         said = (
             f"Both eyes: drawn, saved and exported with {which}; the verdict applies to the solved "
             f"φ. {how} to return."

@@ -137,6 +137,9 @@ def test_going_back_is_not_fine_tuning(
     back = went_back(there, tuned_m)
     assert [bool(fine_tuned_texts(results, one)) for one in (by_hand, there, back)] == [1, 0, 1]
     assert [one.went_back for one in (by_hand, there, back)] == [False, True, False]
+    one_eye = went_back(by_hand, {**offline_m, "left": tuned_m["left"]})
+    assert one_eye.went_back
+    assert list(one_eye.set_by_hand_m) == ["left"], "as of a former φ that held it"
     former = replace(by_hand, facts=replace(record.facts, former="session-1"))
     assert not former.set_by_hand_m, "set in the session before"
     show(procedure={"applied_shift_m": offline_m}, record=went_back(record, offline_m))
