@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from handcal.display import as_shifts
 from handcal.errors import FileError
 from handcal.io.files import read_json, read_limited
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
@@ -26,7 +25,7 @@ from handcal.session.journal import (
     JournalContent,
     read_journal,
 )
-from handcal.session.state import WENT_BACK, SessionEvent, SessionState
+from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import Trial, make_trial
 from handcal.types import Alignment, Eye, Float64
 
@@ -78,6 +77,10 @@ class SessionRecord:
     """Of each alignment, deleted ones too."""
     last_alignment: int = 0
     """Greatest number of an alignment, lost ones too; the next one is greater."""
+    set_by_hand_m: Mapping[Eye, Float64] = field(default_factory=dict)
+    """each (3,); φ last set by hand since the results, of the eyes that are drawn with it."""
+    went_back: bool = False
+    """True if φ was last set by going back, and not for every eye to one set by hand."""
     damaged: tuple[Damage, ...] = ()
     """Parts that are damaged; their contents are missing here, or were read from a copy."""
 
@@ -94,28 +97,6 @@ class SessionRecord:
             return ""
         parts = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
         return ", ".join(what for name, value, what in parts if station.get(name) == value)
-
-    @property
-    def set_by_hand_m(self) -> Mapping[Eye, Float64]:
-        """Each (3,); φ last set by hand since the results, of the eyes that are drawn with it."""
-        by_hand: Mapping[Eye, Float64] = {}
-        went_back = bool(self.facts.former)  # whose φ is recorded like a fine-tuning
-        for event in self.events:
-            if event.name == SessionEvent.FINE_TUNED and not went_back:
-                by_hand = as_shifts(event.data["shift_m"])
-            elif event.name == SessionEvent.SOLVED:
-                by_hand = {}
-            if event.name in (WENT_BACK, SessionEvent.FINE_TUNED):
-                went_back = event.name == WENT_BACK
-        drawn = (self.fine_tuned or {}).items()
-        return {eye: one for eye, one in drawn if eye in by_hand and (one == by_hand[eye]).all()}
-
-    @property
-    def went_back(self) -> bool:
-        """True if φ was last set by going back, and not for every eye to one set by hand."""
-        setting = WENT_BACK, SessionEvent.FINE_TUNED
-        last = [one.name for one in self.events if one.name in setting][-2:-1]
-        return last == [WENT_BACK] and len(self.set_by_hand_m) < len(self.fine_tuned or {})
 
     @property
     def refused(self) -> int:
@@ -217,6 +198,8 @@ def read_session(
         is_applied=state.is_applied and is_complete,
         applied_shift_m=MappingProxyType(state.applied_shift_m),
         fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
+        set_by_hand_m=MappingProxyType(state.set_by_hand_m),
+        went_back=state.went_back,
         is_finished=state.is_finished,
         journal_bytes=journal.complete_bytes,
         torn_bytes=journal.torn_bytes,

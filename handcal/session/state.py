@@ -165,6 +165,7 @@ class SessionState:
     is_solved, is_applied, is_finished : bool
     applied_shift_m : dict of eye to (3,) float64
     fine_tuned : dict of eye to (3,) float64, or None
+    went_back : bool
         As in `handcal.session.session.SessionRecord`.
     """
 
@@ -185,12 +186,25 @@ class SessionState:
         self.is_finished = False
         self.applied_shift_m: dict[Eye, Float64] = {}
         self.fine_tuned: dict[Eye, Float64] | None = None
+        self._by_hand: dict[Eye, Float64] = {}
+        self._is_going_back = self._is_back = False
 
     @property
     def verified_now(self) -> frozenset[Eye]:
         """The eyes verified with the present alignments."""
         now = frozenset(self.alignments.active)
         return frozenset(eye for eye, then in self._verified_with.items() if then == now)
+
+    @property
+    def set_by_hand_m(self) -> dict[Eye, Float64]:
+        """Each (3,); φ last set by hand since the results, of the eyes that are drawn with it."""
+        drawn, by_hand = self.fine_tuned or {}, self._by_hand
+        return {e: one for e, one in drawn.items() if e in by_hand and (one == by_hand[e]).all()}
+
+    @property
+    def went_back(self) -> bool:
+        """True if φ was last set by going back, and not for every eye to one set by hand."""
+        return self._is_back and len(self.set_by_hand_m) < len(self.fine_tuned or {})
 
     def items(self, kind: Kind) -> NumberedItems[Any]:
         """Return the alignments or the trials."""
@@ -259,12 +273,20 @@ class SessionState:
             case SessionEvent.SOLVED:
                 self._set_results(data)
                 self.is_solved, self.is_applied, self.fine_tuned = True, False, None
+                self._by_hand = {}
             case SessionEvent.APPLIED if "shift_m" in data:  # not in version 1
                 self.applied_shift_m |= as_shifts(data["shift_m"])
                 self.is_applied = self.is_solved
             case SessionEvent.FINE_TUNED:
+                # After a slip, φ of the session before is recorded first.
+                is_former = bool(self.facts.former) and not self.applied_shift_m
                 self.fine_tuned = as_shifts(data["shift_m"])
                 self.applied_shift_m |= self.fine_tuned
+                self._is_back, self._is_going_back = self._is_going_back, False
+                if not (self._is_back or is_former):
+                    self._by_hand = self.fine_tuned
+        if name == WENT_BACK:
+            self._is_going_back = True
         if name.startswith("alignment_"):
             self.is_solved = self.is_applied = False
         if name in (SessionEvent.ALIGNMENT_DELETED, SessionEvent.ALIGNMENT_RESTORED):

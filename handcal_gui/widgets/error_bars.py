@@ -26,13 +26,16 @@ PICTURE_LEGEND = tr("Bars: error before, after; left eye above")
 LIBRARY_LEGEND = tr("Bars: expected error before, after; left eye above")
 PICTURE_HELP = tr(
     "Bars of the small picture: the left eye above the right one, each with its error before\n"
-    "the calibration (grey) and after it (coloured; full if the eye is accepted). The whole\n"
-    "width is {:.0f}′."
+    "the calibration (grey) and after it (coloured; full if the eye is accepted, and no trials\n"
+    "are over the target). The whole\nwidth is {:.0f}′."
 ).format(_SCALE_ARCMIN)
 
 
 def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
-    """Return a picture of two bars for each eye; an after bar is full if the eye is accepted."""
+    """Return a picture of two bars for each eye; an after bar is full if the eye is accepted.
+
+    It is an outline if trials contradict the acceptance.
+    """
     bars = tuple(map(eyes.get, EYES)) if has_bars(eyes) else ()
     return _draw(bars, colors(), QGuiApplication.primaryScreen().devicePixelRatio())
 

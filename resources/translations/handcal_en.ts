@@ -7069,7 +7069,8 @@ the mean over its trials, and their numbers: 0 if all were of an earlier φ.
     </message>
     <message>
         <source>Bars of the small picture: the left eye above the right one, each with its error before
-the calibration (grey) and after it (coloured; full if the eye is accepted). The whole
+the calibration (grey) and after it (coloured; full if the eye is accepted, and no trials
+are over the target). The whole
 width is {:.0f}′.</source>
         <translation type="unfinished"></translation>
     </message>

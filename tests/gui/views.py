@@ -8,7 +8,7 @@ from typing import Any
 
 from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
-from handcal.session.state import SessionEvent
+from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import make_trial
 from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Snapshot
@@ -52,11 +52,26 @@ def judged(
     return replace(seen, procedure=replace(seen.procedure, results=results))
 
 
+def with_events(record: SessionRecord, *events: tuple[str, dict[str, Any]]) -> SessionRecord:
+    """Return the record of a session in which more events were recorded that set φ."""
+    last = record.events[-1]
+    more = (replace(last, name=name, data=data) for name, data in events)
+    record = replace(record, events=(*record.events, *more))
+    state = SessionState()
+    for event in record.events:
+        state.apply(event)
+    return replace(
+        record,
+        fine_tuned=state.fine_tuned,
+        set_by_hand_m=state.set_by_hand_m,
+        went_back=state.went_back,
+    )
+
+
 def fine_tuned(record: SessionRecord, shifts_m: Mapping[Eye, Float64]) -> SessionRecord:
     """Return the record of a session with these shifts, set by hand."""
     data = {"shift_m": {eye: one.tolist() for eye, one in shifts_m.items()}}
-    event = replace(record.events[-1], name=SessionEvent.FINE_TUNED, data=data)
-    return replace(record, fine_tuned=dict(shifts_m), events=(*record.events, event))
+    return with_events(record, (SessionEvent.FINE_TUNED, data))
 
 
 def tried(seen: Snapshot) -> Snapshot:

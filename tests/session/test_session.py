@@ -8,14 +8,14 @@ import pytest
 
 from handcal.errors import FileError
 from handcal.rig.example import example_rig
-from handcal.session.journal import JOURNAL_VERSION
+from handcal.session.journal import JOURNAL, JOURNAL_VERSION, happens_now, journal_line
 from handcal.session.session import (
     MAX_ALIGNMENT_BYTES,
     MAX_NOTES_CHARACTERS,
     Session,
     SessionRecord,
 )
-from handcal.session.state import MAX_ALIGNMENTS, MAX_TRIALS
+from handcal.session.state import MAX_ALIGNMENTS, MAX_TRIALS, WENT_BACK, SessionEvent
 from handcal.session.trial import Trial, trial_json
 from handcal.types import Alignment, Verification
 from tests.helpers import DATA
@@ -245,6 +245,32 @@ def test_a_verification_is_of_the_alignments_so_far(session: Session, alignment:
     assert set(record.facts.verified) == {"left"}
     session.delete("alignment", 2)
     assert Session.open(session.path).verified_now == {"left"}
+
+
+def test_going_back_is_not_setting_by_hand(session: Session) -> None:
+    session.save_applied({"left": SHIFT_M, "right": SHIFT_M})
+    session.save_fine_tuned({"left": 2 * SHIFT_M, "right": SHIFT_M})
+    assert set(Session.open(session.path).set_by_hand_m) == {"left", "right"}
+    session.record(WENT_BACK, to="former")
+    session.save_fine_tuned({"left": 2 * SHIFT_M, "right": 3 * SHIFT_M})
+    record = Session.open(session.path)
+    assert record.went_back
+    assert set(record.set_by_hand_m) == {"left"}, "as set before"
+    session.save_results(RESULTS)
+    record = Session.open(session.path)
+    assert not record.went_back
+    assert not record.set_by_hand_m
+
+
+@pytest.mark.parametrize("data", [{}, {"shift_m": {"left": ["x"]}}, {"shift_m": 3}])
+def test_a_damaged_fine_tuning_costs_only_itself(session: Session, data: dict[str, object]) -> None:
+    session.save_fine_tuned({"left": SHIFT_M})
+    number = len(Session.open(session.path).events) + 1
+    with (session.path / JOURNAL).open("ab") as journal:
+        journal.write(journal_line(happens_now(number, SessionEvent.FINE_TUNED, data)))
+    record = Session.open(session.path)
+    assert len(record.damaged) == 1
+    assert set(record.set_by_hand_m) == {"left"}
 
 
 def test_a_shift_set_by_hand_is_kept_until_the_next_results(session: Session) -> None:

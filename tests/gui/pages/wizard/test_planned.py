@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from handcal.register.verdict import Advice
-from handcal.session.journal import Event
 from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
@@ -17,7 +16,7 @@ from handcal.station.states import State
 from handcal.types import EYES, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.view import Action, Step
-from tests.gui.views import planned_snapshot, tried
+from tests.gui.views import planned_snapshot, tried, with_events
 
 Maker = Callable[..., Snapshot]
 VERIFIED = dict.fromkeys(EYES, Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0)))
@@ -253,10 +252,10 @@ def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
         ([went_back, fine_tuned, fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
     ):
         data = {"shift_m": {eye: one.tolist() for eye, one in drawn_m.items()}}
-        events = (*done.record.events, *(Event(99, "", name, data) for name in names))
         shifts_m = {"applied_shift_m": drawn_m, "former_shift_m": former_m}
         seen = planned_snapshot(snapshot, StepName.DONE, **shifts_m)
-        seen = replace(seen, record=replace(seen.record, events=events, fine_tuned=drawn_m))
+        record = with_events(seen.record, *((name, data) for name in names))
+        seen = replace(seen, record=record)
         said = (
             f"Both eyes: drawn, saved and exported with {which}; the verdict applies to the solved "
             f"φ. {how} to return."

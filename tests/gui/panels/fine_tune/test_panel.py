@@ -27,7 +27,7 @@ from handcal.display import DrawnMove, effect_at
 from handcal.register.results import Results, results_json
 from handcal.rig_types import Rig
 from handcal.session.record import SessionRecord
-from handcal.session.state import WENT_BACK
+from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import MAX_HAND_SET_SHIFT_M, State
 from handcal.types import EYES
@@ -46,7 +46,7 @@ from tests.gui.panels.fine_tune.controls import (
     status,
     texts,
 )
-from tests.gui.views import fine_tuned
+from tests.gui.views import fine_tuned, with_events
 
 
 def test_empty_says_how_to_begin(panel: FineTunePanel) -> None:
@@ -129,8 +129,7 @@ def test_going_back_is_not_fine_tuning(
     offline_m = {eye: np.zeros(3) for eye in EYES}
 
     def went_back(before: SessionRecord, shifts_m: Shifts) -> SessionRecord:
-        event = replace(before.events[-1], name=WENT_BACK)
-        return fine_tuned(replace(before, events=(*before.events, event)), shifts_m)
+        return fine_tuned(with_events(before, (WENT_BACK, {})), shifts_m)
 
     by_hand = fine_tuned(record, tuned_m)
     there = went_back(by_hand, offline_m)
@@ -140,8 +139,10 @@ def test_going_back_is_not_fine_tuning(
     one_eye = went_back(by_hand, {**offline_m, "left": tuned_m["left"]})
     assert one_eye.went_back
     assert list(one_eye.set_by_hand_m) == ["left"], "as of a former φ that held it"
-    former = replace(by_hand, facts=replace(record.facts, former="session-1"))
+    slipped = with_events(record, (SessionEvent.FACTS_SAVED, {"former": "session-1"}))
+    former = fine_tuned(slipped, tuned_m)
     assert not former.set_by_hand_m, "set in the session before"
+    assert fine_tuned(former, tuned_m).set_by_hand_m
     show(procedure={"applied_shift_m": offline_m}, record=went_back(record, offline_m))
     show(procedure={"applied_shift_m": results.rendered_shift_m}, record=record)
     assert "replaced" not in status(panel)
