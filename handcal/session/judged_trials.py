@@ -34,7 +34,7 @@ def eye_trials(
     with another φ.
     """
     stored_m = read_rendered_shift_m(record.results if record.is_solved else None)
-    trials = record.trials.values()
+    trials = (one for one in record.trials.values() if one.eye in results.eyes)
     errors = trial_errors_arcmin(trials, results.rendered_shift_m, stored_m)
     return judge_trials(errors, target_arcmin)
 
