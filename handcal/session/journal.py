@@ -176,18 +176,19 @@ class JournalWriter:
         found = path.stat()
         self._file = found.st_dev, found.st_ino
 
-    def append(self, name: str, data: dict[str, Any]) -> Event:
-        """Append an event with the current time, sync it to disk, and return it.
+    @property
+    def complete_bytes(self) -> int:
+        """Length of the complete lines."""
+        return self._bytes
+
+    def append(self, line: bytes) -> None:
+        """Append the line of the event `next_number`, and sync it to disk.
 
         Raises
         ------
         FileError
             If the journal cannot be written or is full; its contents are kept.
-        ValueError
-            If the data contain NaN.
         """
-        event = happens_now(self.next_number, name, data)
-        line = journal_line(event)
         if self._bytes + len(line) > MAX_JOURNAL_BYTES:
             raise FileError(f"the journal of {self._path.parent} is full; start another session")
         try:
@@ -204,7 +205,6 @@ class JournalWriter:
         self._bytes += len(line)
         self._torn_bytes = 0
         self.next_number += 1
-        return event
 
     def write_end(self, notes_sha256: str | None) -> None:
         """Store the number of the last event, so that a journal cut short later is noticed."""

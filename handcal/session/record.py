@@ -19,7 +19,6 @@ from handcal.session.alignment_file import decode_alignment
 from handcal.session.facts import AlignmentFacts, SessionFacts
 from handcal.session.journal import (
     JOURNAL,
-    JOURNAL_VERSION,
     Damage,
     Event,
     JournalContent,
@@ -83,6 +82,8 @@ class SessionRecord:
     """True if φ was last set by going back, and not for every eye to one set by hand."""
     damaged: tuple[Damage, ...] = ()
     """Parts that are damaged; their contents are missing here, or were read from a copy."""
+    unwritten: tuple[Event, ...] = ()
+    """The events that could not be written yet, and are only in the program's memory."""
 
     @property
     def is_solvable(self) -> bool:
@@ -162,52 +163,91 @@ def replay(path: Path) -> Replayed:
     return Replayed(journal, state, tuple(damaged))
 
 
-def read_session(
-    path: Path, before: SessionRecord | None = None, rig: Rig | None = None
-) -> SessionRecord:
-    """Read a session; the parameters and errors are those of `Session.open`."""
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedSession:
+    """What `SessionRecord` is made of; a session that is written to keeps it up to date."""
+
+    path: Path
+    rig: Rig
+    settings: dict[str, Any]
+    notes: str
+    notes_sha256: str | None
+    """Empty without notes, None if they are damaged."""
+    state: SessionState
+    """Changed by each event."""
+    events: Sequence[Event]
+    alignments: Mapping[int, Alignment]
+    """All that are sound, deleted ones too."""
+    journal: JournalContent
+    """As read."""
+    damaged: tuple[Damage, ...]
+    journal_bytes: int
+    torn_bytes: int
+    unwritten: tuple[Event, ...] = ()
+
+    def contents(self) -> SessionRecord:
+        """Return the contents as they are now."""
+        state = self.state
+        active, deleted = (
+            MappingProxyType({n: self.alignments[n] for n in those if n in self.alignments})
+            for those in (state.alignments.active, state.alignments.deleted)
+        )
+        is_complete = state.results is not None and len(active) == len(state.alignments.active)
+        return SessionRecord(
+            path=self.path,
+            rig=self.rig,
+            settings=self.settings,
+            wearer=state.wearer,
+            notes=self.notes,
+            events=tuple(self.events),
+            alignments=active,
+            deleted_alignments=deleted,
+            trials=MappingProxyType(dict(state.trials.active)),
+            deleted_trials=MappingProxyType(dict(state.trials.deleted)),
+            results=state.results,
+            is_solved=state.is_solved and is_complete,
+            is_applied=state.is_applied and is_complete,
+            applied_shift_m=MappingProxyType(dict(state.applied_shift_m)),
+            fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
+            set_by_hand_m=MappingProxyType(state.set_by_hand_m),
+            went_back=state.went_back,
+            is_finished=state.is_finished,
+            journal_bytes=self.journal_bytes,
+            torn_bytes=self.torn_bytes,
+            facts=state.facts,
+            verified_now=state.verified_now,
+            alignment_facts=MappingProxyType(dict(state.alignment_facts)),
+            last_alignment=state.alignments.last(),
+            damaged=self.damaged,
+            unwritten=self.unwritten,
+        )
+
+
+def load_session(path: Path, rig: Rig | None = None) -> LoadedSession:
+    """Read a session once; the parameters and errors are those of `Session.open`."""
     replayed = replay(path)
     journal, state = replayed.journal, replayed.state
     damaged = list(replayed.damaged)
     rig = _read_rig(path, state, damaged) if rig is None else rig
-    known = {**before.alignments, **before.deleted_alignments} if before else {}
-    alignments, deleted_alignments = (
-        _read_alignments(path, checksums, known, damaged)
-        for checksums in (state.alignments.active, state.alignments.deleted)
-    )
-    trials, deleted_trials = (
-        _sound_trials(trials, rig, before, journal.events, damaged)
-        for trials in (state.trials.active, state.trials.deleted)
-    )
-    is_old = journal.version < JOURNAL_VERSION
-    results = _read_results(path / "results.json", state, is_old, damaged)
-    is_complete = results is not None and len(alignments) == len(state.alignments.active)
-    return SessionRecord(
+    checksums = {**state.alignments.active, **state.alignments.deleted}
+    alignments = _read_alignments(path, checksums, damaged)
+    _leave_out_unsound_trials(state, rig, journal.events, damaged)
+    _check_results(path / "results.json", state, damaged)
+    settings = _read_settings(path / "settings.json", state, damaged)
+    notes, notes_sha256 = _read_notes(path / "notes.txt", _notes_checksums(replayed), damaged)
+    return LoadedSession(
         path=path,
         rig=rig,
-        settings=_read_settings(path / "settings.json", state, damaged),
-        wearer=state.wearer,
-        notes=_read_notes(path / "notes.txt", _notes_checksums(replayed), damaged),
+        settings=settings,
+        notes=notes,
+        notes_sha256=notes_sha256,
+        state=state,
         events=journal.events,
         alignments=alignments,
-        deleted_alignments=deleted_alignments,
-        trials=trials,
-        deleted_trials=deleted_trials,
-        results=results,
-        is_solved=state.is_solved and is_complete,
-        is_applied=state.is_applied and is_complete,
-        applied_shift_m=MappingProxyType(state.applied_shift_m),
-        fine_tuned=state.fine_tuned and MappingProxyType(state.fine_tuned),
-        set_by_hand_m=MappingProxyType(state.set_by_hand_m),
-        went_back=state.went_back,
-        is_finished=state.is_finished,
+        journal=journal,
+        damaged=tuple(damaged),
         journal_bytes=journal.complete_bytes,
         torn_bytes=journal.torn_bytes,
-        facts=state.facts,
-        verified_now=state.verified_now,
-        alignment_facts=MappingProxyType(state.alignment_facts),
-        last_alignment=state.alignments.last(),
-        damaged=tuple(damaged),
     )
 
 
@@ -266,20 +306,15 @@ def _read_settings(file: Path, state: SessionState, damaged: list[Damage]) -> di
     return settings if state.settings is None else state.settings
 
 
-def _read_results(
-    file: Path, state: SessionState, is_old: bool, damaged: list[Damage]
-) -> dict[str, Any] | None:
-    """Return the results of the journal, or for older versions of the file."""
+def _check_results(file: Path, state: SessionState, damaged: list[Damage]) -> None:
+    """Compare the file of the results with the journal."""
     try:
         results = read_json(file) if file.exists() else None
         # A killed program may leave the file of earlier results.
-        if not is_old and results not in (None, state.results, *state.older_results):
+        if results not in (None, state.results, *state.older_results):
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
-        used = "nothing was read" if state.results is None else "the journal's copy was read"
-        damaged.append(Damage(file.name, None, f"{error}; {used}"))
-        return state.results
-    return results if is_old else state.results
+        damaged.append(Damage(file.name, None, f"{error}; the journal's copy was read"))
 
 
 def _notes_checksums(replayed: Replayed) -> tuple[str | None, ...]:
@@ -291,35 +326,36 @@ def _notes_checksums(replayed: Replayed) -> tuple[str | None, ...]:
     return replayed.state.notes_sha256
 
 
-def _read_notes(file: Path, checksums: tuple[str | None, ...], damaged: list[Damage]) -> str:
-    data = b""
+def _read_notes(
+    file: Path, checksums: tuple[str | None, ...], damaged: list[Damage]
+) -> tuple[str, str | None]:
+    """Return the notes and their checksum: empty without notes, None if they are damaged."""
+    data, found = b"", ""
     try:
         if file.exists():
             data = read_limited(file, 4 * MAX_NOTES_CHARACTERS)
-        found = sha256(data) if file.exists() else ""
+            found = sha256(data)
         if checksums and found not in checksums:
             raise FileError("its checksum is not the journal's")
     except FileError as error:
         damaged.append(Damage(file.name, None, f"{error}; it was read as it is"))
-    return data.decode(errors="replace")
+        return data.decode(errors="replace"), None
+    return data.decode(errors="replace"), found
 
 
 def _read_alignments(
-    path: Path,
-    checksums: Mapping[int, str],
-    known: Mapping[int, Alignment],
-    damaged: list[Damage],
-) -> Mapping[int, Alignment]:
+    path: Path, checksums: Mapping[int, str], damaged: list[Damage]
+) -> dict[int, Alignment]:
     """Return those of the alignments that are sound."""
     alignments = {}
     for number, checksum in checksums.items():
         file = alignment_path(path, number)
         try:
-            alignments[number] = known.get(number) or _read_alignment(file, checksum)
+            alignments[number] = _read_alignment(file, checksum)
         except (FileError, ValueError) as error:
             name = file.relative_to(path).as_posix()
             damaged.append(Damage(name, None, f"{error}; alignment {number} was left out"))
-    return MappingProxyType(alignments)
+    return alignments
 
 
 def _read_alignment(file: Path, checksum: str) -> Alignment:
@@ -329,24 +365,18 @@ def _read_alignment(file: Path, checksum: str) -> Alignment:
     return decode_alignment(data)
 
 
-def _sound_trials(
-    trials: Mapping[int, Trial],
-    rig: Rig,
-    before: SessionRecord | None,
-    events: Sequence[Event],
-    damaged: list[Damage],
-) -> Mapping[int, Trial]:
-    """Return the trials whose stored errors agree with their φ."""
-    known = {*before.trials, *before.deleted_trials} if before else set()
-    sound = {}
-    for number, trial in trials.items():
-        if number in known or _is_sound(trial, rig):
-            sound[number] = trial
-            continue
-        line = next(one.number for one in events if one.time == trial.time)
-        what = f"the error is not that of its φ; trial {number} was left out"
-        damaged.append(Damage(JOURNAL, line, what))
-    return MappingProxyType(sound)
+def _leave_out_unsound_trials(
+    state: SessionState, rig: Rig, events: Sequence[Event], damaged: list[Damage]
+) -> None:
+    """Remove the trials whose stored errors do not agree with their φ."""
+    state.trials.taken = state.trials.last()
+    for trials in (state.trials.active, state.trials.deleted):
+        for number, trial in list(trials.items()):
+            if not _is_sound(trial, rig):
+                del trials[number]
+                line = next(one.number for one in events if one.time == trial.time)
+                what = f"the error is not that of its φ; trial {number} was left out"
+                damaged.append(Damage(JOURNAL, line, what))
 
 
 def _is_sound(trial: Trial, rig: Rig) -> bool:

@@ -14,7 +14,7 @@ from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
 from handcal.rig.rig_file import write_rig
 from handcal.rig_types import Rig
 from handcal.session.journal import JOURNAL, Damage, Event, happens_now, journal_line
-from handcal.session.record import SessionRecord, alignment_path, read_session, sha256
+from handcal.session.record import SessionRecord, alignment_path, load_session, sha256
 from handcal.session.state import SessionEvent, SessionState
 
 SessionHealth: TypeAlias = Literal["sound", "damaged", "none"]
@@ -33,7 +33,7 @@ class SessionCheck:
 def check_session(path: Path) -> SessionCheck:
     """Return whether the session in a folder is sound, with all its damaged parts."""
     try:
-        record = read_session(path)
+        record = load_session(path).contents()
     except FileError as error:
         return SessionCheck("none", (Damage(str(path), None, str(error)),))
     return SessionCheck("damaged" if record.damaged else "sound", record.damaged)
@@ -58,7 +58,7 @@ def repair_session(path: Path, output: Path, rig: Rig | None = None) -> SessionR
     FileError
         If the session cannot be read, or the folder exists or cannot be written.
     """
-    record = read_session(path, rig=rig)
+    record = load_session(path, rig).contents()
     if output.exists():
         raise FileError(f"{output} exists; choose a new folder")
     hidden = make_folder(output.absolute().parent) / f".{output.name}.repairing"
@@ -85,7 +85,7 @@ def repair_session(path: Path, output: Path, rig: Rig | None = None) -> SessionR
         raise FileError(f"cannot write {output}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(hidden, ignore_errors=True)
-    return read_session(output)
+    return load_session(output).contents()
 
 
 def _events(record: SessionRecord, folder: Path) -> Iterator[Event]:

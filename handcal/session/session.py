@@ -18,8 +18,10 @@ and the results, and the checksum of the notes: it decides what is right where a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
@@ -43,18 +45,13 @@ from handcal.io.lock import FileLock
 from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
 from handcal.rig_types import Rig
 from handcal.session.alignment_file import encode_alignment
+from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.facts import AlignmentFacts, SessionFacts, facts_json, with_facts
-from handcal.session.journal import (
-    JOURNAL,
-    JOURNAL_VERSION,
-    JournalWriter,
-    happens_now,
-    journal_line,
-)
+from handcal.session.journal import JOURNAL, Event, JournalWriter, happens_now, journal_line
 from handcal.session.record import MAX_ALIGNMENT_BYTES as MAX_ALIGNMENT_BYTES
 from handcal.session.record import MAX_NOTES_CHARACTERS as MAX_NOTES_CHARACTERS
 from handcal.session.record import SessionRecord as SessionRecord
-from handcal.session.record import alignment_path, read_session, replay, sha256
+from handcal.session.record import alignment_path, load_session, sha256
 from handcal.session.state import Kind, SessionEvent, clean_wearer
 from handcal.session.trial import Trial, trial_json
 from handcal.types import Alignment, Eye
@@ -63,8 +60,11 @@ from handcal.types import Alignment, Eye
 class Session(Closable):
     """Writes to an existing session folder; no other program can write to it until `close`.
 
-    Data are on disk when a method returns; if it raises FileError, everything written before is
-    kept. `create` starts a new folder; `open` only reads one.
+    It holds the session's state, which is read from disk once and then follows each event. An event
+    of the procedure is in `contents` at once: an alignment, facts, results, φ. If it cannot be
+    written, the method raises FileError, and the event is written before the next one, or by
+    `write_waiting`. All other methods have no effect if they raise. When a method returns, its data
+    are on disk. `create` starts a new folder; `open` only reads one.
 
     Parameters
     ----------
@@ -73,8 +73,6 @@ class Session(Closable):
     Attributes
     ----------
     path : Path
-    revision : int
-        Increases with every write.
 
     Raises
     ------
@@ -84,24 +82,25 @@ class Session(Closable):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.revision = 0
         self._journal: JournalWriter | None = None
         self._lock = FileLock(path / "lock")
         try:
-            record = self.open(path)
-            replayed = replay(path)
-            self._state = replayed.state
+            self._loaded = load_session(path)
             for folder in (path, path / "alignments"):
                 if folder.is_dir():
                     remove_leftovers(folder)
-            self._journal = JournalWriter(path / JOURNAL, replayed.journal)
-            self._notes_sha256 = _notes_sha256(record)
-            if replayed.journal.version < JOURNAL_VERSION:
-                self._upgrade(record, replayed.journal.sha256)
+            self._journal = JournalWriter(path / JOURNAL, self._loaded.journal)
         except BaseException:
-            self._journal = None
             self.close()
             raise
+        self._state = self._loaded.state
+        self._events = list(self._loaded.journal.events)
+        self._alignments = dict(self._loaded.alignments)
+        self._notes, self._notes_sha256 = self._loaded.notes, self._loaded.notes_sha256
+        self._next_number = self._journal.next_number
+        self._waiting: deque[Callable[[], object]] = deque()
+        self._is_changed = False
+        self._contents: SessionRecord | None = None
 
     @classmethod
     def create(
@@ -150,16 +149,12 @@ class Session(Closable):
         return cls(path)
 
     @staticmethod
-    def open(
-        path: Path, before: SessionRecord | None = None, rig: Rig | None = None
-    ) -> SessionRecord:
+    def open(path: Path, rig: Rig | None = None) -> SessionRecord:
         """Read a session, which may be in use or left behind by a crash.
 
         Parameters
         ----------
         path : Path
-        before : SessionRecord, optional
-            An earlier record of it; its alignments, which never change, are not read again.
         rig : Rig, optional
             Used in place of the stored one.
 
@@ -171,13 +166,38 @@ class Session(Closable):
         Raises
         ------
         FileError
-            If the folder is not a session, is of an unknown version, no line of its journal is
-            sound, or the rig is lost: in version 3 its file and the journal's first line.
+            If the folder is not a session, is of another version, no line of its journal is sound,
+            or the rig is lost: its file and the journal's first line.
         """
-        return read_session(path, before, rig)
+        return load_session(path, rig).contents()
+
+    @property
+    def contents(self) -> SessionRecord:
+        """The session as it is now; the same object until it changes."""
+        if self._contents is None:
+            journal = self._require_open()
+            is_unwritten = self._next_number - journal.next_number
+            self._contents = replace(
+                self._loaded,
+                events=tuple(self._events),
+                unwritten=tuple(self._events[len(self._events) - is_unwritten :]),
+                alignments=self._alignments,
+                notes=self._notes,
+                journal_bytes=journal.complete_bytes,
+                torn_bytes=0,
+            ).contents()
+        return self._contents
+
+    def full(self, kind: Kind) -> str:
+        """Return why no further alignment or trial can be saved; empty if one can."""
+        try:
+            self._state.items(kind).next_number()
+        except ValueError as error:
+            return f"{self.path} is full: {error}; start another session"
+        return ""
 
     def record(self, event: str, **data: Any) -> None:
-        """Append an event with JSON-able data to the journal.
+        """Append an event of the procedure with JSON-able data to the journal.
 
         Raises
         ------
@@ -188,7 +208,7 @@ class Session(Closable):
         """
         if event in set(SessionEvent):
             raise ValueError(f"the event {event} is written by the session itself")
-        self._append(event, data)
+        self._keep(event, data)
 
     def save_alignment(self, alignment: Alignment, facts: AlignmentFacts | None = None) -> int:
         """Save an alignment with its circumstances; return its number, from 1.
@@ -198,15 +218,17 @@ class Session(Closable):
         FileError
             If it cannot be written, is too large, or the session is full.
         """
-        number = self._next_number("alignment")
+        if full := self.full("alignment"):
+            raise FileError(full)
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise FileError(f"an alignment of {len(data):,} bytes is too large to be saved")
-        self._require_own()
-        write_new(alignment_path(self.path, number), data)
+        number = self._state.alignments.next_number()
         known = {} if facts is None else {"facts": facts_json(facts)}
         saved = {"number": number, "sha256": sha256(data), **known}
-        self._append(SessionEvent.ALIGNMENT_SAVED, saved)
+        self._alignments[number] = alignment
+        file = alignment_path(self.path, number)
+        self._keep(SessionEvent.ALIGNMENT_SAVED, saved, before=lambda: write_new(file, data))
         return number
 
     def save_trial(self, trial: Trial) -> int:
@@ -217,9 +239,15 @@ class Session(Closable):
         FileError
             If the journal cannot be written, or the session is full.
         """
-        number = self._next_number("trial")
-        self._append(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
+        if full := self.full("trial"):
+            raise FileError(full)
+        number = self._state.trials.next_number()
+        self._write(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
         return number
+
+    def save_comparison(self, comparison: Comparison) -> None:
+        """Save the answer of a blinded comparison; FileError if it cannot be written."""
+        self._write(COMPARED, comparison_json(comparison))
 
     def delete(self, kind: Kind, number: int) -> None:
         """Mark an alignment or a trial as deleted; with an alignment, the results are discarded.
@@ -241,8 +269,10 @@ class Session(Closable):
 
     def save_results(self, results: Mapping[str, Any]) -> None:
         """Replace the results of all alignments; FileError if they cannot be written."""
-        self._append(SessionEvent.SOLVED, dict(results))
-        write_json(self.path / "results.json", dict(results))
+        data = dict(results)
+        self._keep(
+            SessionEvent.SOLVED, data, after=lambda: write_json(self.path / "results.json", data)
+        )
 
     def save_applied(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
         """Record that the headset renders with the solved φ.
@@ -254,11 +284,11 @@ class Session(Closable):
         ValueError
             If a φ is not three finite numbers.
         """
-        self._append(SessionEvent.APPLIED, {"eyes": list(shifts_m), "shift_m": _lists(shifts_m)})
+        self._keep(SessionEvent.APPLIED, {"eyes": list(shifts_m), "shift_m": _lists(shifts_m)})
 
     def save_fine_tuned(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
         """Record that the headset renders with φ set by hand; raises as `save_applied`."""
-        self._append(SessionEvent.FINE_TUNED, {"shift_m": _lists(shifts_m)})
+        self._keep(SessionEvent.FINE_TUNED, {"shift_m": _lists(shifts_m)})
 
     def save_notes(self, text: str) -> None:
         """Replace the notes.
@@ -275,82 +305,110 @@ class Session(Closable):
         data = text.encode(errors="replace")
         before = self._notes_sha256
         # Announced first: a crash leaves notes with the one or the other checksum.
-        self._append(SessionEvent.NOTES_SAVED, {"sha256": sha256(data), "before_sha256": before})
+        self._write(SessionEvent.NOTES_SAVED, {"sha256": sha256(data), "before_sha256": before})
         write_atomic(self.path / "notes.txt", data)
-        self._notes_sha256 = sha256(data)
+        self._notes, self._notes_sha256, self._contents = data.decode(), sha256(data), None
 
     def correct_wearer(self, name: str) -> None:
         """Replace the wearer's name or code; ValueError if it is invalid, else as `save_notes`."""
         data = {"wearer": clean_wearer(name), "before": self._state.wearer}
         if data["wearer"] != data["before"]:
-            self._append(SessionEvent.WEARER_CORRECTED, data)
+            self._write(SessionEvent.WEARER_CORRECTED, data)
 
     def save_facts(self, **facts: Any) -> None:
         """Record facts by their names in `SessionFacts`; each replaces an earlier one.
 
-        The results are discarded if the eye distance or a verification changes. FileError if the
-        journal cannot be written; ValueError if a name is unknown or a value invalid.
+        The results are discarded if the eye distance, the usable eyes or a verification change.
+        FileError if the journal cannot be written; ValueError if a name is unknown or a value
+        invalid.
         """
         data = facts_json(facts)
         with_facts(SessionFacts(), data)
-        self._append(SessionEvent.FACTS_SAVED, data)
-        self._remove_old_results()
+        self._keep(SessionEvent.FACTS_SAVED, data, after=self._remove_old_results)
 
     def finish(self) -> None:
         """Record the end of the session; FileError if the journal cannot be written.
 
-        Anything recorded afterwards but `ASIDE` makes the session unfinished again.
+        Any later event reopens the session, except those in `ASIDE`.
         """
-        self._append(SessionEvent.FINISHED, {})
+        self._write(SessionEvent.FINISHED, {})
+
+    def write_waiting(self) -> None:
+        """Write what could not be written before; FileError if it still cannot be."""
+        while self._waiting:
+            self._require_own()
+            self._waiting[0]()
+            self._waiting.popleft()
+            self._contents = None
 
     def close(self) -> None:
         """Release the session for other programs; safe to call twice."""
-        if self._journal is not None and self.revision:
+        if self._journal is not None:
             with suppress(FileError):  # the folder was removed, or the disk is full
-                self._require_own()
-                self._journal.write_end(self._notes_sha256)
+                self.write_waiting()
+            if self._is_changed:
+                with suppress(FileError):
+                    self._require_own().write_end(self._notes_sha256)
+            self._contents = self.contents
         self._journal = None
         self._lock.release()
 
-    def _next_number(self, kind: Kind) -> int:
-        try:
-            return self._state.items(kind).next_number()
-        except ValueError as error:
-            raise FileError(f"{self.path} is full: {error}; start another session") from error
-
     def _change(self, kind: Kind, what: Literal["deleted", "restored"], number: int) -> None:
-        self._append(SessionEvent(f"{kind}_{what}"), {"number": number})
-        self._remove_old_results()
+        event, data = SessionEvent(f"{kind}_{what}"), {"number": number}
+        if kind == "trial":
+            self._write(event, data)
+        else:
+            self._keep(event, data, after=self._remove_old_results)
 
     def _remove_old_results(self) -> None:
         if self._state.results is None:
             with suppress(OSError):  # the journal says so already
                 (self.path / "results.json").unlink(missing_ok=True)
 
-    def _upgrade(self, record: SessionRecord, journal_sha256: str) -> None:
-        """Bind what versions 1 and 2 stored without checksums."""
-        self._append(
-            SessionEvent.UPGRADED,
-            {
-                "journal_sha256": journal_sha256,
-                "rig": _rig_text(self.path),
-                "settings": record.settings,
-                "results": record.results,
-                "notes_sha256": self._notes_sha256,
-            },
-        )
+    def _write(self, event: str, data: dict[str, Any]) -> None:
+        """Write an event, and only then apply it; nothing changes if it cannot be written."""
+        self.write_waiting()
+        made = happens_now(self._next_number, event, data)
+        self._require_own().append(journal_line(made))
+        self._apply(made)
 
-    def _append(self, event: str, data: dict[str, Any]) -> None:
-        self._state.apply(self._require_own().append(event, data))
-        self.revision += 1
+    def _keep(
+        self,
+        event: str,
+        data: dict[str, Any],
+        before: Callable[[], object] | None = None,
+        after: Callable[[], object] | None = None,
+    ) -> None:
+        """Apply an event and write it, now or later, between two other writes."""
+        journal = self._require_open()
+        made = happens_now(self._next_number, event, data)
+        line = journal_line(made)  # ValueError before anything is changed
+        self._apply(made)
+        if before is not None:
+            self._waiting.append(before)
+        self._waiting.append(lambda: journal.append(line))
+        if after is not None:
+            self._waiting.append(after)
+        self.write_waiting()
+
+    def _apply(self, event: Event) -> None:
+        self._state.apply(event)
+        self._events.append(event)
+        self._next_number += 1
+        self._is_changed = True
+        self._contents = None
+
+    def _require_open(self) -> JournalWriter:
+        if self._journal is None:
+            raise FileError(f"{self.path} is closed; open the session again")
+        return self._journal
 
     def _require_own(self) -> JournalWriter:
         """Return the journal; FileError if another program may be writing to it."""
-        if self._journal is None:
-            raise FileError(f"{self.path} is closed; open the session again")
+        journal = self._require_open()
         self._lock.require_held()
-        self._journal.require_unchanged()
-        return self._journal
+        journal.require_unchanged()
+        return journal
 
 
 def open_session(path: str | PathLike[str]) -> SessionRecord:
@@ -385,14 +443,6 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
 
 def _rig_text(path: Path) -> str:
     return read_limited(path / "rig.yaml", MAX_RIG_BYTES).decode()
-
-
-def _notes_sha256(record: SessionRecord) -> str | None:
-    """Return the checksum of the stored notes: empty without notes, None if they are damaged."""
-    if any(damage.file == "notes.txt" for damage in record.damaged):
-        return None
-    notes = record.path / "notes.txt"
-    return sha256(read_limited(notes, 4 * MAX_NOTES_CHARACTERS)) if notes.exists() else ""
 
 
 def _lists(shifts_m: Mapping[Eye, ArrayLike]) -> dict[Eye, list[float]]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, Place, comparison_json
+from handcal.session.comparison import Answer, Comparison, Drawing, Place
 from handcal.session.session import Session
 from handcal.station.states import ProcedureError
 from handcal.types import Eye, Float64
@@ -84,7 +84,7 @@ class Comparing:
         if self.shown is None or not self.has_seen_both:
             raise ProcedureError("show the wearer both drawings first")
         made = Comparison(self._first, answer, self._applied_m)
-        self._session.record(COMPARED, **comparison_json(made))
+        self._session.save_comparison(made)
         self.end()
 
     def end(self) -> None:

@@ -15,7 +15,8 @@ def begin(path: Path) -> JournalWriter:
 
 def test_what_is_appended_is_read(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
-    appended = begin(path).append("said", {"text": "φ\n", "value": 0.1 + 0.2})
+    appended = happens_now(2, "said", {"text": "φ\n", "value": 0.1 + 0.2})
+    begin(path).append(journal_line(appended))
     content = read_journal(path)
     assert content.events[1] == appended
     assert (appended.number, appended.data["value"]) == (2, 0.1 + 0.2)
@@ -29,7 +30,7 @@ def test_a_torn_line_is_left_out_and_goes_with_the_next(tmp_path: Path) -> None:
         file.write(b'{"version": 2, "numb')
     torn = read_journal(path)
     assert (len(torn.events), torn.torn_bytes) == (1, 20)
-    JournalWriter(path, torn).append("next", {})
+    JournalWriter(path, torn).append(journal_line(happens_now(2, "next", {})))
     assert [event.name for event in read_journal(path).events] == ["created", "next"]
 
 
@@ -40,8 +41,8 @@ def test_a_full_journal_refuses_and_stays_readable(
     writer = begin(path)
     monkeypatch.setattr(journal, "MAX_JOURNAL_BYTES", 1000)
     with pytest.raises(FileError, match="is full; start another session"):
-        writer.append("long", {"text": "x" * 1000})
-    writer.append("short", {})
+        writer.append(journal_line(happens_now(2, "long", {"text": "x" * 1000})))
+    writer.append(journal_line(happens_now(2, "short", {})))
     assert [event.number for event in read_journal(path).events] == [1, 2]
     path.write_bytes(b"x" * 1001)
     with pytest.raises(FileError, match="larger than the 1,000 bytes"):

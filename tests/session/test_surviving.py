@@ -23,6 +23,7 @@ from handcal.rig.example import example_rig
 from handcal.session.journal import happens_now, journal_line
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent
+from handcal.session.trial import Trial
 from handcal.types import Alignment
 from tests.session.conftest import RESULTS, SETTINGS
 
@@ -126,22 +127,30 @@ def disk_ends_at(size: int) -> Iterator[None]:
 
 
 def test_a_full_disk_loses_nothing_and_the_session_goes_on(
-    session: Session, alignment: Alignment
+    session: Session, alignment: Alignment, trial: Trial
 ) -> None:
     session.record("first")
     journal = session.path / "journal.jsonl"
     with disk_ends_at(journal.stat().st_size + 10):
         with pytest.raises(FileError, match=r"cannot write .*journal"):
             session.record("second")
-        with pytest.raises(FileError, match=r"cannot write .*1\.npz"):
+        with pytest.raises(FileError, match=r"cannot write .*journal"):
             session.save_alignment(alignment)
+        with pytest.raises(FileError, match=r"cannot write .*journal"):
+            session.save_trial(trial)  # which is not kept: a person sees that it failed
         torn = Session.open(session.path)
         assert torn.torn_bytes == 10
         assert [event.name for event in torn.events] == ["created", "first"]
+        kept = ["second", "alignment_saved"]
+        assert [event.name for event in session.contents.unwritten] == kept
+        assert list(session.contents.alignments) == [1]
+        assert session.contents.trials == {}
     session.record("third")
     whole = Session.open(session.path)
     assert whole.torn_bytes == 0
-    assert [event.name for event in whole.events] == ["created", "first", "third"]
+    assert [event.name for event in whole.events] == ["created", "first", *kept, "third"]
+    assert list(whole.alignments) == [1]
+    assert session.contents.unwritten == ()
 
 
 @pytest.mark.process
