@@ -82,18 +82,18 @@ def events(before: Snapshot | None, now: Snapshot) -> list[dict[str, object]]:
         add("session", name=now.session_path.name)
     if old is None or new.state is not old.state:
         add("state", state=new.state.value, eyes=list(new.eyes))
-    step, last = new.next_step, None if old is None else old.next_step
+    step, last = now.next_step, None if before is None else before.next_step
     if step is not None and (last is None or (step.name, step.eyes) != (last.name, last.eyes)):
         add("step", step=step.name.value, eyes=list(step.eyes))
     if before is None or old is None:
         return found
     if now.record.refused > before.record.refused:
         add("refused", reason=new.refusal)
-    for number in new.alignments.keys() - old.alignments.keys():
-        alignment = new.alignments[number]
+    for number in now.record.alignments.keys() - before.record.alignments.keys():
+        alignment = now.record.alignments[number]
         add("confirmed", number=number, eyes=list(alignment.eyes))
-    for eye, verification in new.verifications.items():
-        if old.verifications.get(eye) is not verification:
+    for eye, verification in now.record.facts.verified.items():
+        if before.record.facts.verified.get(eye) is not verification:
             add("verified", eye=eye)
     if now.record is not before.record:
         for number in now.record.trials.keys() - before.record.trials.keys():

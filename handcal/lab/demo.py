@@ -29,7 +29,7 @@ from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
 from handcal.station.follow import Patience, deliver, follow_plan
 from handcal.station.former import SLIP_M
-from handcal.station.plan import PlanSettings, paper_alignments, usable_eyes
+from handcal.station.plan import PlanSettings, with_eyes
 from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
@@ -118,12 +118,7 @@ def run_demo(
         sessions=str(output),
         side=settings.side,
         slip_m=_slip_m(settings),
-        plan=PlanSettings(
-            settings.plan,
-            usable_eyes(settings.eyes),
-            is_automatic=_is_automatic(settings),
-            verify=settings.verify,
-        ),
+        plan=with_eyes(_plan(settings), settings.eyes),
     )
     former = Path(settings.former) if settings.former else None
     with Station(station_settings, "Simulated wearer", former=former) as station:
@@ -132,9 +127,8 @@ def run_demo(
         begun_m = dict(station.calibration.applied_shift_m)
         watch = _Watch(station.calibration)
         station.watch(watch.see)
-        alignments = paper_alignments(settings.eyes, settings.alignments)
         try:
-            follow_plan(station, alignments, _PATIENCE, progress)
+            follow_plan(station, _PATIENCE, progress)
             seconds = watch.seconds
             delivered = deliver(station)
         except ContradictedError as error:
@@ -226,9 +220,14 @@ def measure_eye_distance(seed: int, worn_rig: Rig) -> EyeDistance:
         raise HandcalError(f"no person can wear this rig: {problem}") from problem
 
 
-def _is_automatic(settings: DemoSettings) -> bool:
-    """Return whether the station follows the plan automatically; otherwise the script does."""
-    return settings.plan == "recommended" or bool(settings.former)
+def _plan(settings: DemoSettings) -> PlanSettings:
+    """Return the plan; that of the paper has no verification unless it starts from a session."""
+    return PlanSettings(
+        settings.plan,
+        is_automatic=True,
+        verify=settings.verify and (settings.plan == "recommended" or bool(settings.former)),
+        alignments=settings.alignments,
+    )
 
 
 @dataclass(slots=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from handcal.errors import CancelledError, HandcalError
 from handcal.progress import Progress
 from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import Observation, State
 from handcal.station.station import Station
 from handcal.types import Eye
 
@@ -28,12 +28,7 @@ class Patience:
     """Number of station steps that are waited at least, so that a slow computer gets more time."""
 
 
-def follow_plan(
-    station: Station,
-    alignments: Sequence[tuple[Eye, ...]],
-    patience: Patience,
-    progress: Progress = Progress(),
-) -> None:
+def follow_plan(station: Station, patience: Patience, progress: Progress = Progress()) -> None:
     """Calibrate the wearer of a station by its plan, from the connected headset to the result.
 
     The wearer holds the hand still in view of the camera, moves it under the cursor, and confirms.
@@ -41,9 +36,7 @@ def follow_plan(
     Parameters
     ----------
     station : Station
-        If its plan is automatic, the plan decides what is done.
-    alignments : sequence of tuple of eye
-        Eyes open in each alignment of a plan that is not automatic; solved and applied after each.
+        Its plan runs automatically.
     patience : Patience
     progress : Progress
         Called with the present step and the share of the whole that is done.
@@ -56,15 +49,25 @@ def follow_plan(
     CancelledError
         If it was cancelled; the message names the session.
     """
-    led = _Led(station, patience, progress)
+    wait = partial(_wait, station, patience, progress)
     try:
-        led.wait(
-            0.0, "Waiting for the headset", lambda one: one.link.connected, "no headset connected"
-        )
-        if station.plan.settings.is_automatic:
-            led.follow()
-        else:
-            led.align(alignments)
+        wait(0.0, "Waiting for the headset", lambda one: one.link.connected, "no headset connected")
+        share, step = 0.0, None
+        reached: tuple[object, ...] = ()
+        while step is None or step.name is not StepName.DONE:
+            doing = "to begin" if step is None else step.text
+            what = "Following the plan" if step is None else f"{_named(step.eyes)}: {doing}"
+
+            def is_further(seen: Snapshot, before: tuple[object, ...] = reached) -> bool:
+                new = seen.next_step
+                return new is not None and new.name not in _PASSING and _place(seen) != before
+
+            seen = wait(share, what, is_further, f"the plan stopped at: {doing}")
+            reached, step = _place(seen), seen.next_step
+            share += 0.15 * (0.95 - share)  # how many steps remain is not known
+        if station.calibration.results is None:
+            raise HandcalError(f"there is no result: {step.text}")
+        progress.at(1.0, f"Done: {step.text}")
     except HandcalError as error:  # Ctrl+C may also have ended the virtual headset
         if progress.is_cancelled():
             kept = f"cancelled; what was recorded is in {station.session.path}"
@@ -80,86 +83,33 @@ def deliver(station: Station) -> Snapshot:
     return snapshot
 
 
-@dataclass(frozen=True, slots=True)
-class _Led:
-    """A station whose plan is followed."""
+def _wait(
+    station: Station,
+    patience: Patience,
+    progress: Progress,
+    share: float,
+    what: str,
+    until: Callable[[Snapshot], bool],
+    complaint: str,
+) -> Snapshot:
+    """Run a station until a condition holds, and return the snapshot in which it does.
 
-    station: Station
-    patience: Patience
-    progress: Progress
-
-    def follow(self) -> None:
-        """Let the station follow its plan to the end."""
-        share, step = 0.0, None
-        reached: tuple[object, ...] = ()
-        while step is None or step.name is not StepName.DONE:
-            doing = "to begin" if step is None else step.text
-            what = "Following the plan" if step is None else f"{_named(step.eyes)}: {doing}"
-
-            def is_further(seen: Snapshot, before: tuple[object, ...] = reached) -> bool:
-                new = seen.procedure.next_step
-                return new is not None and new.name not in _PASSING and _place(seen) != before
-
-            seen = self.wait(share, what, is_further, f"the plan stopped at: {doing}")
-            reached, step = _place(seen), seen.procedure.next_step
-            share += 0.15 * (0.95 - share)  # how many steps remain is not known
-        if self.station.calibration.results is None:
-            raise HandcalError(f"there is no result: {step.text}")
-
-    def align(self, alignments: Sequence[tuple[Eye, ...]]) -> None:
-        """Make every alignment; solve and apply after each."""
-        calibration, count = self.station.calibration, len(alignments)
-        for done, eyes in enumerate(alignments):
-            label = f"Alignment {done + 1} of {count}, {_named(eyes)}"
-            self.wait(
-                (done + 0.1) / count,
-                f"{label}: waiting for a steady hand",
-                lambda seen: (
-                    _observed(seen, lambda one: one.is_steady) and seen.procedure.is_applied
-                ),
-                "the wearer did not hold the hand still",
-            )
-            calibration.make_cursor(eyes)
-            self.wait(
-                (done + 0.3) / count,
-                f"{label}: the wearer aligns and confirms",
-                lambda seen: seen.procedure.state is State.ALIGNED,
-                "the wearer did not align the hand",
-            )
-            self.progress.at((done + 0.8) / count, f"{label}: solving")
-            calibration.solve()
-            calibration.apply()
-            self.wait(
-                (done + 0.9) / count,
-                f"{label}: waiting for the headset to apply it",
-                lambda seen: seen.procedure.state is State.APPLIED,
-                "the headset did not apply the result",
-            )
-            self.progress.at((done + 1.0) / count, f"{label}: applied and acknowledged")
-
-    def wait(
-        self, share: float, what: str, until: Callable[[Snapshot], bool], complaint: str
-    ) -> Snapshot:
-        """Run the station until a condition holds, and return the snapshot in which it does.
-
-        Raises HandcalError after the wearer's patience, or as soon as it cannot hold any more.
-        """
-        self.progress.at(share, what)
-        end_s, frames = time.monotonic() + self.patience.seconds, 0
-        snapshot = None
-        while time.monotonic() < end_s or frames < self.patience.frames:
-            frames += 1
-            self.progress.check()
-            self.station.require_headset()
-            snapshot = self.station.step()
-            if snapshot.problem:
-                raise HandcalError(snapshot.problem)
-            if until(snapshot):
-                return snapshot
-        why = _reason(snapshot)
-        raise HandcalError(
-            f"{complaint} within {self.patience.seconds:g} s{f': {why}' if why else ''}"
-        )
+    Raises HandcalError after the wearer's patience, or as soon as it cannot hold any more.
+    """
+    progress.at(share, what)
+    end_s, frames = time.monotonic() + patience.seconds, 0
+    snapshot = None
+    while time.monotonic() < end_s or frames < patience.frames:
+        frames += 1
+        progress.check()
+        station.require_headset()
+        snapshot = station.step()
+        if snapshot.problem:
+            raise HandcalError(snapshot.problem)
+        if until(snapshot):
+            return snapshot
+    why = _reason(snapshot)
+    raise HandcalError(f"{complaint} within {patience.seconds:g} s{f': {why}' if why else ''}")
 
 
 def _named(eyes: Sequence[Eye]) -> str:
@@ -168,12 +118,8 @@ def _named(eyes: Sequence[Eye]) -> str:
 
 def _place(snapshot: Snapshot) -> tuple[object, ...]:
     """Return what each step that the wearer does changes; two steps may differ in results only."""
-    step = snapshot.procedure.next_step
+    step = snapshot.next_step
     return step and (step.name, step.eyes), snapshot.procedure.results
-
-
-def _observed(snapshot: Snapshot, is_true: Callable[[Observation], bool]) -> bool:
-    return snapshot.observation is not None and is_true(snapshot.observation)
 
 
 def _reason(snapshot: Snapshot | None) -> str:

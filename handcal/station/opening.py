@@ -16,7 +16,6 @@ from handcal.io.settings import settings_json
 from handcal.register.prior import PriorSettings
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
-from handcal.session.facts import SessionFacts
 from handcal.session.journal import JOURNAL, JOURNAL_END
 from handcal.session.record import replay
 from handcal.session.session import Session
@@ -37,9 +36,12 @@ _FIRST_EVENTS = {SessionEvent.CREATED, SessionEvent.FACTS_SAVED, SessionEvent.FI
 
 @contextmanager
 def resume_or_create(
-    settings: StationSettings, wearer: str, resume: Path | None
-) -> Iterator[Session]:
+    settings: StationSettings, wearer: str, resume: Path | None, begun: Former
+) -> Iterator[tuple[Session, StationSettings]]:
     """Resume a session, or create one, which is removed if its station cannot be opened.
+
+    Also return the settings with the session's prior: a session keeps the prior that it began with,
+    so that resuming does not change its results. A resumed one keeps the lab's target, too.
 
     Raises
     ------
@@ -48,18 +50,38 @@ def resume_or_create(
     """
     if resume is not None:
         with Session(resume) as session:
-            yield session
+            stored = stored_solve_settings(session.contents)
+            target_arcmin = stored.verdict.target_arcmin
+            yield session, _with_prior(settings, stored.fuse.prior, target_arcmin)
         return
+    solve = settings.calibration.solve
+    if begun.prior is not None:
+        prior = replace(solve.fuse.prior, learned=begun.prior)
+    else:
+        prior = _lab_prior(settings)
+    settings = _with_prior(settings, prior, solve.verdict.target_arcmin)
     rig = read_rig(settings.rig_path)
     station = settings_json(settings)
-    stored = {"calibration": station.pop("calibration"), "station": station}
-    with Session.create(settings.sessions_path, rig, stored, wearer=wearer) as session:
+    stored_settings = {"calibration": station.pop("calibration"), "station": station}
+    with Session.create(settings.sessions_path, rig, stored_settings, wearer=wearer) as session:
         try:
-            yield session
+            yield session, settings
         except BaseException:
             session.close()
             _discard_if_empty(session.path)
             raise
+
+
+def _with_prior(
+    settings: StationSettings, prior: PriorSettings, target_arcmin: float
+) -> StationSettings:
+    calibration = settings.calibration
+    solve = replace(
+        calibration.solve,
+        fuse=replace(calibration.solve.fuse, prior=prior),
+        verdict=replace(calibration.solve.verdict, target_arcmin=target_arcmin),
+    )
+    return replace(settings, calibration=replace(calibration, solve=solve))
 
 
 def _discard_if_empty(path: Path) -> None:
@@ -74,44 +96,14 @@ def _discard_if_empty(path: Path) -> None:
             path.rmdir()
 
 
-def with_session_prior(
-    settings: StationSettings, resume: Path | None, begun: Former
-) -> StationSettings:
-    """Return the settings with the prior of the session that is resumed or begun.
-
-    A resumed session keeps the lab's target, too.
-
-    Raises
-    ------
-    FileError
-        If the session or the rig cannot be read.
-    """
-    solve = settings.calibration.solve
-    # A session keeps the prior that it began with, so that resuming does not change its results.
-    if resume is not None:
-        stored = stored_solve_settings(Session.open(resume))
-        prior, target_arcmin = stored.fuse.prior, stored.verdict.target_arcmin
-        solve = replace(solve, verdict=replace(solve.verdict, target_arcmin=target_arcmin))
-    elif begun.prior is not None:
-        prior = replace(solve.fuse.prior, learned=begun.prior)
-    else:
-        prior = _lab_prior(settings)
-    solve = replace(solve, fuse=replace(solve.fuse, prior=prior))
-    return replace(settings, calibration=replace(settings.calibration, solve=solve))
-
-
-def plan_of_session(
-    session: Session, plan: PlanSettings, facts: SessionFacts, is_resumed: bool
-) -> PlanSettings:
+def plan_of_session(session: Session, plan: PlanSettings, *, is_resumed: bool) -> PlanSettings:
     """Return the plan that a resumed session has, or record that of a new one and return it.
 
     Parameters
     ----------
     session : Session
     plan : PlanSettings
-        The plan of a new session; a resumed one keeps its name and eyes.
-    facts : SessionFacts
-        The session's facts, as stored.
+        The plan of a new session; a resumed one keeps its name, its eyes and their order.
     is_resumed : bool
 
     Raises
@@ -119,15 +111,17 @@ def plan_of_session(
     FileError
         If the session cannot be written.
     """
-    if is_resumed:
-        is_recommended = facts.plan == "recommended"
-        name: PlanName = "recommended" if is_recommended else "paper"
-        return replace(plan, name=name, usable_eyes=facts.usable_eyes)
-    if plan.name != "paper":
-        session.save_facts(plan=plan.name)
-    if plan.usable_eyes != EYES:
-        session.save_facts(usable_eyes=plan.usable_eyes)
-    return plan
+    if not is_resumed:
+        if plan.name != "paper":
+            session.save_facts(plan=plan.name)
+        elif plan.in_turn:
+            session.save_facts(plan=plan.eyes)
+        if plan.usable_eyes != EYES:
+            session.save_facts(usable_eyes=plan.usable_eyes)
+        return plan
+    facts = session.contents.facts
+    name: PlanName = "recommended" if facts.plan == "recommended" else "paper"
+    return replace(plan, name=name, usable_eyes=facts.usable_eyes, in_turn=facts.plan == "each")
 
 
 def open_camera(settings: StationSettings, simulation: Simulation | None, worn_rig: Rig) -> Camera:

@@ -13,7 +13,7 @@ from handcal.link.pairing import Pairings
 from handcal.progress import Progress
 from handcal.station.doctor import Health
 from handcal.station.follow import Patience, deliver, follow_plan
-from handcal.station.plan import PlanSettings, paper_alignments, usable_eyes
+from handcal.station.plan import PlanSettings, with_eyes
 from handcal.station.preflight import check_station
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
@@ -73,14 +73,17 @@ def run_calibration(
     """
     pairings = pairings or Pairings(())
     _require_ready(settings.station, pairings)
-    usable = usable_eyes(settings.eyes)
-    plan = PlanSettings(settings.plan, usable, is_automatic=settings.plan == "recommended")
-    wanted = replace(settings.station, plan=plan)
+    plan = PlanSettings(
+        settings.plan,
+        is_automatic=True,
+        verify=settings.plan == "recommended",
+        alignments=settings.alignments,
+    )
+    wanted = replace(settings.station, plan=with_eyes(plan, settings.eyes))
     with Station(wanted, settings.wearer, pairings=pairings) as station:
         for watcher in watchers:
             station.watch(watcher)
-        alignments = paper_alignments(settings.eyes, settings.alignments)
-        follow_plan(station, alignments, Patience(settings.patience_s), progress)
+        follow_plan(station, Patience(settings.patience_s), progress)
         snapshot = deliver(station)
         station.finish()
         return _result(station, snapshot)

@@ -124,16 +124,34 @@ def solve_again(
     if not record.is_solvable:
         return None
     try:
-        return solve_session(
-            record.alignments,
-            record.rig,
-            settings,
-            progress,
-            eye_distance=eye_distance or record.facts.eye_distance,
-            contradictions=record.facts.contradictions,
-            verified=record.facts.verified,
-            plan="recommended" if record.facts.plan == "recommended" else None,
-            usable_eyes=record.facts.usable_eyes,
-        )
+        return solve_contents(record, settings, progress, eye_distance)
     except ValueError as error:
         raise FileError(f"{record.path} cannot be solved: {error}") from error
+
+
+def solve_contents(
+    record: SessionRecord,
+    settings: SolveSettings,
+    progress: Progress = Progress(),
+    eye_distance: EyeDistance | None = None,
+) -> Results:
+    """Return the results of all that a session holds; parameters as in `solve_again`.
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to solve, or an alignment cannot be solved.
+    CancelledError
+        If it was cancelled.
+    """
+    return solve_session(
+        record.alignments,
+        record.rig,
+        settings,
+        progress,
+        eye_distance=eye_distance or record.facts.eye_distance,
+        contradictions=record.facts.contradictions,
+        verified=record.facts.verified,
+        plan="recommended" if record.facts.plan == "recommended" else None,
+        usable_eyes=record.facts.usable_eyes,
+    )

@@ -21,7 +21,6 @@ from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
-from handcal.session.session import Session
 from handcal.session.state import Kind
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
@@ -34,12 +33,11 @@ from handcal.station.opening import (
     plan_of_session,
     resume_or_create,
     start_headset,
-    with_session_prior,
 )
 from handcal.station.plan import NextStep, Plan, StepName
 from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
-from handcal.station.snapshot import Snapshot, read_procedure
+from handcal.station.snapshot import Snapshot
 from handcal.station.states import Observation, ProcedureError, State
 from handcal.station.trials import Trials
 from handcal.station.verifying import skipped_eyes
@@ -93,8 +91,6 @@ class Station(Closable):
         begun = Former()
         if former is not None and resume is None:
             begun = read_former(former, read_rig(settings.rig_path))
-        settings = with_session_prior(settings, resume, begun)
-        self.settings = settings
         is_virtual = settings.headset == "virtual"
         if is_virtual or isinstance(pairings, str):
             key = new_pairing_key() if is_virtual else str(pairings)
@@ -107,10 +103,11 @@ class Station(Closable):
         self._observation: Observation | None = None
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
-            self.session = stack.enter_context(resume_or_create(settings, wearer, resume))
-            self._revision = self.session.revision
-            self._record = Session.open(self.session.path)
-            self.rig = self.worn_rig = self._record.rig
+            self.session, settings = stack.enter_context(
+                resume_or_create(settings, wearer, resume, begun)
+            )
+            self.settings = settings
+            self.rig = self.worn_rig = self.session.contents.rig
             self._worn_rig_path = Path(settings.worn_rig or self.session.path / "rig.yaml")
             bind = LOOPBACK if is_virtual else (settings.host, settings.port)
             self._link = stack.enter_context(HeadsetServer(pairings, bind))
@@ -120,27 +117,19 @@ class Station(Closable):
                 )
                 self.worn_rig = read_rig(self._worn_rig_path)
             self._feed = stack.enter_context(CameraFeed(weakly(self._open_camera)))
-            facts = self._record.facts
-            plan = plan_of_session(self.session, settings.plan, facts, resume is not None)
+            plan = plan_of_session(self.session, settings.plan, is_resumed=resume is not None)
             if former is not None and resume is None:
                 self.session.save_facts(former=former.name)
                 self.session.save_fine_tuned(begun.shift_m)
             self.calibration = Calibration(
-                self.rig,
-                self._link,
-                self.session,
-                settings.calibration,
-                resume=self._record if resume else None,
-                wearer=self._record.wearer,
-                plan="recommended" if plan.name == "recommended" else None,
-                usable_eyes=plan.usable_eyes,
-                former_m=begun.shift_m,
+                self.session, self._link, settings.calibration, begun.shift_m
             )
+            record = self.session.contents
             self.plan = Plan(
                 self.calibration,
                 plan,
-                verifies_first=bool(facts.former or former),
-                skipped=skipped_eyes(self._record.events),
+                verifies_first=bool(record.facts.former),
+                skipped=skipped_eyes(record.events),
             )
             self._views = EyeViews(
                 self.calibration, self.rig, settings, self._simulation, self.worn_rig
@@ -176,33 +165,53 @@ class Station(Closable):
 
     def step(self) -> Snapshot:
         """Process the next frame, if one arrives soon, and return the new snapshot."""
-        frame = self._feed.read()
-        self._frame = frame or self._frame
-        observation = None
-        try:
-            if frame is not None:
-                self.calibration.camera = self._feed.status.identity
-                observation = self.calibration.step(frame)
-                cloud = observation.cloud
-                self._feed.expose_for(None if cloud is None else cloud.points_m)
-            if self.calibration.state is State.APPLYING:
-                self.calibration.poll_applied()
-            if observation is not None:
-                self._observation = observation
-                self._next_step = self._follow_plan(observation)
-        except LinkError as error:
-            self._not_applied = str(error)
-        except FileError:
-            pass  # the procedure keeps the data; `_store_waiting` reports the problem
-        if self.calibration.state is not State.SOLVED:
-            self._not_applied = ""
-        self.trials.follow_procedure()
+        observation = self._observe()
+        self._advance(observation)
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
+        snapshot = self._make_snapshot(observation)
+        for watcher in self._watchers:
+            watcher(snapshot)
+        return snapshot
+
+    def _observe(self) -> Observation | None:
+        """Return what the next frame shows; None if none arrives."""
+        frame = self._feed.read()
+        if frame is None:
+            return None
+        self._frame = frame
+        self.calibration.camera = self._feed.status.identity
+        try:
+            observation = self.calibration.step(frame)
+        except LinkError as error:
+            self._not_applied = str(error)
+            return None
+        cloud = observation.cloud
+        self._feed.expose_for(None if cloud is None else cloud.points_m)
+        return observation
+
+    def _advance(self, observation: Observation | None) -> None:
+        """Take what the headset has acknowledged, and the plan's next step if its time has come."""
+        # The session keeps what it cannot write; `_store_waiting` reports the problem.
+        try:
+            if self.calibration.state is State.APPLYING:
+                with suppress(FileError):
+                    self.calibration.poll_applied()
+            if observation is not None:
+                self._observation = observation
+                with suppress(FileError):
+                    self._next_step = self._follow_plan(observation)
+        except LinkError as error:
+            self._not_applied = str(error)
+        if self.calibration.state is not State.SOLVED:
+            self._not_applied = ""
+        self.trials.follow_procedure()
+
+    def _make_snapshot(self, observation: Observation | None) -> Snapshot:
         self._number += 1
         link = self._link.statistics()
-        snapshot = Snapshot(
+        return Snapshot(
             number=self._number,
             t_host_ns=time.monotonic_ns(),
             frame=self._frame,
@@ -210,34 +219,29 @@ class Station(Closable):
             camera=self._feed.status,
             link=link,
             link_problem=self._link_problem(link),
-            problem=self._not_stored or self._not_applied,
+            procedure=self.calibration.now(),
+            record=self.session.contents,
+            settings=self.settings.calibration,
+            plan=self.plan.settings,
+            next_step=self._next_step,
+            not_applied=self._not_applied,
             not_stored=self._not_stored,
             contradiction=self._contradiction(observation),
-            procedure=read_procedure(
-                self.calibration,
-                self.settings.calibration,
-                self.plan.settings.name,
-                self._next_step,
-            ),
-            record=self._record,
             # A view of what the headset draws would reveal which drawing is shown.
             views={} if self.trials.comparing.shown else dict(self._views.shown),
             comparing=self.trials.comparing.shown,
             has_compared_both=self.trials.comparing.has_seen_both,
         )
-        for watcher in self._watchers:
-            watcher(snapshot)
-        return snapshot
 
     def watch(self, watcher: Callable[[Snapshot], object]) -> None:
         """Call `watcher` with every new snapshot, in the station's thread; it must not wait."""
         self._watchers.append(watcher)
 
     def _follow_plan(self, observation: Observation) -> NextStep:
-        """Take the plan's next step if it is automatic; return it."""
-        if self.plan.settings.is_automatic and not self.holds_plan:
-            return self.plan.advance(observation)
-        return self.plan.next_step(observation.is_steady)
+        """Take the plan's next step if it is automatic and not held; return it."""
+        if self.holds_plan:
+            return self.plan.next_step(observation.is_steady)
+        return self.plan.follow(observation)
 
     def take_step(self) -> None:
         """Take the next step of a plan that is held.
@@ -261,7 +265,7 @@ class Station(Closable):
         """Record the link statistics and finish the session; FileError if it cannot be written."""
         self.trials.hide_target()
         self.trials.comparing.end()
-        self.calibration.store_waiting()
+        self.session.write_waiting()
         self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()
 
@@ -303,8 +307,6 @@ class Station(Closable):
 
     def close(self) -> None:
         """Write pending data and close everything; safe to call twice."""
-        with suppress(FileError):
-            self.calibration.store_waiting()
         self._stack.close()
 
     def _start_headset(self, scene_port: int) -> VirtualHeadset:
@@ -343,16 +345,13 @@ class Station(Closable):
         return found[0].text if found else ""
 
     def _store_waiting(self) -> None:
-        """Retry writing pending data now and then; read the session if it has changed."""
+        """Write what could not be written before, now and then."""
         now_s = time.monotonic()
         if self._not_stored and now_s < self._next_store_s:
             return
         self._next_store_s = now_s + _STORE_PERIOD_S
         try:
-            self.calibration.store_waiting()
-            if self._revision != self.session.revision:
-                self._record = Session.open(self.session.path, self._record)
-                self._revision = self.session.revision
+            self.session.write_waiting()
             self._not_stored = ""
         except FileError as error:
             self._not_stored = (

@@ -163,7 +163,7 @@ def run_user_trials(
     CancelledError
     """
     settings = settings or TrialSettings()
-    record = Session.open(session.path)
+    record = session.contents
     rig, calibrated_m = record.rig, calibrated_shifts_m(record, settings.eyes)
     drawing = Drawing(rig, server, record.wearer)
     trials: list[Trial] = []

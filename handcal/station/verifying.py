@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from handcal.display import view_of_eye
+from handcal.errors import HandError
 from handcal.geometry import invert, transform
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.server import Nudge
@@ -22,7 +23,7 @@ from handcal.register.nudge import nudged_shift_m
 from handcal.rig_types import EyeDisplay, Rig
 from handcal.session.journal import Event
 from handcal.session.state import VERIFYING, SessionEvent
-from handcal.station.hands import PlacedHand
+from handcal.station.hands import PlacedHand, RecentHands
 from handcal.types import EYES, Eye, Float64, Verification
 
 SKIPPED = "verification_skipped"
@@ -142,6 +143,27 @@ class Verifying:
         if nudge.fits:
             self.fits = nudge
         return None
+
+    def judge(self, fits: Nudge, hands: RecentHands, tolerance_s: float) -> PlacedHand | str:
+        """Return the hand that the drawing fits, or what the wearer must do before it counts.
+
+        Parameters
+        ----------
+        fits : Nudge
+            The wearer's confirmation.
+        hands : RecentHands
+        tolerance_s : float
+            Largest time between the confirmation and the hand.
+        """
+        if fits.problem:
+            return "The drawing has changed. Look and confirm again."
+        try:
+            hand = hands.nearest(fits.t_host_ns, tolerance_s)
+        except HandError as error:
+            return f"{error}. Hold it up and confirm again."
+        if hands.steady() is None:
+            return "Hold your hand still, and confirm again."
+        return hand
 
     def undo(self) -> None:
         """Undo the last nudge; ValueError if there is none."""

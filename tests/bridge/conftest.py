@@ -16,7 +16,8 @@ from handcal.link.statistics import LinkStatistics
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.station.hands import PlacedHand
-from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.procedure import Procedure
+from handcal.station.snapshot import Snapshot
 from handcal.station.states import Observation, State
 from handcal.types import Eye, Float64, HandCloud
 
@@ -52,7 +53,7 @@ def snapshot(tmp_path: Path) -> Iterator[Snapshot]:
     with Session.create(tmp_path, example_rig(), {}, name="session") as session:
         record = Session.open(session.path)
         procedure = Procedure(
-            State.SHOW_HAND, ("left", "right"), None, "", 0.1, {}, None, SHIFT_M, True
+            State.SHOW_HAND, ("left", "right"), None, "", None, SHIFT_M, is_applied=True
         )
         yield Snapshot(
             number=1,
@@ -64,7 +65,6 @@ def snapshot(tmp_path: Path) -> Iterator[Snapshot]:
                 True, 0, 0, 0, 0, 0, 0, 0, 0, {}, 60.0, None, None, None, None, None, 0, 0
             ),
             link_problem="",
-            problem="",
             procedure=procedure,
             record=record,
         )

@@ -162,7 +162,7 @@ def test_the_link_was_bad_and_everything_arrived(result: dict[str, Any], session
 
 
 def test_what_a_person_reads_tells_the_same(run: Run, result: dict[str, Any]) -> None:
-    assert "100 % Alignment 2 of 2, the right eye: applied and acknowledged" in run.out
+    assert "100 % Done: every alignment is made" in run.out
     error = result["reprojection_arcmin"]
     assert f"{error['before']:.1f}′ before, {error['after']:.1f}′ after" in run.out
     assert f"Session: {result['session']}" in run.out

@@ -17,7 +17,7 @@ from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.rig.example import example_rig
-from handcal.session.session import Session, SessionRecord
+from handcal.session.session import Session
 from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
@@ -71,11 +71,10 @@ class Stage:
         self,
         server: HeadsetServer,
         client: HeadsetClient,
-        session: Session | None,
-        resume: SessionRecord | None = None,
+        session: Session,
     ):
         self.server, self.client = server, client
-        self.calibration = Calibration(RIG, server, session, SETTINGS, resume)
+        self.calibration = Calibration(session, server, SETTINGS)
         self.t_ns = time.monotonic_ns()
         self._frames = 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,9 +29,12 @@ from tests.station.stage import (
 )
 
 
-def test_the_offline_projections_come_first(stage: Stage, server: HeadsetServer) -> None:
+def test_the_offline_projections_come_first(
+    stage: Stage, server: HeadsetServer, tmp_path: Path
+) -> None:
     stage.calibrate()
-    Calibration(RIG, server)
+    with Session.create(tmp_path, RIG, {}, name="another") as another:
+        Calibration(another, server)
     eventually(lambda: shows_offline_projections(stage.shown()))
 
 
@@ -96,7 +100,7 @@ def test_polling_gives_up_when_the_time_is_over(
     server: HeadsetServer, client: HeadsetClient, session: Session
 ) -> None:
     stage = Stage(server, client, session)
-    stage.calibration = Calibration(RIG, server, session, replace(SETTINGS, apply_timeout_s=0.2))
+    stage.calibration = Calibration(session, server, replace(SETTINGS, apply_timeout_s=0.2))
     stage.align()
     stage.calibration.solve()
     client.close()

@@ -185,7 +185,7 @@ def test_a_measured_eye_distance_is_used_stored_and_restored(
     other = solve(record, eye_distance=EyeDistance(0.058))
     assert other.eye_distance_m is not None
     assert other.eye_distance_m < results.eye_distance_m
-    resumed = Stage(server, client, session, resume=record)
+    resumed = Stage(server, client, session)
     assert resumed.calibration.eye_distance == wide
     assert resumed.calibration.results is not None
     assert results_json(resumed.calibration.results) == results_json(results)

@@ -52,12 +52,12 @@ def test_a_session_of_another_rig_or_without_an_alignment_is_refused(
         read_former(session.path, RIG)
 
 
-def test_the_headset_begins_with_the_former_shift(stage: Stage) -> None:
+def test_the_headset_begins_with_the_former_shift(stage: Stage, session: Session) -> None:
     former_m: dict[Eye, Float64] = {
         "left": np.array([0.001, 0.0, 0.002]),
         "right": np.array([-0.001, 0.0, 0.0]),
     }
-    stage.calibration = Calibration(RIG, stage.server, None, SETTINGS, former_m=former_m)
+    stage.calibration = Calibration(session, stage.server, SETTINGS, former_m)
     eventually(lambda: stage.calibration.is_applied)
     for eye in EYES:
         np.testing.assert_allclose(stage.calibration.applied_shift_m[eye], former_m[eye])

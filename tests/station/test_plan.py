@@ -16,12 +16,11 @@ from handcal.link.server import HeadsetServer
 from handcal.register.placement import PlacementSettings
 from handcal.session.session import Session
 from handcal.station.plan import NextStep, Plan, PlanSettings, StepName
-from handcal.station.procedure import Calibration
 from handcal.station.states import State
 from handcal.station.verifying import skipped_eyes
 from handcal.types import EYES, Eye
 from tests.helpers import eventually
-from tests.station.stage import HEADSET_AHEAD_NS, RIG, SETTINGS, T_D_HAND, Stage
+from tests.station.stage import HEADSET_AHEAD_NS, RIG, T_D_HAND, Stage
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)
 # The hand of these tests does not move, so no other place may be in the camera's range.
@@ -71,15 +70,8 @@ class Planned:
 @pytest.fixture
 def make(server: HeadsetServer, client: HeadsetClient, session: Session) -> Callable[..., Planned]:
     def build(settings: PlanSettings = RECOMMENDED, verifies_first: bool = False) -> Planned:
+        session.save_facts(plan=settings.name, usable_eyes=settings.usable_eyes)
         stage = Stage(server, client, session)
-        stage.calibration = Calibration(
-            RIG,
-            server,
-            session,
-            SETTINGS,
-            plan=settings.name,
-            usable_eyes=settings.usable_eyes,
-        )
         return Planned(stage, settings, verifies_first)
 
     return build

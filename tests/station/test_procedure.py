@@ -280,9 +280,11 @@ def test_what_the_disk_did_not_take_is_kept_and_stored_later(
     stage.see(T_D_NEAR)
     stage.press()
     session.path.rename(away)
-    with pytest.raises(FileError, match="cannot write"):
-        stage.see(T_D_NEAR)
+    assert stage.see(T_D_NEAR).hand is not None
     assert stage.state() is State.ALIGNED
+    assert [event.name for event in session.contents.unwritten] == ["alignment_saved"]
+    with pytest.raises(FileError, match="cannot write"):
+        session.write_waiting()
     with pytest.raises(FileError, match="cannot write"):
         calibration.solve()
     assert stage.state() is State.SOLVED
@@ -295,25 +297,27 @@ def test_what_the_disk_did_not_take_is_kept_and_stored_later(
 
     away.rename(session.path)
     stage.align()
+    assert session.contents.unwritten == ()
     assert len(Session.open(session.path).alignments) == 2
 
 
-def test_it_runs_without_a_session(server: HeadsetServer, client: HeadsetClient) -> None:
-    stage = Stage(server, client, None)
-    stage.calibrate()
-    assert stage.state() is State.APPLIED
-
-
 def test_a_full_session_says_so_before_the_wearer_aligns(
-    server: HeadsetServer, client: HeadsetClient, monkeypatch: pytest.MonkeyPatch
+    server: HeadsetServer,
+    client: HeadsetClient,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("handcal.station.alignments.MAX_ALIGNMENTS", 1)
-    stage = Stage(server, client, None)
+    monkeypatch.setattr("handcal.session.state.MAX_ALIGNMENTS", 1)
+    with Session.create(tmp_path, RIG, {}, name="small") as small:
+        fill(Stage(server, client, small))
+
+
+def fill(stage: Stage) -> None:
     stage.align()
     stage.calibration.redo()
     stage.calibration.restore_alignment(1)  # a deleted one would not count
     stage.hold()
-    with pytest.raises(ProcedureError, match="no room for more than 1 alignments in a session"):
+    with pytest.raises(ProcedureError, match="full: no room for more than 1 alignments"):
         stage.calibration.make_cursor()
 
 

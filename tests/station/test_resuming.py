@@ -52,7 +52,7 @@ def resumed(stage: Stage, session: Session) -> tuple[Stage, Session]:
     """Resume a session as after a crash: the old calibration receives no message."""
     session.close()
     again = Session(session.path)
-    return Stage(stage.server, stage.client, again, Session.open(session.path)), again
+    return Stage(stage.server, stage.client, again), again
 
 
 def test_a_calibration_goes_on_where_its_program_was_killed(stage: Stage, session: Session) -> None:
@@ -81,7 +81,8 @@ def test_a_calibration_goes_on_where_its_program_was_killed(stage: Stage, sessio
     stage.calibration.set_shift({"right": by_hand_m})
     stage.calibration.record_shift()
     solved_m = stage.calibration.applied_shift_m["left"]
-    Calibration(RIG, stage.server)  # another has used the headset in between
+    with Session.create(session.path.parent, RIG, {}, name="another") as another:
+        Calibration(another, stage.server)  # has used the headset in between
     stage, session = resumed(stage, session)
     assert stage.state() is State.APPLIED
     eventually(lambda: shows(stage, "left", solved_m) and shows(stage, "right", by_hand_m))
@@ -124,4 +125,4 @@ def test_a_session_that_can_no_longer_be_solved_is_not_resumed(
     session.save_alignment(alignment)  # of a few points
     session.save_results({})
     with pytest.raises(ProcedureError, match=r"cannot be resumed: .* points"):
-        Calibration(RIG, server, session, SETTINGS, Session.open(session.path))
+        Calibration(session, server, SETTINGS)

@@ -114,7 +114,7 @@ def test_a_network_headset_is_calibrated(station: StationSettings, recording: Pa
     record = Session.open(Path(result["session"]))
     assert record.wearer == "Ada"
     assert [one.eyes for one in record.alignments.values()] == [("left",), ("right",)]
-    assert "Alignment 2 of 2, the right eye: solving" in said
+    assert "the right eye: the wearer aligns the hand with the cursor and confirms" in said
     json.dumps(result, allow_nan=False)
 
 

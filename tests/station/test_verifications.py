@@ -230,8 +230,7 @@ def test_a_session_is_resumed_during_a_verification(
     begin(stage, "right")
     press(stage, NudgeSum(2.0, 1.0, 0.002))
     nudged_m = stage.calibration.applied_shift_m["right"]
-    record = Session.open(session.path)
-    again = Stage(server, client, session, record)
+    again = Stage(server, client, session)
     assert again.state() is State.VERIFY
     assert again.calibration.verifying is not None
     assert again.calibration.verifying.moved == NudgeSum(2.0, 1.0, 0.002)
@@ -245,7 +244,7 @@ def test_a_session_is_resumed_during_a_verification(
     found = again.calibration.verifications["right"]
     assert found.nudge_arcmin == (3.0, 1.0)
     # Once it has ended, it is not resumed again.
-    last = Stage(server, client, session, Session.open(session.path))
+    last = Stage(server, client, session)
     assert last.state() is State.APPLIED
     assert last.calibration.verifying is None
     assert last.calibration.verifications == again.calibration.verifications
@@ -264,7 +263,7 @@ def test_a_damaged_verification_is_not_resumed(
     begin(stage)
     whole = {"before_m": [0.0] * 3, "hand_E_m": [0.0, 0.0, 0.5], "nudge_arcmin": [1.0, 1.0]}
     session.record("verifying", **({} if damage == {"eye": "left"} else whole) | damage)
-    again = Stage(server, client, session, Session.open(session.path))
+    again = Stage(server, client, session)
     assert again.state() is State.APPLIED
 
 
