@@ -23,7 +23,6 @@ from handcal.export.trial_sections import (
     trials_section,
     user_test_section,
 )
-from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
 from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
@@ -61,7 +60,7 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     yield _summary(outcome)
     yield _shifts(outcome)
     if results is not None:
-        yield _solution(outcome, results)
+        yield _solution(results)
     if results is not None and results.alignments:
         yield _alignments(outcome, results)
         yield _shift_plots(outcome, results)
@@ -169,7 +168,7 @@ def _shifts(outcome: SessionOutcome) -> Section:
     return Section("Eye shift φ", items)
 
 
-def _solution(outcome: SessionOutcome, results: Results) -> Section:
+def _solution(results: Results) -> Section:
     table = Table(
         [
             Column("eye", "left"),
@@ -184,7 +183,7 @@ def _solution(outcome: SessionOutcome, results: Results) -> Section:
             [
                 eye,
                 results.verdicts[eye].name,
-                f"{expected_error_arcmin(outcome.record.rig.eyes[eye], shift):.1f}",
+                f"{results.benefits[eye].after_arcmin:.1f}",
                 *_registered(shift),
                 _reason(results.verdicts[eye], shift),
             ]

@@ -92,7 +92,8 @@ def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
                     "source": "alignment",
                     "alignment": number,
                     "eye": eye,
-                    **_solved(outcome, eye, shift),
+                    **_solved(outcome, shift),
+                    "expected_error_arcmin": expected_error_arcmin(record.rig.eyes[eye], shift),
                     "eyes_open": " ".join(alignment.eyes),
                     "rotation_deg": float(np.degrees(np.linalg.norm(alignment.rotation_rad))),
                     **_triple("drawn_phi{}_mm", 1e3 * alignment.drawn_shift_m[eye]),
@@ -102,7 +103,8 @@ def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
             yield {
                 "source": "fused",
                 **_place(outcome, eye, "solved"),
-                **_solved(outcome, eye, shift),
+                **_solved(outcome, shift),
+                "expected_error_arcmin": results.benefits[eye].after_arcmin,
                 "verdict": verdict.name,
                 "reason": verdict.reason,
             }
@@ -123,7 +125,7 @@ def _place(outcome: SessionOutcome, eye: Eye, origin: ShiftOrigin) -> dict[str, 
     }
 
 
-def _solved(outcome: SessionOutcome, eye: Eye, shift: EyeShift) -> dict[str, Any]:
+def _solved(outcome: SessionOutcome, shift: EyeShift) -> dict[str, Any]:
     covariance_mm2 = 1e6 * shift.covariance_m2
     return {
         "method": outcome.settings.method,
@@ -134,7 +136,6 @@ def _solved(outcome: SessionOutcome, eye: Eye, shift: EyeShift) -> dict[str, Any
             for row, column in zip(*np.triu_indices(3), strict=True)
         },
         **_registered(shift),
-        "expected_error_arcmin": expected_error_arcmin(outcome.record.rig.eyes[eye], shift),
     }
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 from PySide6.QtCore import QObject
 
 from handcal.progress import Progress
-from handcal.register.results import SolveSettings, solve_session
+from handcal.register.results import SolveSettings
 from handcal.session.session import SessionRecord
+from handcal.station.solve_again import solve_again
 from handcal.types import Method
 from handcal_gui.engine.jobs import Job
 from handcal_gui.panels.results.panel import ResultsPanel
@@ -55,14 +56,7 @@ class Comparison(QObject):
 
         def work(progress: Progress) -> object:
             assert record is not None
-            return solve_session(
-                record.alignments,
-                record.rig,
-                settings,
-                progress,
-                eye_distance=record.facts.eye_distance,
-                verified=record.facts.verified,
-            )
+            return solve_again(record, settings, progress)
 
         self._job = Job(work)
         self._job.progressed.connect(self._panel.show_comparison_progress)

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results
 from handcal.report.cells import signed
-from handcal.rig_types import EyeDisplay, Rig
 from handcal.session.judged_trials import EyeTrials, is_doubted
 from handcal.session.record import SessionRecord
 from handcal.session.trial import SAME_SHIFT_M, Trial
@@ -55,30 +53,30 @@ class Quantity:
     suffix: str
     meaning: str
     """Explanation for a tooltip. The unit is in the name or the suffix."""
-    value: Callable[[EyeShift, EyeDisplay], float]
-    """Computes the number in its unit from the shift and the eye's display."""
+    value: Callable[[EyeShift], float]
+    """Computes the number in its unit from the shift."""
     decimals: int
     sigma: Callable[[EyeShift], float] | None = None
     """Computes the number's standard deviation from the shift."""
     is_registered: bool = False
     """True if there is none without an alignment, as after a slipped headset."""
 
-    def text(self, shift: EyeShift, display: EyeDisplay) -> str:
+    def text(self, shift: EyeShift) -> str:
         """Return the number, with its standard deviation if it has one."""
         if not self._is_known(shift):
             return NOTHING
-        value = self.value(shift, display)
+        value = self.value(shift)
         if self.sigma is None:
             return f"{value:.{self.decimals}f}{self.suffix}"
         return (
             f"{signed(value, self.decimals)} ± {self.sigma(shift):.{self.decimals}f}{self.suffix}"
         )
 
-    def difference(self, shift: EyeShift, other: EyeShift, display: EyeDisplay) -> str:
+    def difference(self, shift: EyeShift, other: EyeShift) -> str:
         """Return the other's number minus this one."""
         if not (self._is_known(shift) and self._is_known(other)):
             return NOTHING
-        apart = self.value(other, display) - self.value(shift, display)
+        apart = self.value(other) - self.value(shift)
         return f"{signed(apart, self.decimals)}{self.suffix}"
 
     def _is_known(self, shift: EyeShift) -> bool:
@@ -93,27 +91,19 @@ def _phi(index: int, direction: str) -> Quantity:
             "Distance of the eye {} the rig's viewpoint,\n± one standard deviation (σ). Both eyes "
             "are solved together:\nan alignment of one may change the other, too."
         ).format(direction),
-        lambda shift, _: 1e3 * float(shift.shift_m[index]),
+        lambda shift: 1e3 * float(shift.shift_m[index]),
         2,
         lambda shift: 1e3 * float(shift.covariance_m2[index, index]) ** 0.5,
     )
 
 
 PHI = (_phi(0, tr("to the right of")), _phi(1, tr("below")), _phi(2, tr("in front of")))
-EXPECTED_ERROR = Quantity(
-    tr("Expected error"),
-    "′",
-    tr(
-        "Expected angle between real and drawn points at 0.4 to 0.6 m due to the "
-        "uncertainty of φ,\n"
-        "in arcminutes. 1′ is 0.15 mm at 0.5 m."
-    ),
-    lambda shift, display: expected_error_arcmin(display, shift),
-    1,
+_EXPECTED_ERROR = tr("Expected error")
+_EXPECTED_ERROR_MEANING = tr(
+    "Expected angle between real and drawn points at 0.4 to 0.6 m due to the uncertainty of φ,\n"
+    "in arcminutes. 1′ is 0.15 mm at 0.5 m."
 )
-QUANTITIES = (
-    *PHI,
-    EXPECTED_ERROR,
+REGISTRATION = (
     Quantity(
         tr("Point RMS (mm)"),
         "",
@@ -121,7 +111,7 @@ QUANTITIES = (
             "Distance from the hand's points to their partners on the cursor after registration,\n"
             "root mean square over the inliers"
         ),
-        lambda shift, _: 1e3 * shift.rms_m,
+        lambda shift: 1e3 * shift.rms_m,
         2,
         is_registered=True,
     ),
@@ -129,7 +119,7 @@ QUANTITIES = (
         tr("Inliers"),
         " %",
         tr("Share of the hand's points with a partner on the cursor"),
-        lambda shift, _: 100 * shift.inlier_ratio,
+        lambda shift: 100 * shift.inlier_ratio,
         0,
         is_registered=True,
     ),
@@ -137,7 +127,7 @@ QUANTITIES = (
         tr("Iterations"),
         "",
         tr("Sum over all alignments"),
-        lambda shift, _: float(shift.iterations),
+        lambda shift: float(shift.iterations),
         0,
         is_registered=True,
     ),
@@ -170,16 +160,14 @@ def _trials_cell(found: EyeTrials | None, count: int) -> str:
     return text.format(found.mean_arcmin, found.count)
 
 
-def result_rows(results: Results, rig: Rig, trials: Row | None = None) -> list[Row]:
+def result_rows(results: Results, trials: Row | None = None) -> list[Row]:
     """Return the numbers of each eye, one column per eye, and those of both eyes."""
-    rows = [
-        Row(q.name, tuple(_cell(q, results.eyes.get(eye), rig, eye) for eye in EYES), q.meaning)
-        for q in QUANTITIES
-    ]
-    arcmin = results.expected_after_another_arcmin
-    another = tuple(_arcmin(arcmin[eye]) if eye in arcmin else NOTHING for eye in EYES)
-    after = QUANTITIES.index(EXPECTED_ERROR) + 1
-    rows[after:after] = [Row(tr("One more alignment"), another, _ANOTHER), *filter(None, [trials])]
+    rows = [_row(quantity, results) for quantity in PHI]
+    expected = {eye: one.after_arcmin for eye, one in results.benefits.items()}
+    rows.append(Row(_EXPECTED_ERROR, _cells(expected), _EXPECTED_ERROR_MEANING))
+    another = _cells(results.expected_after_another_arcmin)
+    rows += [Row(tr("One more alignment"), another, _ANOTHER), *filter(None, [trials])]
+    rows += [_row(quantity, results) for quantity in REGISTRATION]
     solved = tr("Eye distance, solved")  # as another may be measured
     rows.append(Row(solved, (eye_distance_text(results),), _EYE_DISTANCE_MEANING))
     if measured := results.measured_eye_distance:
@@ -254,10 +242,10 @@ def verdict_rows(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list
     return rows
 
 
-def another_text(results: Results, rig: Rig) -> str:
+def another_text(results: Results) -> str:
     """Return the expected benefit of one more alignment."""
     gains = ", ".join(
-        f"{EYE_NAMES[eye].lower()} {EXPECTED_ERROR.text(results.eyes[eye], rig.eyes[eye])}"
+        f"{EYE_NAMES[eye].lower()} {_arcmin(results.benefits[eye].after_arcmin)}"
         f" → {_arcmin(arcmin)}"
         for eye, arcmin in results.expected_after_another_arcmin.items()
     )
@@ -270,25 +258,31 @@ def eye_distance_text(results: Results) -> str:
     return NOTHING if distance_m is None else f"{1e3 * distance_m:.1f} mm"
 
 
-def single_alignment_rows(results: Results, rig: Rig) -> list[Row]:
+def single_alignment_rows(results: Results) -> list[Row]:
     """Return φ from each alignment alone, one row per eye."""
     return [
-        Row(_ALONE[eye].format(number), tuple(q.text(shift, rig.eyes[eye]) for q in PHI))
+        Row(_ALONE[eye].format(number), tuple(q.text(shift) for q in PHI))
         for number, shifts in results.alignments.items()
         for eye, shift in shifts.items()
     ]
 
 
-def comparison_rows(results: Results, other: Results, rig: Rig) -> list[Row]:
+def comparison_rows(results: Results, other: Results) -> list[Row]:
     """Return both results and their differences, eye by eye."""
     rows = []
     for eye in EYES:
         if eye in results.eyes and eye in other.eyes:
             rows.append(Row(EYE_NAMES[eye], ("", "", "")))
-            one, two, display = results.eyes[eye], other.eyes[eye], rig.eyes[eye]
-            for q in QUANTITIES:
-                both = q.text(one, display), q.text(two, display)
-                rows.append(Row(q.name, (*both, q.difference(one, two, display)), q.meaning))
+            one, two = results.eyes[eye], other.eyes[eye]
+            expected = [of.benefits[eye].after_arcmin for of in (results, other)]
+            apart = f"{signed(expected[1] - expected[0], 1)}′"
+            texts = (*map(_arcmin, expected), apart)
+            compared = [
+                Row(q.name, (q.text(one), q.text(two), q.difference(one, two)), q.meaning)
+                for q in (*PHI, *REGISTRATION)
+            ]
+            compared.insert(len(PHI), Row(_EXPECTED_ERROR, texts, _EXPECTED_ERROR_MEANING))
+            rows += compared
     if results.eye_distance_m is not None and other.eye_distance_m is not None:
         apart_mm = 1e3 * (other.eye_distance_m - results.eye_distance_m)
         texts = (*map(eye_distance_text, (results, other)), f"{signed(apart_mm, 1)} mm")
@@ -296,9 +290,15 @@ def comparison_rows(results: Results, other: Results, rig: Rig) -> list[Row]:
     return rows
 
 
-def _cell(quantity: Quantity, shift: EyeShift | None, rig: Rig, eye: Eye) -> str:
-    return NOTHING if shift is None else quantity.text(shift, rig.eyes[eye])
+def _row(quantity: Quantity, results: Results) -> Row:
+    eyes = results.eyes
+    cells = (quantity.text(eyes[eye]) if eye in eyes else NOTHING for eye in EYES)
+    return Row(quantity.name, tuple(cells), quantity.meaning)
+
+
+def _cells(arcmin: Mapping[Eye, float]) -> tuple[str, ...]:
+    return tuple(_arcmin(arcmin[eye]) if eye in arcmin else NOTHING for eye in EYES)
 
 
 def _arcmin(arcmin: float) -> str:
-    return f"{arcmin:.{EXPECTED_ERROR.decimals}f}{EXPECTED_ERROR.suffix}"
+    return f"{arcmin:.1f}′"

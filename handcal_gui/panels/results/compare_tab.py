@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.register.results import Results
-from handcal.rig_types import Rig
 from handcal.types import METHODS, Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
@@ -53,7 +52,6 @@ class CompareTab(QWidget):
         super().__init__(parent)
         self.setObjectName("comparison")
         self._results: Results | None = None
-        self._rig: Rig | None = None
         self.table = NumberTable("comparison-of-methods", tr("Comparison of methods"), wraps=True)
         keep_space(self.table)
         self._methods = QComboBox()
@@ -79,11 +77,11 @@ class CompareTab(QWidget):
         self._lay_out()
         self._set_busy(False)
 
-    def show_results(self, results: Results, rig: Rig) -> None:
+    def show_results(self, results: Results) -> None:
         """Set the results to compare with; an earlier comparison is removed."""
         if self._cancel.isEnabled():
             self._request_cancel()
-        self._results, self._rig = results, rig
+        self._results = results
         self._methods.clear()
         for method in METHODS:
             if method != results.method:
@@ -94,10 +92,10 @@ class CompareTab(QWidget):
     def show_comparison(self, other: Results) -> None:
         """Show another method's results of the same alignments."""
         self._set_busy(False)
-        if self._results is None or self._rig is None:
+        if self._results is None:
             return
         columns = self._results.method, other.method, "Δ"
-        self.table.show_rows(columns, comparison_rows(self._results, other, self._rig))
+        self.table.show_rows(columns, comparison_rows(self._results, other))
         self.table.show()
         self._status.setText(
             tr(

@@ -92,7 +92,7 @@ class ResultsPanel(QWidget):
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
             self.show_results(procedure.results, record.alignments, record.rig)
-        self.show_trials(record, procedure.target_arcmin)
+        self.show_trials(record, snapshot.settings.solve.verdict.target_arcmin)
 
     def show_results(
         self,
@@ -122,14 +122,14 @@ class ResultsPanel(QWidget):
             return
         for card in self._cards.values():
             card.setVisible(has_verdicts)
-        self._show_eyes(results, rig)
+        self._show_eyes(results)
         for tab in (self._iterations, self._residuals, self._alone):
             self._tabs.setTabVisible(self._tabs.indexOf(tab), bool(results.alignments))
         self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
-        self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results, rig))
-        self._another.setText(another_text(results, rig))
-        self._compare.show_results(results, rig)
+        self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results))
+        self._another.setText(another_text(results))
+        self._compare.show_results(results)
         self._fit()
 
     def show_trials(self, record: SessionRecord, target_arcmin: float) -> None:
@@ -137,16 +137,16 @@ class ResultsPanel(QWidget):
         if self._results is not None and record.trials is not self._trials:
             self._trials = record.trials
             self._judged = eye_trials(self._results, record, target_arcmin)
-            self._show_eyes(self._results, record.rig)
+            self._show_eyes(self._results)
             self._fit()
 
-    def _show_eyes(self, results: Results, rig: Rig) -> None:
+    def _show_eyes(self, results: Results) -> None:
         """Show the verdicts and the numbers of both eyes, with those of their trials."""
         for eye, card in self._cards.items():
             card.show_verdict(results, self._judged.get(eye))
         row = trial_row(self._judged, self._trials.values()) if self._trials else None
         names = [EYE_NAMES[eye] for eye in EYES]
-        self._numbers.show_rows(names, result_rows(results, rig, row))
+        self._numbers.show_rows(names, result_rows(results, row))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the tab of the eyes into the panel."""
