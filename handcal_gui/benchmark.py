@@ -186,7 +186,7 @@ class _Measurement(QObject):
         if seen is None or snapshot.frame is None:
             return
         if snapshot.procedure.state is State.SHOW_HAND and seen.is_steady:
-            self._program.live.do(Action.MAKE_CURSOR)
+            self._program.live.do(Action.TAKE_STEP)
         self._replay.is_turned = snapshot.procedure.state is State.ALIGN
         self._shown_ns = snapshot.frame.t_host_ns
         self._seen = snapshot.frame.index
@@ -238,7 +238,7 @@ def measure(frames: int, rate_hz: int) -> list[BenchFigure]:
             sessions=str(folder / "sessions"),
         )
         program.live.opened.connect(lambda _path: _show_every_panel(program))
-        program.live.start(lambda: _ReplayStation(replay, settings), "both")
+        program.live.start(lambda: _ReplayStation(replay, settings))
         watch = _Measurement(program, replay, frames)
         with _headset(settings.port):
             app.exec()

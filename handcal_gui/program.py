@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 
 from handcal.errors import FileError
 from handcal.session.session import Session
+from handcal.station.plan import with_eyes
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui import FIRST_SIZE_PX
@@ -117,23 +118,24 @@ class Program(QObject):
     def start_calibration(self, settings: StationSettings, wearer: str) -> None:
         """Open a station for a wearer."""
         self._current.change(station=settings)
-        self._run(lambda: Station(settings, wearer, pairings=self._current.pairings))
+        followed = self._followed(settings)
+        self._run(lambda: Station(followed, wearer, pairings=self._current.pairings))
 
     def resume_session(self, path: Path) -> None:
         """Resume a session, at the station that was used last or chosen since."""
         if not self._may_leave():
             return
         self.start.keep_entries(self._current)
-        settings = self.preferences.station
-        self._run(lambda: Station(settings, resume=path, pairings=self._current.pairings))
+        followed = self._followed(self.preferences.station)
+        self._run(lambda: Station(followed, resume=path, pairings=self._current.pairings))
 
     def begin_from(self, path: Path) -> None:
         """Begin a session from a stored one of the same wearer, whose φ is verified first."""
         if not self._may_leave():
             return
         station = self.preferences.station
-        plan = replace(station.plan, name="recommended", is_automatic=True)
-        settings = replace(station, plan=plan)
+        recommended = replace(station, plan=replace(station.plan, name="recommended"))
+        settings = self._followed(recommended)
         try:
             wearer = Session.open(path).wearer
         except FileError as error:
@@ -215,7 +217,7 @@ class Program(QObject):
         review_page.again_requested.connect(self._begin_from_shown)
         self.live.slipped.connect(self._begin_from_shown)
         review_page.close_requested.connect(self.show_start)
-        self.wizard_panel.plan_changed.connect(lambda plan: self._current.change(plan=plan))
+        self.wizard_panel.eyes_chosen.connect(lambda eyes: self._current.change(plan=eyes))
         self.wizard_panel.hold_changed.connect(
             lambda is_held: self._current.change(runs_itself=not is_held)
         )
@@ -275,12 +277,18 @@ class Program(QObject):
     def _use_theme(self) -> None:
         use_theme(self.preferences.theme)
 
+    def _followed(self, settings: StationSettings) -> StationSettings:
+        """Return settings whose plan the station follows, in the order of eyes that was chosen."""
+        plan = replace(settings.plan, is_automatic=True)
+        if plan.name == "paper":
+            plan = with_eyes(plan, self.preferences.plan)
+        return replace(settings, plan=plan)
+
     def _run(self, open_station: Callable[[], Station]) -> None:
         self.review.close()
         self.window.banner.clear()
         is_held = not self.preferences.runs_itself
-        chosen = self.preferences
-        self.live.start(open_station, chosen.plan, bridges=chosen.bridges, is_held=is_held)
+        self.live.start(open_station, bridges=self.preferences.bridges, is_held=is_held)
         self.start.set_opening(True)
         self.window.show_page("start")
 

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from handcal.errors import FileError
 from handcal.io.files import make_folder
-from handcal_gui.pages.wizard.view import STEPS, Action, Step, WizardView
+from handcal_gui.pages.wizard.view import STEPS, Step, WizardView
 
 
 class Screenshots:
@@ -30,16 +30,16 @@ class Screenshots:
     def __init__(self, window: QWidget, folder: Path) -> None:
         self._window = window
         self._folder = make_folder(folder)
-        self._seen: dict[Step, set[Action]] = {}
+        self._seen: dict[Step, set[str]] = {}
 
     def save_step(self, view: WizardView) -> None:
-        """Save the window the first time that a step shows a main action."""
+        """Save the window the first time that a step shows a main button."""
         seen = self._seen.setdefault(view.step, set())
-        action = view.main.action
-        if action in seen:
+        label = view.main.label
+        if label in seen:
             return
-        again = f"-{action.value}" if seen else ""
-        seen.add(action)
+        again = f"-{label}" if seen else ""
+        seen.add(label)
         name = f"step-{STEPS.index(view.step) + 1}-{view.step.value}{again}"
         self.save(name.lower().replace(" ", "-"))
 

@@ -8,13 +8,10 @@ from functools import partial
 
 from handcal.errors import FileError
 from handcal.station.procedure import Calibration
-from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.docks import Panels
 from handcal_gui.engine.engine_thread import Command
-from handcal_gui.pages.wizard.planned import PlannedWizard
-from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.translation import tr
 
@@ -33,37 +30,6 @@ def calibrating(command: Callable[[Calibration], object]) -> Command:
             command(station.calibration)
 
     return command_station
-
-
-def command_of(action: Action, wizard: Wizard, snapshot: Snapshot) -> Command | None:
-    """Return the command of a guide's action; None for a move in which the engine has no part."""
-    eyes, unverified = wizard.eyes(snapshot), wizard.unverified(snapshot)
-    is_planned = isinstance(wizard, PlannedWizard)
-    commands: dict[Action, Callable[[Calibration], object]] = {
-        Action.MAKE_CURSOR: lambda calibration: calibration.make_cursor(eyes),
-        Action.CONFIRM: _confirm,
-        Action.SOLVE: Calibration.solve,
-        Action.APPLY: Calibration.apply,
-        Action.REDO: Calibration.redo,
-        Action.VERIFIED: Calibration.verified,
-        Action.UNDO_NUDGE: Calibration.undo_nudge,
-    }
-    if unverified:
-        commands[Action.VERIFY] = lambda calibration: calibration.verify(unverified[0])
-    if snapshot.procedure.state is State.VERIFY:
-        commands[Action.SKIP] = _skip
-    if is_planned:
-        commands |= {
-            Action.ANOTHER: lambda calibration: calibration.make_cursor(eyes),
-            Action.VERIFY_LEFT: lambda calibration: calibration.verify("left"),
-            Action.VERIFY_RIGHT: lambda calibration: calibration.verify("right"),
-        }
-    stationwide: dict[Action, Command] = {Action.FINISH: Station.finish}
-    if is_planned:
-        stationwide |= {Action.TAKE_STEP: Station.take_step, Action.SKIP: _skip_planned}
-    if action in stationwide:
-        return stationwide[action]
-    return calibrating(commands[action]) if action in commands else None
 
 
 def connect_panels(
@@ -142,14 +108,25 @@ def _confirm(calibration: Calibration) -> None:
         calibration.confirm()
 
 
-def _skip_planned(station: Station) -> None:
-    """Skip the verification, which the wearer may have ended already; the plan continues."""
-    with suppress(FileError):
-        if station.calibration.state is State.VERIFY:
-            station.plan.skip()
-
-
-def _skip(calibration: Calibration) -> None:
+def _skip(station: Station) -> None:
     """Skip the verification, which the wearer may have ended already."""
-    if calibration.state is State.VERIFY:
-        calibration.skip_verification()
+    with suppress(FileError):
+        station.plan.skip()
+
+
+COMMANDS: dict[Action, Command] = {
+    Action.TAKE_STEP: Station.take_step,
+    Action.CONFIRM: calibrating(_confirm),
+    Action.REDO: calibrating(Calibration.redo),
+    Action.VERIFIED: calibrating(Calibration.verified),
+    Action.UNDO_NUDGE: calibrating(Calibration.undo_nudge),
+    Action.SKIP: _skip,
+    Action.ANOTHER: lambda station: station.plan.request(),
+    Action.REPEAT_LEFT: lambda station: station.plan.request(("left",)),
+    Action.REPEAT_RIGHT: lambda station: station.plan.request(("right",)),
+    Action.WITHDRAW: lambda station: station.plan.withdraw(),
+    Action.VERIFY_LEFT: calibrating(lambda calibration: calibration.verify("left")),
+    Action.VERIFY_RIGHT: calibrating(lambda calibration: calibration.verify("right")),
+    Action.FINISH: Station.finish,
+}
+"""The engine's part of each action of the guide."""

@@ -20,13 +20,11 @@ from handcal.register.results import SolveSettings
 from handcal.session.session import Session
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import EyePlan
-from handcal_gui.control.commands import calibrating, command_of, connect_panels
+from handcal_gui.control.commands import COMMANDS, calibrating, connect_panels
 from handcal_gui.control.compare import Comparison
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.docks import Panel
 from handcal_gui.engine.engine_thread import Command, EngineThread
-from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import ACTION_NAMES, Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
@@ -124,7 +122,6 @@ class CalibrationController(QObject):
     def start(
         self,
         open_station: Callable[[], Station],
-        plan: EyePlan,
         *,
         bridges: BridgeSettings = _NO_BRIDGES,
         is_held: bool = True,
@@ -136,7 +133,7 @@ class CalibrationController(QObject):
         self._is_plan_held = True
         self._doing = self._shown = 0
         self._conditions = Conditions()
-        self._wizard_panel.start(Wizard(plan), is_held=is_held)
+        self._wizard_panel.start(Wizard(), is_held=is_held)
         self._engine = EngineThread(lambda: _held(open_station()), self, bridges)
         self._engine.arrived.connect(self._poll)
         self._engine.told.connect(self._window.banner.show_message)
@@ -184,18 +181,13 @@ class CalibrationController(QObject):
         elif action is Action.SLIPPED:
             self.slipped.emit()
         elif self._snapshot is not None and self._shown >= self._doing:
-            self._perform(action, self._snapshot)
-
-    def _perform(self, action: Action, snapshot: Snapshot) -> None:
-        wizard = self._wizard_panel.wizard
-        command = command_of(action, wizard, snapshot)
-        skips = action is Action.SKIP and not isinstance(wizard, PlannedWizard)
-        if command is None or skips:
-            wizard.move(action, snapshot)
-        if command is None:
-            self._wizard_panel.show_snapshot(snapshot)
-        else:
-            self._doing = self._submit(action.value, command)
+            if action is Action.BACK:
+                self._wizard_panel.hold(True)  # or the step would run again
+            if action in (Action.NEXT, Action.BACK, Action.FINISH):
+                self._wizard_panel.wizard.move(action)
+                self._wizard_panel.show_snapshot(self._snapshot)
+            if (command := COMMANDS.get(action)) is not None:
+                self._doing = self._submit(action.value, command)
 
     def _nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
         """Move the drawing of the eye that is verified."""
@@ -216,6 +208,9 @@ class CalibrationController(QObject):
         self._wizard_panel.asked.connect(self.do)
         self._wizard_panel.nudged.connect(self._nudge)
         self._wizard_panel.went_back.connect(self._go_back)
+        self._wizard_panel.eyes_chosen.connect(
+            lambda eyes: self._submit(tr("choose the eyes"), lambda s: s.plan.choose(eyes))
+        )
         self._wizard_panel.step_changed.connect(self._on_step)
         for name, dock in self._window.docks.items():
             dock.visibilityChanged.connect(partial(self._catch_up, getattr(panels, name)))
@@ -261,8 +256,7 @@ class CalibrationController(QObject):
             if panel in always or (is_due and shows):
                 panel.show_snapshot(snapshot)
         self._window.banner.show_condition(condition)
-        wizard = self._wizard_panel.wizard
-        self._hold_plan(isinstance(wizard, PlannedWizard) and wizard.holds_plan)
+        self._hold_plan(self._wizard_panel.wizard.holds_plan)
         self._watch_views(picture.wants_views or panels.wearer_view in self._visible)
         self.polled.emit(snapshot)
 
@@ -305,10 +299,6 @@ class CalibrationController(QObject):
             is_usb=station.settings.source == "realsense",
             is_virtual=station.settings.headset == "virtual",
         )
-        plan = station.plan.settings
-        if plan.name == "recommended":
-            is_held = self._wizard_panel.wizard.is_held
-            self._wizard_panel.start(PlannedWizard(plan.usable_eyes), is_held=is_held)
         panels = self._window.panels
         self._solve_settings = station.settings.calibration.solve
         host, port = station.address

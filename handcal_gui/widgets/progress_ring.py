@@ -14,7 +14,7 @@ _STEPS = 60
 
 
 class ProgressRing(QWidget):
-    """Shows a count with its name, and fills with it; within, the time until a step runs itself."""
+    """Shows a count with its name, and fills with it."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -23,13 +23,7 @@ class ProgressRing(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._text = self._unit = ""
         self._part = 0
-        self._waited: int | None = None
         self.set_diameter(9 * SPACING_PX)
-
-    @property
-    def share(self) -> float | None:
-        """The share of the waiting time shown; None if no step runs itself."""
-        return None if self._waited is None else self._waited / _STEPS
 
     @property
     def text(self) -> str:
@@ -40,16 +34,14 @@ class ProgressRing(QWidget):
         """Set the size."""
         self.setFixedSize(QSize(diameter_px, diameter_px))
 
-    def show_count(self, done: int, planned: int, unit: str, share: float | None = None) -> None:
-        """Show a count, and the share from 0 to 1 of a step's waiting time, if there is one."""
+    def show_count(self, done: int, planned: int, unit: str) -> None:
+        """Show a count."""
         text = f"{done}/{planned}"
         part = round(_STEPS * done / planned)
-        waited = None if share is None else round(_STEPS * share)
-        shown = part, waited, text, unit
-        if shown != (self._part, self._waited, self._text, self._unit):
-            self._part, self._waited, self._text, self._unit = shown
-            filled = "" if waited is None else f", {100 * waited // _STEPS} %"
-            self.setAccessibleDescription(f"{text} {unit}{filled}")
+        shown = part, text, unit
+        if shown != (self._part, self._text, self._unit):
+            self._part, self._text, self._unit = shown
+            self.setAccessibleDescription(f"{text} {unit}")
             self.update()
 
     def paintEvent(self, _: QPaintEvent) -> None:
@@ -62,21 +54,15 @@ class ProgressRing(QWidget):
         faint.setAlphaF(0.3)
         painter.setPen(QPen(faint, width))
         painter.drawEllipse(ring)
-        self._fill(painter, ring, self._part, colors().good, width)
-        inner = ring.adjusted(width * 0.8, width * 0.8, -width * 0.8, -width * 0.8)
-        self._fill(painter, inner, self._waited or 0, colors().live, width / 2)
+        pen = QPen(QColor(colors().good), width)
+        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+        painter.setPen(pen)
+        painter.drawArc(ring, 90 * 16, -round(360 * 16 * self._part / _STEPS))
         painter.setPen(self.palette().windowText().color())
         upper = ring.adjusted(0, 0, 0, -ring.height() / 4 if self._unit else 0)
         self._write(painter, upper, self._text, self.width() // 4)
         lower = ring.adjusted(1.8 * width, ring.height() / 2.1, -1.8 * width, -ring.height() / 6)
         self._write(painter, lower, self._unit, self.width() // 6)
-
-    def _fill(self, painter: QPainter, ring: QRectF, part: int, color: str, width: float) -> None:
-        """Draw a part of a ring, from its top."""
-        pen = QPen(QColor(color), width)
-        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
-        painter.setPen(pen)
-        painter.drawArc(ring, 90 * 16, -round(360 * 16 * part / _STEPS))
 
     def _write(self, painter: QPainter, place: QRectF, text: str, height_px: int) -> None:
         """Write a text in the middle of a place, smaller if it would not fit."""

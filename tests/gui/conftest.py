@@ -38,8 +38,10 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.station.hands import PlacedHand
+from handcal.station.plan import NextStep, StepName
+from handcal.station.procedure import Procedure
 from handcal.station.settings import StationSettings
-from handcal.station.snapshot import Procedure, Snapshot
+from handcal.station.snapshot import Snapshot
 from handcal.station.states import CalibrationSettings, Observation, State
 from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal.types import (
@@ -51,6 +53,7 @@ from handcal.types import (
     Frame,
     HeadsetIdentity,
     UInt8,
+    Verification,
 )
 from tests.helpers import write_small_rig
 
@@ -160,7 +163,7 @@ def snapshot(
 
     ``snapshot(State.ALIGN, observation={"is_over_limit": True}, camera={"dropped": 3}, number=2)``
     changes fields of the parts `observation`, `procedure`, `camera` and `link`, and of the
-    snapshot itself; ``observation=None`` leaves it out.
+    snapshot itself; ``observation=None`` leaves it out. The record holds the eyes `verified`.
     """
 
     def make(
@@ -170,6 +173,7 @@ def snapshot(
         procedure: Mapping[str, Any] = {},
         camera: Mapping[str, Any] = {},
         link: Mapping[str, Any] = {},
+        verified: Mapping[Eye, Verification] | None = None,
         **changes: Any,
     ) -> Snapshot:
         observed = _observe(state, shots)
@@ -181,16 +185,15 @@ def snapshot(
             camera=replace(CameraStatus("Simulated camera", rate_hz=30.0), **camera),
             link=replace(LINK, **link),
             link_problem="",
-            problem="",
-            procedure=replace(
-                _procedure(state, shots, results),
-                **{"alignments": changes.get("record", record).alignments, **procedure},
-            ),
+            procedure=replace(_procedure(state, shots, results), **procedure),
             record=record,
+            next_step=NextStep(_NEXT[state], EYES, "as told"),
             views=_views(rig, shots),
         )
-        if verified := frozenset(procedure.get("verifications", ())):
-            changes["record"] = replace(changes.get("record", record), verified_now=verified)
+        if verified is not None:
+            now = changes.get("record", record)
+            facts = replace(now.facts, verified=verified)
+            changes["record"] = replace(now, facts=facts, verified_now=frozenset(verified))
         return replace(snapshot, **changes)
 
     return make
@@ -378,12 +381,22 @@ def _procedure(state: State, shots: Shots, results: Results) -> Procedure:
         eyes=EYES,
         cursor=shots.cursor if state in (State.ALIGN, State.ALIGNED, State.SOLVED) else None,
         refusal="",
-        guard_limit_rad=float(np.radians(9.0)),
-        alignments={},
         results=results if is_sent or state is State.SOLVED else None,
         applied_shift_m=applied_m,
         is_applied=state is not State.APPLYING,
     )
+
+
+_NEXT = {
+    State.SHOW_HAND: StepName.CURSOR,
+    State.ALIGN: StepName.ALIGN,
+    State.ALIGNED: StepName.SOLVE,
+    State.SOLVED: StepName.APPLY,
+    State.APPLYING: StepName.WAIT,
+    State.APPLIED: StepName.DONE,
+    State.VERIFY: StepName.NUDGE,
+}
+"""The plan's next step in each state, if nothing else is said."""
 
 
 def _views(rig: Rig, shots: Shots) -> dict[Eye, EyeView]:

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 from handcal.link.nudges import NudgeSum
+from handcal.register.results import SolveSettings
+from handcal.register.verdict import VerdictSettings
 from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import make_trial
-from handcal.station.plan import NextStep, StepName
+from handcal.station.plan import NextStep, PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
+from handcal.station.states import CalibrationSettings, State
 from handcal.station.verifying import VerifyingView
 from handcal.types import EYES, Eye, Float64, Verdict, VerdictName, Verification
-from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.step_views import save_view
-from handcal_gui.pages.wizard.steps import PLANS, Wizard
+from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step, WizardView
 
+RECOMMENDED = PlanSettings("recommended", is_automatic=True)
 _ZERO = (0.0, 0.0, 0.0)
 NUDGED = VerifyingView("left", NudgeSum(3.0, -4.0, 0.01), _ZERO, _ZERO, True, False)
 PLANNED: dict[StepName, tuple[State, tuple[Eye, ...]]] = {
@@ -42,14 +45,24 @@ def judged(
     snapshot: Maker, left: VerdictName, right: VerdictName, state: State, **changes: Any
 ) -> Snapshot:
     """Return a snapshot with these verdicts, of eyes that were verified."""
-    seen = snapshot(state, procedure={"verifications": dict.fromkeys(EYES, VERIFIED)}, **changes)
+    seen = snapshot(state, verified=dict.fromkeys(EYES, VERIFIED), **changes)
     assert seen.procedure.results is not None
     verdicts: dict[Eye, Verdict] = {
         "left": Verdict(left, "as told"),
         "right": Verdict(right, "as told"),
     }
     results = replace(seen.procedure.results, verdicts=verdicts)
-    return replace(seen, procedure=replace(seen.procedure, results=results))
+    procedure = replace(seen.procedure, results=results)
+    if state is State.APPLIED:
+        procedure = replace(procedure, applied_shift_m=results.rendered_shift_m)
+    return replace(seen, procedure=procedure)
+
+
+def with_target(target_arcmin: float) -> CalibrationSettings:
+    """Return settings with a target of the lab."""
+    return CalibrationSettings(
+        solve=SolveSettings(verdict=VerdictSettings(target_arcmin=target_arcmin))
+    )
 
 
 def with_events(record: SessionRecord, *events: tuple[str, dict[str, Any]]) -> SessionRecord:
@@ -87,37 +100,53 @@ def actions(view: WizardView) -> list[Action]:
     return [offer.action for offer in view.others]
 
 
+def begun(*, is_held: bool = False) -> Wizard:
+    """Return a guide in which *Begin* has been pressed."""
+    wizard = Wizard()
+    wizard.move(Action.NEXT)
+    wizard.is_held = is_held
+    return wizard
+
+
 def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[WizardView]:
-    """Return a view of every step, with every main button and every other one."""
+    """Return a view of every step of both plans, with every main button and every other one."""
     left = replace(next(iter(record.alignments.values())), eyes=("left",))
-    one = replace(record, alignments={1: left})
-    views = []
-    for plan in PLANS:
-        wizard = Wizard(plan)
-        start = snapshot(State.SHOW_HAND, record=replace(record, alignments={}))
-        for _ in range(3):
-            views.append(wizard.view(start))
-            wizard.move(Action.NEXT, start)
-        states = (State.ALIGN, State.SHOW_HAND, State.ALIGNED, State.SOLVED, State.APPLYING)
-        views.extend(wizard.view(snapshot(state)) for state in states)
-        wizard.view(snapshot(State.SOLVED))
-        views.append(wizard.view(snapshot(State.APPLIED, procedure={"results": None})))
-        views.append(wizard.view(snapshot(State.APPLIED, record=one)))
-        views.append(wizard.view(snapshot(State.VERIFY, procedure={"verifying": NUDGED})))
-        applied = snapshot(State.APPLIED)
-        for _ in range(3):  # each eye in turn, then the result
-            views.append(wizard.view(applied))
-            wizard.move(Action.SKIP, applied)
-        wizard.move(Action.NEXT, applied)
-        for is_finished in (False, True):
-            finished = replace(record, is_finished=is_finished)
-            views.append(wizard.view(snapshot(State.APPLIED, record=finished)))
-    doubted = tried(judged(snapshot, "accept", "accept", State.APPLIED))
+    former = replace(record.facts, former="session-20261124-024848-549254")
+    none = replace(record, alignments={})
+    views = [
+        Wizard().view(planned_snapshot(snapshot, StepName.RAISE, record=one))
+        for one in (record, none, replace(none, facts=former))
+    ]
+    each = PlanSettings("paper", in_turn=True)
+    for plan, is_held in product((RECOMMENDED, each), (False, True)):
+        wizard = begun(is_held=is_held)
+        snapshots = [
+            planned_snapshot(snapshot, name, plan=plan, record=one)
+            for name in StepName
+            for one in (record, replace(record, alignments={1: left}), none)
+        ]
+        done = planned_snapshot(snapshot, StepName.DONE, plan=plan)
+        raising = planned_snapshot(snapshot, StepName.RAISE, plan=plan)
+        asked = {"is_requested": True}, {"awaited": StepName.VERIFY}, {"awaited": StepName.CURSOR}
+        snapshots += [with_next(raising, **one) for one in asked]
+        snapshots += [
+            replace(done, procedure=replace(done.procedure, results=None)),
+            planned_snapshot(snapshot, StepName.DONE, plan=plan, verified={}),
+            tried(judged(snapshot, "accept", "accept", State.APPLIED, plan=plan)),
+        ]
+        for names in (("accept", "accept"), ("keep", "accept"), ("implausible", "repeat")):
+            for state in (State.SOLVED, State.APPLIED):
+                snapshots.append(judged(snapshot, *names, state, plan=plan))
+        views.extend(wizard.view(one) for one in snapshots)
+        for seen in (done, judged(snapshot, "accept", "accept", State.APPLIED, plan=plan)):
+            wizard = begun(is_held=is_held)
+            wizard.move(Action.NEXT)
+            for is_finished in (False, True):
+                finished = replace(seen.record, is_finished=is_finished)
+                views.append(wizard.view(replace(seen, record=finished)))
     for is_finished in (False, True):
-        seen = replace(doubted, record=replace(doubted.record, is_finished=is_finished))
-        views.append(save_view(seen, is_held=True))
-    for is_held in (False, True):
-        views.extend(_planned_views(snapshot, record, is_held=is_held))
+        seen = tried(judged(snapshot, "accept", "accept", State.APPLIED))
+        views.append(save_view(replace(seen, record=replace(seen.record, is_finished=is_finished))))
     assert {view.step for view in views} == set(Step)
     offers = [offer for view in views for offer in (view.main, *view.others)]
     assert {offer.action for offer in offers} == set(Action)
@@ -125,36 +154,30 @@ def all_views(snapshot: Callable[..., Snapshot], record: SessionRecord) -> list[
 
 
 def planned_snapshot(
-    snapshot: Callable[..., Snapshot], name: StepName, **procedure: Any
+    snapshot: Callable[..., Snapshot],
+    name: StepName,
+    *,
+    plan: PlanSettings = RECOMMENDED,
+    record: SessionRecord | None = None,
+    verified: Mapping[Eye, Verification] | None = None,
+    **procedure: Any,
 ) -> Snapshot:
     """Return a snapshot whose plan's next step has a name."""
     state, eyes = PLANNED[name]
-    planned = {"plan": "recommended", "next_step": NextStep(name, eyes, "as told"), "eyes": eyes}
     if name is StepName.NUDGE:
-        planned["verifying"] = NUDGED
-    return snapshot(state, procedure={**planned, **procedure})
+        procedure = {"verifying": NUDGED, **procedure}
+    changes = {} if record is None else {"record": record}
+    return snapshot(
+        state,
+        procedure={"eyes": eyes, **procedure},
+        plan=plan,
+        next_step=NextStep(name, eyes, "as told"),
+        verified=verified,
+        **changes,
+    )
 
 
-def _planned_views(
-    snapshot: Callable[..., Snapshot], record: SessionRecord, *, is_held: bool
-) -> list[WizardView]:
-    """Return a view of every next step of a plan."""
-    wizard = PlannedWizard()
-    wizard.is_held = is_held
-    snapshots = [planned_snapshot(snapshot, name) for name in StepName]
-    former = replace(record.facts, former="session-20261124-024848-549254")
-    again = replace(record, facts=former, alignments={})
-    views = [
-        wizard.view(planned_snapshot(snapshot, StepName.RAISE, alignments={})),
-        wizard.view(
-            replace(planned_snapshot(snapshot, StepName.RAISE, alignments={}), record=again)
-        ),
-        wizard.view(snapshots[0]),
-    ]
-    wizard.move(Action.NEXT, snapshots[0])
-    views.extend(wizard.view(one) for one in snapshots)
-    wizard.move(Action.NEXT, snapshots[-1])
-    for is_finished in (False, True):
-        finished = replace(record, is_finished=is_finished)
-        views.append(wizard.view(replace(snapshots[-1], record=finished)))
-    return views
+def with_next(seen: Snapshot, **changes: Any) -> Snapshot:
+    """Return a snapshot with changes to its plan's next step."""
+    assert seen.next_step is not None
+    return replace(seen, next_step=replace(seen.next_step, **changes))

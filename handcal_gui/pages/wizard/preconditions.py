@@ -49,10 +49,10 @@ def hand_found(snapshot: Snapshot) -> Precondition:
 
 def trials_of(snapshot: Snapshot) -> dict[Eye, EyeTrials]:
     """Return the user-test trials of the present results."""
-    procedure = snapshot.procedure
-    if procedure.results is None:
+    results = snapshot.procedure.results
+    if results is None:
         return {}
-    return eye_trials(procedure.results, snapshot.record, procedure.target_arcmin)
+    return eye_trials(results, snapshot.record, snapshot.settings.solve.verdict.target_arcmin)
 
 
 def doubted_eyes(snapshot: Snapshot) -> list[Eye]:

@@ -64,7 +64,8 @@ class ResultBar(QWidget):
         """Show the results of a snapshot if they have changed."""
         results, shown = snapshot.procedure.results, self._record
         is_written = shown is None or snapshot.record.trials is not shown.trials
-        self._record, self._target_arcmin = snapshot.record, snapshot.procedure.target_arcmin
+        self._record = snapshot.record
+        self._target_arcmin = snapshot.settings.solve.verdict.target_arcmin
         if results is not self._results or is_written:
             self._results = results
             self.card.show_results(results, self._target_arcmin, self._trials())

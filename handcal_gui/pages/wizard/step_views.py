@@ -9,7 +9,9 @@ import numpy as np
 from handcal.register.guard import turn_advice
 from handcal.register.results import USED, Results
 from handcal.report.cells import signed
-from handcal.station.snapshot import Procedure, Snapshot
+from handcal.session.session import SessionRecord
+from handcal.station.procedure import Procedure
+from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName
@@ -37,8 +39,6 @@ VERIFY_AGAIN: dict[Eye, ButtonSpec] = {
     "left": ButtonSpec(Action.VERIFY_LEFT, tr("Verify &left eye")),
     "right": ButtonSpec(Action.VERIFY_RIGHT, tr("Verify &right eye")),
 }
-SHOWN_S, STILL_S, READ_S, ADVICE_S = 0.6, 1.2, 1.5, 3.0
-"""Waiting times of automatic steps: for the hand, and to read a text or advice."""
 LOOK = tr("Keep the hand up, and look slowly to the left and to the right.")
 UNUSABLE: frozenset[VerdictName] = frozenset({"implausible", "contradicted"})
 SETTLED: frozenset[VerdictName] = frozenset({"accept", "keep"})
@@ -72,9 +72,9 @@ def connect_view(snapshot: Snapshot) -> WizardView:
     is_ready = _all_hold(preconditions)
     if snapshot.contradiction and not camera.problem:
         preconditions = (Precondition(sentence(snapshot.contradiction), False), *preconditions[1:])
-    procedure, former = snapshot.procedure, snapshot.record.facts.former
+    former = snapshot.record.facts.former
     puts_on, label, fact = tr("Put the headset on the wearer"), tr("Begin"), ""
-    if begun := _made(procedure):
+    if begun := _made(snapshot.record):
         label = tr("Continue")
         fact = tr("This session continues where it stopped, with {}.").format(begun)
     elif former:
@@ -130,7 +130,7 @@ def align_view(snapshot: Snapshot) -> WizardView:
 
 def _as_cursor(snapshot: Snapshot) -> Precondition:
     """Return whether the guard would accept the live hand; if not, with its reason."""
-    seen, limit_rad = snapshot.observation, snapshot.procedure.guard_limit_rad
+    seen, limit_rad = snapshot.observation, snapshot.settings.guard.limit_rad
     limit_deg = round(float(np.degrees(limit_rad)), 1)
     straight = tr("Hand rotated by less than {:g}°").format(limit_deg)
     if seen is None or seen.rotation_rad is None:
@@ -143,48 +143,6 @@ def _as_cursor(snapshot: Snapshot) -> Precondition:
         text = tr("Turned {:.1f}°: {}").format(np.degrees(angle_rad), lowered(advice))
         return Precondition(text, False)
     return Precondition(straight, True)
-
-
-def solve_view(snapshot: Snapshot) -> WizardView:
-    """Return the view of alignments to solve, or of a result to send."""
-    procedure = snapshot.procedure
-    count = len(snapshot.procedure.alignments)
-    aligned = Precondition(
-        tr("{} confirmed").format(pluralize(count, tr("alignment"), tr("alignments"))), True
-    )
-    redo = ButtonSpec(
-        Action.REDO,
-        tr("&Discard and repeat"),
-        discards=tr("Deletes the last alignment; the session panel can restore it"),
-    )
-    if procedure.state is State.ALIGNED or procedure.results is None:
-        return WizardView(
-            Step.SOLVE,
-            tr("The wearer may lower the hand. Solve for the positions of the eyes."),
-            (aligned,),
-            ButtonSpec(Action.SOLVE, tr("Solve")),
-            (redo,),
-            runs_after_s=SHOWN_S,
-        )
-    verdicts = eyes_accepted(snapshot)
-    if procedure.state is State.APPLYING:
-        wait = tr("Waiting for the headset to acknowledge its projections.")
-        return WizardView(
-            Step.SOLVE,
-            wait,
-            (aligned, *verdicts),
-            ButtonSpec(Action.APPLY, tr("Sending…"), False),
-        )
-    instruction, label = sending(procedure.results)
-    is_faulty = any(one.verdict in UNUSABLE for one in verdicts)
-    return WizardView(
-        Step.SOLVE,
-        instruction,
-        (aligned, *verdicts),
-        ButtonSpec(Action.APPLY, label),
-        (redo,),
-        runs_after_s=None if is_faulty else READ_S,
-    )
 
 
 def sending(results: Results) -> tuple[str, str]:
@@ -224,7 +182,7 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
         "Close the {} eye. Move the outline onto the hand: in the headset, or here with the "
         "arrow keys, + and −."
     ).format(EYE_WORDS[other])
-    if eye in snapshot.procedure.verifications:
+    if eye in snapshot.record.facts.verified:
         text = tr("Once more, to be sure. {}").format(text)
     total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
     seen_ns = snapshot.t_host_ns - verifying.began_host_ns
@@ -272,8 +230,15 @@ def falsified_view(preconditions: tuple[Precondition, ...]) -> WizardView | None
     )
 
 
-def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
-    """Return the view of a session to finish, which is held or finishes itself, or finished."""
+def can_end(snapshot: Snapshot) -> bool:
+    """Return whether nothing is left to decide: every eye is settled, and no trial doubts one."""
+    judged = eyes_accepted(snapshot)
+    is_settled = bool(judged) and all(one.verdict in SETTLED for one in judged)
+    return is_settled and not doubted_eyes(snapshot) and not snapshot.problem
+
+
+def save_view(snapshot: Snapshot) -> WizardView:
+    """Return the view of a session that is to be finished, or is."""
     preconditions = (
         Precondition(tr("Saved in {}").format(snapshot.session_path), not snapshot.problem),
         *eyes_accepted(snapshot),
@@ -285,48 +250,39 @@ def save_view(snapshot: Snapshot, *, is_held: bool) -> WizardView:
     is_verified = is_settled and len(snapshot.record.verified_now) == len(judged)
     unearned = frozenset() if is_verified else frozenset({Step.VERIFY})
     if snapshot.record.is_finished:
-        ended = tr(
+        text = tr(
             "The session is complete. Take the headset off, or continue with the next wearer."
         )
         if judged and not is_settled:
-            ended = tr(
+            text = tr(
                 "The session is finished, its result not accepted: go back to measure more, or "
                 "continue with the next wearer."
             )
         elif doubted:
-            ended = tr(
+            text = tr(
                 "The session is finished, but trials of {} are over the target: go back to measure "
                 "again, or continue with the next wearer."
             ).format(eye_names(doubted))
-        return WizardView(
-            Step.SAVE,
-            ended,
-            preconditions,
-            ButtonSpec(Action.NEXT_WEARER, tr("Next wearer")),
-            others,
-            fact=kept_fact(snapshot.procedure),
-            unearned=unearned,
-        )
-    finish = tr("Everything is already saved. The session finishes by itself; Hold keeps it open.")
-    if is_held or not judged:
-        finish = tr("Everything is already saved. Finish the session when you are done.")
-    if judged and not is_settled:
-        finish = tr("Not accepted. Go back to measure more, or finish as it is; all is saved.")
-    elif doubted:
-        finish = tr(
-            "Trials of {} are over the target. Go back to measure again, or finish as it is; all "
-            "is saved."
-        ).format(eye_names(doubted))
-    if snapshot.problem:
-        finish = tr("Solve the problem below, then finish the session.")
+        main = ButtonSpec(Action.NEXT_WEARER, tr("Next wearer"))
+    else:
+        text = tr("Everything is already saved. Finish the session when you are done.")
+        if judged and not is_settled:
+            text = tr("Not accepted. Go back to measure more, or finish as it is; all is saved.")
+        elif doubted:
+            text = tr(
+                "Trials of {} are over the target. Go back to measure again, or finish as it is; "
+                "all is saved."
+            ).format(eye_names(doubted))
+        if snapshot.problem:
+            text = tr("Solve the problem below, then finish the session.")
+        main = ButtonSpec(Action.FINISH, tr("Finish session"))
     return WizardView(
         Step.SAVE,
-        finish,
+        text,
         preconditions,
-        ButtonSpec(Action.FINISH, tr("Finish session")),
+        main,
         others,
         fact=kept_fact(snapshot.procedure),
-        runs_after_s=READ_S if is_settled and not (doubted or snapshot.problem) else None,
         unearned=unearned,
     )
 
@@ -366,18 +322,18 @@ def _all_hold(preconditions: Sequence[Precondition]) -> bool:
     return all(one.holds for one in preconditions)
 
 
-def _made(procedure: Procedure) -> str:
+def _made(record: SessionRecord) -> str:
     """Return the alignments and verifications so far, in words; empty if there are none."""
     held = (
-        (len(procedure.alignments), tr("alignment"), tr("alignments")),
-        (len(procedure.verifications), tr("verified eye"), tr("verified eyes")),
+        (len(record.alignments), tr("alignment"), tr("alignments")),
+        (len(record.facts.verified), tr("verified eye"), tr("verified eyes")),
     )
     return ", ".join(pluralize(*one) for one in held if one[0])
 
 
 def distance(snapshot: Snapshot) -> str:
     """Return how far from the camera the hand is to be held within the depth gate, in words."""
-    gate_m = snapshot.procedure.segment.reachable_m
+    gate_m = snapshot.settings.segment.reachable_m
     near_m, far_m = gate_m[0] + _GATE_MARGIN_M, gate_m[1] - _GATE_MARGIN_M
     text = tr("{:.0f} to {:.0f} cm from the camera").format(100 * near_m, 100 * far_m)
     is_forearm = near_m <= _FOREARM_M <= far_m

@@ -42,23 +42,20 @@ STEPS = tuple(Step)
 
 
 class Action(StrEnum):
-    """Actions of the buttons; the value is the engine's command, or a move within the wizard."""
+    """Actions of the buttons; the value is the engine's command, or a move within the guide."""
 
     NEXT = "next"
-    MAKE_CURSOR = "make cursor"
+    BACK = "back"
+    TAKE_STEP = "take the next step"
     CONFIRM = "confirm"
-    SOLVE = "solve"
-    APPLY = "apply"
     ANOTHER = "another alignment"
     REPEAT_LEFT = "repeat left eye"
     REPEAT_RIGHT = "repeat right eye"
+    WITHDRAW = "withdraw the alignment"
     REDO = "redo"
-    BACK = "back"
-    VERIFY = "verify the eye"
     VERIFIED = "confirm the verification"
     UNDO_NUDGE = "undo the last nudge"
     SKIP = "skip the verification"
-    TAKE_STEP = "take the next step"
     VERIFY_LEFT = "verify the left eye"
     VERIFY_RIGHT = "verify the right eye"
     SLIPPED = "begin again after the headset slipped"
@@ -68,17 +65,16 @@ class Action(StrEnum):
 
 
 ACTION_NAMES: dict[str, str] = {
-    Action.MAKE_CURSOR: tr("make cursor"),
+    Action.TAKE_STEP: tr("take the next step"),
     Action.CONFIRM: tr("confirm"),
-    Action.SOLVE: tr("solve"),
-    Action.APPLY: tr("apply"),
     Action.ANOTHER: tr("add an alignment"),
+    Action.REPEAT_LEFT: tr("align the left eye"),
+    Action.REPEAT_RIGHT: tr("align the right eye"),
+    Action.WITHDRAW: tr("go back"),
     Action.REDO: tr("redo"),
-    Action.VERIFY: tr("verify the eye"),
     Action.VERIFIED: tr("confirm the verification"),
     Action.UNDO_NUDGE: tr("undo the last nudge"),
     Action.SKIP: tr("skip the verification"),
-    Action.TAKE_STEP: tr("take the next step"),
     Action.VERIFY_LEFT: tr("verify the left eye"),
     Action.VERIFY_RIGHT: tr("verify the right eye"),
     Action.FINISH: tr("finish"),
@@ -126,8 +122,6 @@ class WizardView:
     """The last event or current activity, such as a refusal; empty if none."""
     fact: str = ""
     """The findings so far; empty if there are none."""
-    runs_after_s: float | None = None
-    """Time until the enabled main button is pressed automatically; None if never."""
     unearned: frozenset[Step] = frozenset()
     """Earlier steps that were left without what they are for."""
     omitted: frozenset[Step] = frozenset()

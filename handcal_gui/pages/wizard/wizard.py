@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QAction, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
+from handcal.station.plan import PlanSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
-from handcal.types import EYES, EyePlan
+from handcal.types import EyePlan
 from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.action_bar import ActionBar
-from handcal_gui.pages.wizard.automatic import Automatic
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture
-from handcal_gui.pages.wizard.planned import PlannedWizard
 from handcal_gui.pages.wizard.rows import PreconditionRows, StepRail
-from handcal_gui.pages.wizard.steps import PLANS, Wizard
+from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import WEARERS, Action, Step, WizardView
 from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, font_px, scale_font
@@ -29,6 +28,13 @@ from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
 from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.sentence import sentence
 
+_ORDERS: dict[EyePlan, str] = {
+    "each": tr("One eye after the other"),
+    "both": tr("Both eyes at once"),
+    "left": tr("Left eye only"),
+    "right": tr("Right eye only"),
+}
+"""The eyes that the paper's plan aligns, and their order."""
 _MOST_PRECONDITIONS = 3
 _COMPARING = {
     False: tr("The wearer compares two drawings. Record the answer in Trials, or stop comparing."),
@@ -83,8 +89,9 @@ class WizardPanel(QWidget):
     comparison : ComparisonRow
         Shown in the station while the wearer compares.
     asked : Signal(Action)
-        A button was pressed, by a person or automatically.
-    plan_changed : Signal(str)
+        A button was pressed.
+    eyes_chosen : Signal(str)
+        A person has chosen the eyes of the paper's plan: an `EyePlan`.
     hold_changed : Signal(bool)
         A person has chosen whether every step waits for a person.
     nudged : Signal(float, float, float)
@@ -99,7 +106,7 @@ class WizardPanel(QWidget):
 
     asked = Signal(object)
     step_changed = Signal(object)
-    plan_changed = Signal(str)
+    eyes_chosen = Signal(str)
     hold_changed = Signal(bool)
     nudged = Signal(float, float, float)
     went_back = Signal(str)
@@ -114,7 +121,6 @@ class WizardPanel(QWidget):
         self.comparison.hide()
         self._is_station = self._is_large = False
         self._room = 0
-        self._automatic = Automatic()
         self._ring = ProgressRing("wizardRing")
         self._hold = self._hold_action()
         self._no_trials = QShortcut("T", self, lambda: show_briefly(self, _NO_TRIALS))
@@ -135,20 +141,22 @@ class WizardPanel(QWidget):
         self._note = QLabel(wordWrap=True, textFormat=Qt.TextFormat.PlainText)
         self._note.setObjectName("wizardNote")
         self.bar = ActionBar()
+        self._eyes: EyePlan | None = None
         self._plan = QComboBox()
         self._plan.setObjectName("wizardPlan")
         self._lay_out()
         self._fit_soon = fit_soon(self._fit, self)
-        self.bar.asked.connect(self._on_asked)
-        self._plan.currentIndexChanged.connect(self._choose_plan)
+        self.bar.asked.connect(self.asked)
+        self._plan.currentIndexChanged.connect(
+            lambda index: self.eyes_chosen.emit(list(_ORDERS)[index])
+        )
         follow_theme(self, self._refresh)
 
     def start(self, wizard: Wizard, *, is_held: bool = True) -> None:
         """Switch to another wizard; if it is held, every step waits for a person."""
         self.wizard = wizard
         self.hold(is_held)
-        self._plan.setCurrentText(PLANS[wizard.plan])
-        self.shown = None
+        self.shown = self._eyes = None
         self.bar.show_view(None)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
@@ -157,14 +165,13 @@ class WizardPanel(QWidget):
         if snapshot.comparing is not None:
             main = replace(view.main, is_enabled=False)
             said = _COMPARING[self._is_station]
-            view = replace(
-                view, sentence=said, main=main, others=(), note="", fact="", runs_after_s=None
-            )
+            view = replace(view, sentence=said, main=main, others=(), note="", fact="")
         self.comparison.show_comparison(
             snapshot.comparing, has_seen_both=snapshot.has_compared_both, can_begin=False, count=0
         )
         self.comparison.setVisible(self._is_station and snapshot.comparing is not None)
         self.picture.step = view.step
+        self._show_eyes(snapshot.plan)
         if view != self.shown:
             before, self.shown = self.shown, view
             self._refresh()
@@ -172,11 +179,11 @@ class WizardPanel(QWidget):
                 self.step_changed.emit(view.step)
             if before is None or before.sentence != view.sentence:
                 self.picture.show_snapshot(snapshot)  # before its turn, or it contradicts the text
-        self._run(view, snapshot)
+        self._ring.show_count(*_count(snapshot, view))
 
     def hold(self, is_held: bool) -> None:
         """Let every step wait for a person, or let steps run automatically."""
-        self._automatic.is_held = self.wizard.is_held = is_held
+        self.wizard.is_held = is_held
         self._hold.setChecked(is_held)
         self._refresh()
 
@@ -275,38 +282,12 @@ class WizardPanel(QWidget):
         self.hold(is_held)
         self.hold_changed.emit(is_held)
 
-    def _on_asked(self, action: Action) -> None:
-        if action is Action.BACK:
-            self.hold(True)  # or the step would run again
-        self.asked.emit(action)
-
-    def _run(self, view: WizardView, snapshot: Snapshot) -> None:
-        """Press the main button once an automatic step has waited long enough."""
-        now_s = 1e-9 * snapshot.t_host_ns
-        share = self._automatic.share(view, now_s)
-        self._ring.show_count(*self._count(snapshot, view), share)
-        if share == 1.0 and QApplication.activeModalWidget() is None:
-            self._automatic.note_pressed(now_s)
-            self.press_main()
-
-    def _count(self, snapshot: Snapshot, view: WizardView) -> tuple[int, int, str]:
-        """Return the alignments made and planned, or the eyes verified, and their name."""
-        procedure = snapshot.procedure
-        if view.omitted or view.step in OF_THE_RESULT:
-            eyes = 1 if self.wizard.plan in EYES else 2
-            again = {procedure.verifying.eye} if procedure.verifying is not None else set()
-            return len(snapshot.record.verified_now - again), eyes, tr("verified")
-        done = len(procedure.alignments)
-        planned = 2 if self.wizard.plan == "each" else 1
-        more = procedure.state is State.ALIGN
-        return done, max(planned, done + more), tr("aligned")
-
     def _lay_out(self) -> None:
         scale_font(self._title, 1.6, is_bold=True)
         self._sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._scale_texts()
         self._note.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._plan.addItems(list(PLANS.values()))
+        self._plan.addItems(list(_ORDERS.values()))
         self._plan.setMinimumWidth(12 * SPACING_PX)  # narrower than its longest text
         self._plan.setToolTip(
             tr(
@@ -325,9 +306,7 @@ class WizardPanel(QWidget):
         head = hbox(self._title, 0, self._choice, self.picture.result.buttons, hold)
         layout = vbox(self._rail, on=self, margins=2 * SPACING_PX, spacing=SPACING_PX)
         layout.addLayout(head)
-        self._ring.setToolTip(
-            tr("Green: alignments made, or eyes verified. Blue: time until the step runs by itself")
-        )
+        self._ring.setToolTip(tr("Alignments made, or eyes verified"))
         said = self._sentence, self._preconditions, self._fact, self._note
         texts = vbox(*said, 0, spacing=SPACING_PX // 2)
         ring = vbox(self._ring, 0)
@@ -344,9 +323,7 @@ class WizardPanel(QWidget):
         self._sentence.setText(view.sentence)
         # The result card gives the verdicts, with their reasons.
         has_card = view.step in OF_THE_RESULT and view.main.action is not Action.VERIFIED
-        # The station's plan chooses the eyes.
-        is_planned = isinstance(self.wizard, PlannedWizard)
-        self._choice.setVisible(view.step not in OF_THE_RESULT and not is_planned)
+        self._choice.setVisible(view.step not in OF_THE_RESULT and self._eyes is not None)
         self.picture.result.buttons.setVisible(has_card)
         self._preconditions.show_preconditions(
             [one for one in view.preconditions if not (has_card and one.verdict)]
@@ -367,15 +344,30 @@ class WizardPanel(QWidget):
         why_quiet = ""
         if view.main.action in WEARERS:
             why_quiet = tr("The wearer confirms in the headset, or you:")
-        elif view.runs_after_s is not None and not self._automatic.is_held:
-            why_quiet = tr("Runs by itself, or:")
         self.bar.show_view(view, why_quiet=why_quiet)
         can_choose = view.step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR)
         if not can_choose:
             self._plan.clearFocus()  # otherwise Qt would pass the focus on
         self._plan.setEnabled(can_choose)
 
-    def _choose_plan(self, index: int) -> None:
-        plan: EyePlan = list(PLANS)[index]
-        self.wizard.plan = plan
-        self.plan_changed.emit(plan)
+    def _show_eyes(self, plan: PlanSettings) -> None:
+        """Show which eyes are aligned, in a plan that leaves it to a person."""
+        eyes = plan.eyes if plan.name == "paper" else None
+        if eyes != self._eyes:
+            self._eyes = eyes
+            if eyes is not None:
+                with QSignalBlocker(self._plan):
+                    self._plan.setCurrentIndex(list(_ORDERS).index(eyes))
+            self._refresh()
+
+
+def _count(snapshot: Snapshot, view: WizardView) -> tuple[int, int, str]:
+    """Return the alignments made and planned, or the eyes verified, and their name."""
+    procedure, record, plan = snapshot.procedure, snapshot.record, snapshot.plan
+    if view.omitted or view.step in OF_THE_RESULT:
+        again = {procedure.verifying.eye} if procedure.verifying is not None else set()
+        return len(record.verified_now - again), len(plan.usable_eyes), tr("verified")
+    done = len(record.alignments)
+    is_in_turn = plan.name == "recommended" or plan.in_turn
+    planned = len(plan.usable_eyes) if is_in_turn else 1
+    return done, max(planned, done + (procedure.state is State.ALIGN)), tr("aligned")

@@ -87,7 +87,7 @@ class RotationPanel(QWidget):
         was = procedure.refused_for  # without an order that may no longer apply
         last = f"{was}." if was else procedure.refusal or _last_reason(snapshot.record)
         self._show_refusals(snapshot.record.refused, last)
-        self._show_limit(procedure.guard_limit_rad)
+        self._show_limit(snapshot.settings.guard.limit_rad)
         is_aligning = procedure.cursor is not None and procedure.state is State.ALIGN
         if self._history and not (is_aligning and procedure.cursor is self._cursor):
             self._history.clear()

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
+from handcal.session.state import SessionEvent
 from handcal.station.snapshot import Snapshot
 from handcal.types import EyeDistance
 from handcal_gui.panels.session.notes_editor import NotesEditor
@@ -114,8 +115,8 @@ class SessionPanel(QWidget):
         results = snapshot.procedure.results
         if snapshot.record is not self._record or results is not self._results:
             self.show_record(snapshot.record, results)
-        left = snapshot.procedure.alignments.keys() - snapshot.record.alignments.keys()
-        count = len(left) if snapshot.not_stored else 0
+        saved = [event.name for event in snapshot.record.unwritten]
+        count = saved.count(SessionEvent.ALIGNMENT_SAVED)
         held = pluralize(count, tr("alignment"), tr("alignments"))
         self._unwritten.setText(tr("{} not written yet.").format(held))
         self._unwritten.setVisible(bool(count))

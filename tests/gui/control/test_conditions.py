@@ -42,9 +42,9 @@ def test_a_virtual_headset_that_ended_is_the_cause_of_all_else(snapshot: Maker) 
 
 
 def test_what_the_headset_does_not_answer_leads_to_link(snapshot: Maker) -> None:
-    silent = snapshot(problem="the headset did not answer")
+    silent = snapshot(not_applied="the headset did not answer")
     assert watch(Conditions(), silent, [0.0, 5.0])[-1] == "the headset did not answer; see Link"
-    full = replace(silent, problem="the disk is full", not_stored="the disk is full")
+    full = replace(silent, not_stored="the disk is full")
     assert watch(Conditions(), full, [0.0, 5.0])[-1] == "the disk is full"
 
 

@@ -18,6 +18,7 @@ from handcal_gui.engine.engine_thread import EngineThread
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program
+from tests.gui.views import begun
 
 MakeSnapshot = Callable[..., Snapshot]
 
@@ -140,6 +141,7 @@ def test_a_failed_action_is_no_longer_told_at_the_next_step(
     program: Program, snapshot: MakeSnapshot
 ) -> None:
     guide, banner = program.wizard_panel, program.window.banner
+    guide.start(begun())
     guide.show_snapshot(snapshot(State.ALIGN))
     program.live._on_command_failed(Action.CONFIRM, "the hand moves")
     assert banner.text == "Could not confirm: the hand moves"

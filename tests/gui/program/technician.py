@@ -58,6 +58,15 @@ class Technician:
         self.wait(lambda: self.can(action))
         QTest.keyClick(self.program.window, Qt.Key.Key_Space)
 
+    def press_space_to(self, do: str) -> None:
+        """Press the space bar once the wizard's main button has this label."""
+        self.wait(lambda: self.can_take(do))
+        QTest.keyClick(self.program.window, Qt.Key.Key_Space)
+
+    def can_take(self, label: str) -> bool:
+        shown = self.program.wizard_panel.shown
+        return shown is not None and shown.main.label == label and shown.main.is_enabled
+
     def wait_for_state(self, state: State) -> None:
         self.wait(lambda: self.snapshot.procedure.state is state)
 
@@ -72,12 +81,12 @@ def can_start(technician: Technician) -> bool:
     return bool(technician.child(QPushButton, "start").isEnabled())
 
 
-def make_cursor(technician: Technician, studio: Any, first: Action = Action.NEXT) -> None:
-    """Get from Connect, or from Verify, to a cursor."""
+def make_cursor(technician: Technician, studio: Any, *, is_first: bool = True) -> None:
+    """Get from Connect, or from the alignment before, to a cursor."""
     studio.camera.shows = "cursor"
-    technician.press_space_for(first)
-    technician.press_space_for(Action.NEXT)
-    technician.press_space_for(Action.MAKE_CURSOR)
+    if is_first:
+        technician.press_space_for(Action.NEXT)
+    technician.press_space_to("Make cursor")
     technician.wait_for_state(State.ALIGN)
     technician.wait(lambda: studio.headset.shown.cursor_W_m is not None)
 
@@ -90,8 +99,8 @@ def is_turned(technician: Technician) -> bool:
     return bool(np.linalg.norm(seen.rotation_rad) > 0.02)
 
 
-def align(technician: Technician, studio: Any, first: Action = Action.NEXT) -> None:
-    make_cursor(technician, studio, first)
+def align(technician: Technician, studio: Any, *, is_first: bool = True) -> None:
+    make_cursor(technician, studio, is_first=is_first)
     studio.camera.shows = "live"
     technician.wait(lambda: is_turned(technician))
     studio.headset.confirm()
@@ -99,8 +108,9 @@ def align(technician: Technician, studio: Any, first: Action = Action.NEXT) -> N
 
 
 def solve_and_apply(technician: Technician) -> None:
-    technician.press_space_for(Action.SOLVE)
-    technician.press_space_for(Action.APPLY)
+    technician.press_space_to("Solve")
+    technician.wait_for_state(State.SOLVED)
+    technician.press_space_for(Action.TAKE_STEP)
     technician.wait_for_state(State.APPLIED)
 
 

@@ -97,7 +97,7 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     begin(technician, studio)
     program.wizard_panel.hold(False)
     technician.wait_for_state(State.VERIFY)
-    assert technician.snapshot.procedure.alignments == {}
+    assert technician.snapshot.record.alignments == {}
 
 
 def test_each_step_of_a_held_plan_is_taken_by_a_press(technician: Technician, studio: Any) -> None:
@@ -117,7 +117,7 @@ def test_each_step_of_a_held_plan_is_taken_by_a_press(technician: Technician, st
     assert technician.record.facts.verified == {}
     session = technician.program.window.panels.session
     session.delete_requested.emit("alignment", 1)
-    technician.wait(lambda: not technician.snapshot.procedure.alignments)
+    technician.wait(lambda: not technician.snapshot.record.alignments)
     session.restore_requested.emit("alignment", 1)
     technician.wait(lambda: technician.can(Action.TAKE_STEP))  # not waiting for a hand for good
     for state in (State.SOLVED, State.APPLIED):

@@ -115,7 +115,7 @@ def test_alignments_are_deleted_and_restored(live: Technician, studio: Any) -> N
     assert live.snapshot.procedure.results is None
     session.restore_requested.emit("alignment", 1)
     live.wait(lambda: len(live.snapshot.record.alignments) == 1)
-    live.press_space_for(Action.SOLVE)
+    live.press_space_to("Solve")
     live.wait_for_state(State.SOLVED)
     session.delete_requested.emit("alignment", 7)
     live.wait(lambda: live.banner.startswith("Could not delete the alignment: "))
@@ -300,11 +300,11 @@ def test_nothing_is_lost_by_closing_at_work(
     first.child(QComboBox, "wizardPlan").setCurrentText("Left eye only")
     align(first, studio)
     if moment == "solving":
-        first.press_space_for(Action.SOLVE)
+        first.press_space_to("Solve")
     else:
         solve_and_apply(first)
     if moment == "verifying":
-        first.press_space_for(Action.VERIFY)
+        first.press_space_to("Verify the left eye")
         first.wait_for_state(State.VERIFY)
     if moment == "recording a trial":
         first.program.window.panels.trials.trial_requested.emit("left", 1.0)
@@ -375,10 +375,10 @@ def test_the_window_can_be_closed_at_any_moment(
         make_cursor(technician, studio)
     if moment == "applying":
         align(technician, studio)
-        technician.press_space_for(Action.SOLVE)
-        technician.wait(lambda: technician.can(Action.APPLY))
+        technician.press_space_to("Solve")
+        technician.wait_for_state(State.SOLVED)
         studio.headset.fall_silent()
-        technician.press_space_for(Action.APPLY)
+        technician.press_space_for(Action.TAKE_STEP)
         technician.wait_for_state(State.APPLYING)
     if moment in ("review", "opening a session"):
         program.open_session(record.path)

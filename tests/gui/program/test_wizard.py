@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
-import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton
 
 from handcal.station.states import State
-from handcal_gui.pages.wizard import step_views, steps
-from handcal_gui.pages.wizard.view import Action, Step
+from handcal_gui.pages.wizard.view import Action
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.preferences import PreferencesFile
+from tests.gui.helpers import button
 from tests.gui.program.technician import (
     Technician,
     align,
@@ -30,15 +30,14 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     align(live, studio)
     assert studio.headset.shown.eyes == ("left",)
     solve_and_apply(live)
-    live.wait(lambda: live.can(Action.ANOTHER))
-    align(live, studio, Action.ANOTHER)
+    align(live, studio, is_first=False)
     assert studio.headset.shown.eyes == ("right",)
     solve_and_apply(live)
-    for _ in ("left", "right"):
-        live.wait(lambda: live.can(Action.VERIFY))
+    for label in ("Verify the left eye", "Verify the right eye"):
+        live.wait(partial(live.can_take, label))
         live.child(QPushButton, "wizardOther0").click()  # skip
-    live.wait(lambda: live.can(Action.ANOTHER))  # not accepted, so it does not fit
-    live.child(QPushButton, "wizardOther0").click()
+    live.wait(lambda: live.can(Action.ANOTHER))  # not accepted
+    button(live.program.window, QPushButton, "Finish a&s it is").click()
     live.press_space_for(Action.FINISH)
     live.wait(lambda: live.can(Action.NEXT_WEARER))
     record = live.record
@@ -68,12 +67,7 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     assert ["Hold a hand in front" in text for text in shown_first] == [True]  # no hand of Ada's
 
 
-def test_steps_run_by_themselves_after_one_press(
-    live: Technician, studio: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for module in (steps, step_views):
-        for name in ("SHOWN_S", "STILL_S", "READ_S"):
-            monkeypatch.setattr(module, name, 0.2)  # test_automatic.py tests how long they wait
+def test_steps_run_by_themselves_after_one_press(live: Technician, studio: Any) -> None:
     QTest.keyClick(live.program.window, Qt.Key.Key_H)  # the station is held at first
     live.press_space_for(Action.NEXT)
     for eye in ("left", "right"):
@@ -99,7 +93,7 @@ def test_an_eye_is_verified_by_keys_and_the_error_found_is_shown(
     plan.setCurrentText("Left eye only")
     align(technician, studio)
     solve_and_apply(technician)
-    technician.press_space_for(Action.VERIFY)
+    technician.press_space_to("Verify the left eye")
     technician.wait_for_state(State.VERIFY)
     technician.wait(lambda: technician.can(Action.VERIFIED))
     before_m = technician.snapshot.procedure.applied_shift_m["left"]
@@ -110,7 +104,7 @@ def test_an_eye_is_verified_by_keys_and_the_error_found_is_shown(
     technician.wait(lambda: "2.0′ right" in technician.child(QLabel, "wizardFact").text())
     assert technician.snapshot.procedure.applied_shift_m["left"][0] != before_m[0]
     technician.press_space_for(Action.VERIFIED)
-    technician.wait(lambda: "left" in technician.snapshot.procedure.verifications)
+    technician.wait(lambda: "left" in technician.snapshot.record.facts.verified)
     technician.wait_for_state(State.APPLIED)
     results = technician.snapshot.procedure.results
     assert results is not None
@@ -123,20 +117,17 @@ def test_an_eye_is_verified_by_keys_and_the_error_found_is_shown(
 def test_back_and_a_key_hold_the_steps_that_run_by_themselves(
     live: Technician, studio: Any, file: PreferencesFile
 ) -> None:
-    ring = live.child(QWidget, "wizardRing")
     QTest.keyClick(live.program.window, Qt.Key.Key_H)
     assert file.load()[0].runs_itself
     live.press_space_for(Action.NEXT)  # no hand is shown yet
-    live.wait(lambda: ring.share == 0.0)
+    live.wait(lambda: "No hand" in " ".join(shown_preconditions(live)))
     live.child(QPushButton, "wizardOther0").click()
     live.wait(lambda: live.can(Action.NEXT))
     studio.camera.shows = "cursor"
     live.press_space_for(Action.NEXT)
-    live.wait(lambda: "Hand found" in shown_preconditions(live))
-    live.qtbot.wait(1000)
-    assert live.program.wizard_panel.shown is not None
-    assert live.program.wizard_panel.shown.step is Step.SHOW_HAND
-    assert ring.share is None
+    live.wait(lambda: live.can_take("Make cursor"))
+    live.qtbot.wait(1500)
+    assert live.snapshot.procedure.state is State.SHOW_HAND
     assert file.load()[0].runs_itself  # going back is for this wearer only
     QTest.keyClick(live.program.window, Qt.Key.Key_H)
     live.wait_for_state(State.ALIGN)
@@ -146,7 +137,7 @@ def test_space_never_discards_wherever_tab_leads(live: Technician, studio: Any) 
     window = live.program.window
     handle = window.windowHandle()
     align(live, studio)
-    live.wait(lambda: live.can(Action.SOLVE))
+    live.wait(lambda: live.can_take("Solve"))
     live.wait(live.child(QPushButton, "wizardOther0").isEnabled)
     live.child(QPushButton, "wizardMain").setEnabled(False)  # as when there is no hand
     for _ in range(40):
@@ -163,7 +154,7 @@ def test_space_never_discards_wherever_tab_leads(live: Technician, studio: Any) 
 
 def test_an_alignment_is_discarded_by_its_own_key_only(live: Technician, studio: Any) -> None:
     align(live, studio)
-    live.wait(lambda: live.can(Action.SOLVE))
+    live.wait(lambda: live.can_take("Solve"))
     live.wait(live.child(QPushButton, "wizardOther0").isEnabled)
     QTest.keyClick(
         live.program.window.windowHandle(), Qt.Key.Key_D, Qt.KeyboardModifier.AltModifier

@@ -55,7 +55,7 @@ def main_button(window: MainWindow) -> QPushButton:
 def offer_solve(window: MainWindow) -> None:
     bar = window.findChild(ActionBar)
     assert isinstance(bar, ActionBar)
-    bar.show_view(WizardView(Step.SOLVE, "Solve.", (), ButtonSpec(Action.SOLVE, "Solve")))
+    bar.show_view(WizardView(Step.SOLVE, "Solve.", (), ButtonSpec(Action.TAKE_STEP, "Solve")))
 
 
 _NONE = Qt.KeyboardModifier.NoModifier

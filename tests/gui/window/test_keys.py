@@ -152,7 +152,7 @@ def show_buttons(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> l
         ButtonSpec(Action.ANOTHER, "&Add alignment"),
         ButtonSpec(Action.BACK, "&Back"),
     )
-    main = ButtonSpec(Action.SOLVE, "Solve", is_enabled)
+    main = ButtonSpec(Action.TAKE_STEP, "Solve", is_enabled)
     say(program, snapshot, WizardView(Step.SOLVE, "", (), main, others))
     asked: list[object] = []
     program.wizard_panel.asked.connect(asked.append)
@@ -180,7 +180,7 @@ def test_space_presses_only_the_main_button_from_every_focus(
     wrong: list[object] = []
     window.panels.session.delete_requested.connect(wrong.append)
     clicked = watch_clicks(window)
-    expected = [Action.SOLVE] if is_enabled else []
+    expected = [Action.TAKE_STEP] if is_enabled else []
     texts, kinds = 0, set()
     for widget in focusable(window):
         widget.setFocus()

@@ -26,7 +26,7 @@ from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.legend import LegendEntry
 from tests.gui.helpers import button, child, show, text
-from tests.gui.views import fine_tuned
+from tests.gui.views import fine_tuned, with_target
 
 Maker = Callable[..., Snapshot]
 
@@ -35,7 +35,7 @@ def test_the_result_is_copied_and_printed(qtbot: QtBot, snapshot: Maker, tmp_pat
     bar = show(qtbot, ResultBar(), 700, 300)
     qtbot.addWidget(bar.buttons)
     assert bar.text() == ""
-    bar.show_snapshot(snapshot(State.APPLIED, procedure={"target_arcmin": 6.5}))
+    bar.show_snapshot(snapshot(State.APPLIED, settings=with_target(6.5)))
     button(bar.buttons, QToolButton, "Copy").click()
     copied = QGuiApplication.clipboard().text()
     assert copied.startswith("Wearer: without a name\n")

@@ -12,14 +12,14 @@ from handcal.errors import FileError
 from handcal.hand.settings import SegmentSettings
 from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
-from handcal.station.states import State
+from handcal.station.states import CalibrationSettings, State
 from handcal.station.verifying import VerifyingView
 from handcal.types import Eye, VerdictName, Verification
 from handcal_gui.pages.wizard.preconditions import hand_found
 from handcal_gui.pages.wizard.step_views import connect_view, distance, save_view
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, ButtonSpec, Precondition, Step
-from tests.gui.views import NUDGED, Maker, actions, judged, tried
+from tests.gui.views import NUDGED, VERIFIED, Maker, actions, begun, judged, tried, with_target
 
 
 @pytest.mark.parametrize(
@@ -48,20 +48,20 @@ def test_a_camera_against_which_there_is_evidence_is_not_ticked(snapshot: Maker)
 def test_align_tells_which_eye_to_close_and_why_it_was_refused(snapshot: Maker) -> None:
     refusal = "Your hand is turned by 14.0°, more than 9°."
     seen = {"is_over_limit": True}
-    view = Wizard().view(
+    view = begun().view(
         snapshot(procedure={"eyes": ("left",), "refusal": refusal}, observation=seen)
     )
     assert view.sentence.startswith("Close the right eye.")
     assert view.note == refusal
     assert not view.preconditions[1].holds
     lost = {"hand": None, "cloud": None, "problem": "hand cut by the image border"}
-    assert not Wizard().view(snapshot(procedure={"refusal": refusal}, observation=lost)).note
-    assert Wizard().view(snapshot()).preconditions[1].holds
+    assert not begun().view(snapshot(procedure={"refusal": refusal}, observation=lost)).note
+    assert begun().view(snapshot()).preconditions[1].holds
 
 
 def test_a_refusal_becomes_past_and_orders_nothing(snapshot: Maker) -> None:
     refused = {"refusal": "Tilt your hand.", "refused_for": "Your hand was turned by 18.6°"}
-    view = Wizard().view(snapshot(procedure=refused))
+    view = begun().view(snapshot(procedure=refused))
     assert (view.note, view.fact) == ("", "Last refused: your hand was turned by 18.6°.")
 
 
@@ -82,16 +82,15 @@ def test_align_says_how_the_hand_differs_from_the_cursor(
         "has_changed": has_changed,
         "shape_text": "thumb 10 mm further out than in the cursor",
     }
-    limit = {"guard_limit_rad": float(np.radians(9.0))}
-    view = Wizard().view(snapshot(observation=seen, procedure=limit))
+    view = begun().view(snapshot(observation=seen))
     assert view.preconditions[1] == Precondition(text, False)
 
 
 def test_a_second_press_does_not_confirm_the_hand_that_made_the_cursor(snapshot: Maker) -> None:
     now = snapshot()
-    assert not Wizard().view(now).main.is_enabled
+    assert not begun().view(now).main.is_enabled
     later = replace(now, t_host_ns=now.t_host_ns + 2_000_000_000)
-    assert Wizard().view(later).main.is_enabled
+    assert begun().view(later).main.is_enabled
 
 
 @pytest.mark.parametrize("seen", [{"is_over_limit": True}, {"problem": "no hand", "hand": None}])
@@ -104,25 +103,25 @@ def test_no_confirmation_is_offered_beside_a_condition_that_is_not_met(
     for changes in ({}, seen):
         now = snapshot(state, procedure=procedure, observation=changes)
         for at_ns in (now.t_host_ns, now.t_host_ns + 2_000_000_000):
-            view = Wizard().view(replace(now, t_host_ns=at_ns))
+            view = begun().view(replace(now, t_host_ns=at_ns))
             assert view.main.is_enabled == all(one.holds for one in view.preconditions)
 
 
 def test_solve_shows_the_verdicts_before_anything_is_sent(snapshot: Maker) -> None:
-    view = Wizard().view(snapshot(State.SOLVED, problem="the disk is full; free some space"))
-    assert [check.text.split(":")[0] for check in view.preconditions[1:]] == [
+    view = begun().view(snapshot(State.SOLVED, not_stored="the disk is full; free some space"))
+    assert [check.text.split(":")[0] for check in view.preconditions] == [
         "Left eye",
         "Right eye",
     ]
     assert not view.note, "the banner says it"
     assert actions(view) == [Action.REDO]
-    assert not Wizard().view(snapshot(State.APPLYING)).main.is_enabled
+    assert not begun().view(snapshot(State.APPLYING)).main.is_enabled
 
 
 def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
     for name in get_args(VerdictName):
-        checks = Wizard().view(judged(snapshot, name, "accept", State.SOLVED)).preconditions
-        assert [(c.verdict, c.holds) for c in checks[1:]] == [
+        checks = begun().view(judged(snapshot, name, "accept", State.SOLVED)).preconditions
+        assert [(c.verdict, c.holds) for c in checks] == [
             (name, name == "accept"),
             ("accept", True),
         ]
@@ -132,19 +131,18 @@ def test_only_an_accepted_eye_is_ticked(snapshot: Maker) -> None:
 def test_of_a_result_that_must_not_be_used_the_offline_calibration_is_kept(
     snapshot: Maker, name: VerdictName
 ) -> None:
-    view = Wizard().view(judged(snapshot, "accept", name, State.SOLVED))
+    view = begun(is_held=True).view(judged(snapshot, "accept", name, State.SOLVED))
     assert view.sentence == (
         "Send the left eye's projection; the right eye keeps the offline calibration, because its "
-        f"result is {name}."
+        f"result is {name}. The wearer may lower the hand."
     )
-    assert view.main == ButtonSpec(Action.APPLY, "Send left eye")
-    assert view.runs_after_s is None, "a person decides"
+    assert view.main == ButtonSpec(Action.TAKE_STEP, "Send left eye")
     assert actions(view) == [Action.REDO]
     assert all(offer.discards for offer in view.others), "by a click or its letter only"
-    none = Wizard().view(judged(snapshot, name, name, State.SOLVED))
+    none = begun(is_held=True).view(judged(snapshot, name, name, State.SOLVED))
     assert none.sentence.startswith("Do not use this result: keep the offline")
     assert "of both eyes" in none.sentence
-    assert none.main == ButtonSpec(Action.APPLY, "Keep offline")
+    assert none.main == ButtonSpec(Action.TAKE_STEP, "Keep offline")
 
 
 @pytest.mark.parametrize(
@@ -159,12 +157,9 @@ def test_after_one_eye_that_must_not_be_used_the_next_step_repeats_or_ends(
 ) -> None:
     left = replace(next(iter(record.alignments.values())), eyes=("left",))
     one = replace(record, alignments={1: left})
-    wizard = Wizard("each")
-    wizard.view(judged(snapshot, name, name, State.SOLVED, record=one))
-    view = wizard.view(judged(snapshot, name, name, State.APPLIED, record=one))
+    view = begun().view(judged(snapshot, name, name, State.APPLIED, record=one))
     assert view.sentence.startswith("Do not use this result.")
     assert view.main == main
-    assert view.runs_after_s is None
     assert "offline calibration for both eyes" in view.fact
 
 
@@ -183,8 +178,9 @@ def test_after_one_eye_that_must_not_be_used_the_next_step_repeats_or_ends(
 def test_solve_says_which_offline_calibration_is_kept(
     snapshot: Maker, left: VerdictName, right: VerdictName, sentence: str, label: str
 ) -> None:
-    view = Wizard().view(judged(snapshot, left, right, State.SOLVED))
-    assert (view.sentence, view.main.label) == (sentence, label)
+    view = begun(is_held=True).view(judged(snapshot, left, right, State.SOLVED))
+    assert view.sentence == f"{sentence} The wearer may lower the hand."
+    assert view.main.label == label
     assert view.main.is_enabled
 
 
@@ -194,16 +190,17 @@ def test_a_verification_tells_how_far_the_outline_was_moved(snapshot: Maker) -> 
     seen = snapshot(
         State.VERIFY, procedure={"verifying": moved, "refusal": "Hold your hand still."}
     )
-    view = Wizard().view(seen)
+    view = begun().view(seen)
     assert view.step is Step.VERIFY
     assert view.sentence.startswith("Close the right eye.")
     assert view.fact == "Left eye's outline moved by 5.0′: 3.0′ left, 4.0′ down, size −0.6\u00a0%"
     assert view.note == "Hold your hand still."
-    assert (view.main.action, view.runs_after_s) == (Action.VERIFIED, None)
+    assert view.main.action is Action.VERIFIED
     assert actions(view) == [Action.UNDO_NUDGE, Action.SKIP]
     before: dict[Eye, Verification] = {"left": Verification(triple, (0.0, 0.0), triple)}
-    again = replace(seen, procedure=replace(seen.procedure, verifications=before))
-    assert Wizard().view(again).sentence == f"Once more, to be sure. {view.sentence}"
+    facts = replace(seen.record.facts, verified=before)
+    again = replace(seen, record=replace(seen.record, facts=facts))
+    assert begun().view(again).sentence == f"Once more, to be sure. {view.sentence}"
 
 
 def test_a_drawing_is_not_confirmed_before_anyone_can_have_looked(snapshot: Maker) -> None:
@@ -211,7 +208,7 @@ def test_a_drawing_is_not_confirmed_before_anyone_can_have_looked(snapshot: Make
         seen = snapshot(State.VERIFY, procedure={"verifying": NUDGED})
         began = replace(NUDGED, began_host_ns=seen.t_host_ns - round(1e9 * ago_s))
         seen = replace(seen, procedure=replace(seen.procedure, verifying=began))
-        return Wizard().view(seen).main.is_enabled
+        return begun().view(seen).main.is_enabled
 
     assert [can_confirm(ago_s) for ago_s in (0.1, 1.4, 1.6)] == [False, False, True]
 
@@ -221,11 +218,11 @@ def test_without_the_headset_nothing_is_confirmed(snapshot: Maker) -> None:
         seen = snapshot(
             State.VERIFY, procedure={"verifying": NUDGED}, link={"connected": connected}
         )
-        assert Wizard().view(seen).main.is_enabled == connected
+        assert begun().view(seen).main.is_enabled == connected
         aligning = snapshot(
             State.ALIGN, link={"connected": connected}, t_host_ns=seen.t_host_ns + 2 * 10**9
         )
-        assert Wizard().view(aligning).main.is_enabled == connected
+        assert begun().view(aligning).main.is_enabled == connected
 
 
 def test_without_an_image_no_hand_is_said_to_be_missing(snapshot: Maker) -> None:
@@ -235,12 +232,11 @@ def test_without_an_image_no_hand_is_said_to_be_missing(snapshot: Maker) -> None
 
 
 def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
+    wizard = begun()
     accepted = judged(snapshot, "accept", "accept", State.APPLIED)
     repeat = judged(snapshot, "repeat", "accept", State.APPLIED)
     wizard.view(accepted)
-    wizard.move(Action.NEXT, accepted)
+    wizard.move(Action.NEXT)
     assert not wizard.view(accepted).unearned
     view = wizard.view(repeat)
     assert view.unearned == {Step.VERIFY}
@@ -248,10 +244,9 @@ def test_the_last_step_ticks_only_what_was_verified(snapshot: Maker) -> None:
 
 
 def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
-    wizard = Wizard()
-    wizard.view(snapshot(State.SOLVED))
-    full = snapshot(State.APPLIED, problem=str(FileError("the disk is full")))
-    wizard.move(Action.NEXT, full)
+    wizard = begun()
+    full = snapshot(State.APPLIED, not_stored=str(FileError("the disk is full")))
+    wizard.move(Action.NEXT)
     view = wizard.view(full)
     assert not view.preconditions[0].holds
     assert not view.note, "the banner says it"
@@ -260,46 +255,42 @@ def test_a_full_disk_is_reported_at_the_last_step(snapshot: Maker) -> None:
 def test_the_distance_of_the_hand_follows_from_the_depth_gate(snapshot: Maker) -> None:
     def said(near_m: float, far_m: float) -> str:
         gate = SegmentSettings(depth_min_m=near_m, depth_max_m=far_m)
-        return distance(snapshot(State.SHOW_HAND, procedure={"segment": gate}))
+        return distance(snapshot(State.SHOW_HAND, settings=CalibrationSettings(segment=gate)))
 
     assert said(0.35, 0.70) == "at forearm's length, 40 to 65 cm from the camera"
     assert said(0.55, 2.00) == "60 to 70 cm from the camera"
 
 
-def test_a_session_that_is_held_does_not_finish_by_itself(snapshot: Maker) -> None:
-    seen = judged(snapshot, "accept", "accept", State.APPLIED)
-    assert "finishes by itself" in save_view(seen, is_held=False).sentence
-    assert "Finish the session when you are done" in save_view(seen, is_held=True).sentence
-
-
-def test_a_result_that_trials_contradict_does_not_finish_by_itself(snapshot: Maker) -> None:
-    seen = tried(judged(snapshot, "accept", "accept", State.APPLIED))
-    view = save_view(seen, is_held=False)
-    assert view.sentence.startswith("Trials of the left eye are over the target. Go back to")
-    assert view.runs_after_s is None
+def test_a_result_that_trials_contradict_is_not_finished_at_once(snapshot: Maker) -> None:
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
+    assert begun().view(accepted).main == ButtonSpec(Action.FINISH, "Finish")
+    full = replace(accepted, not_stored="the disk is full")
+    assert begun().view(full).main == ButtonSpec(Action.NEXT, "Finish")
+    seen = tried(accepted)
+    assert begun().view(seen).main == ButtonSpec(Action.NEXT, "Finish as it is")
+    assert save_view(seen).sentence.startswith("Trials of the left eye are over the target. Go")
     finished = replace(seen, record=replace(seen.record, is_finished=True))
-    said = save_view(finished, is_held=False).sentence
+    said = save_view(finished).sentence
     assert said.startswith("The session is finished, but trials of the left eye are over")
-    mild = replace(seen, procedure=replace(seen.procedure, target_arcmin=1e3))
-    assert "finishes by itself" in save_view(mild, is_held=False).sentence
+    mild = replace(seen, settings=with_target(1e3))
+    assert begun().view(mild).main.action is Action.FINISH
+    assert save_view(mild).sentence.startswith("Everything is already saved.")
 
 
 def test_a_kept_offline_calibration_is_named_and_not_unearned(snapshot: Maker) -> None:
     kept = judged(snapshot, "accept", "keep", State.APPLIED)
     told = "The headset uses the offline calibration for the right eye: φ is 0 there."
-    assert save_view(kept, is_held=False).fact == told
-    assert not save_view(kept, is_held=False).unearned
-    wizard = Wizard()
-    wizard.view(judged(snapshot, "accept", "keep", State.SOLVED))
-    view = wizard.view(kept)
+    assert save_view(kept).fact == told
+    assert not save_view(kept).unearned
+    view = begun().view(kept)
     assert (view.step, view.fact) == (Step.VERIFY, told)
-    assert not save_view(judged(snapshot, "accept", "accept", State.APPLIED), is_held=False).fact
+    assert not save_view(judged(snapshot, "accept", "accept", State.APPLIED)).fact
 
 
 def test_a_resumed_session_says_that_it_continues(snapshot: Maker, record: SessionRecord) -> None:
-    new = connect_view(snapshot(State.SHOW_HAND, procedure={"alignments": {}}))
+    new = connect_view(snapshot(State.SHOW_HAND, record=replace(record, alignments={})))
     assert (new.main.label, new.fact) == ("Begin", "")
-    resumed = connect_view(snapshot(State.APPLIED, procedure={"verifications": {"left": NUDGED}}))
+    resumed = connect_view(snapshot(State.APPLIED, verified={"left": VERIFIED}))
     count = len(record.alignments)
     assert resumed.main.label == "Continue"
     assert resumed.fact == (

@@ -1,391 +1,400 @@
+"""The guide shows the plan's next step, and takes it only while the plan is held."""
+
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
+import numpy as np
 import pytest
 
 from handcal.register.verdict import Advice
-from handcal.session.session import SessionRecord
+from handcal.session.state import WENT_BACK, SessionEvent
+from handcal.station.plan import PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
-from handcal.types import EYES, Alignment, Eye, EyePlan, VerdictName
-from handcal_gui.pages.wizard.planned import PlannedWizard
-from handcal_gui.pages.wizard.steps import Wizard, is_complete, next_eyes
-from handcal_gui.pages.wizard.view import STEPS, Action, Step
-from tests.gui.views import VERIFIED, Maker, actions, judged, tried
-
-
-def reach(wizard: Wizard, snapshot: Snapshot, step: Step) -> None:
-    while wizard.step(snapshot) is not step:
-        wizard.move(Action.NEXT, snapshot)
-
-
-def aligned(record: SessionRecord, alignment: Alignment, *eyes: tuple[Eye, ...]) -> SessionRecord:
-    return replace(
-        record, alignments={n: replace(alignment, eyes=those) for n, those in enumerate(eyes, 1)}
-    )
-
-
-@pytest.fixture
-def start(snapshot: Maker, record: SessionRecord) -> Snapshot:
-    """Return a station just opened: everything connected, a hand held still, nothing aligned."""
-    return snapshot(State.SHOW_HAND, record=replace(record, alignments={}))
-
-
-@pytest.mark.parametrize(
-    ("state", "step"),
-    [
-        (State.SHOW_HAND, Step.CONNECT),
-        (State.ALIGN, Step.ALIGN),
-        (State.ALIGNED, Step.SOLVE),
-        (State.SOLVED, Step.SOLVE),
-        (State.APPLYING, Step.SOLVE),
-    ],
+from handcal.types import EYES, Eye, EyeShift, Verdict, VerdictName, Verification
+from handcal_gui.pages.wizard.steps import Wizard
+from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step
+from tests.gui.views import (
+    RECOMMENDED,
+    VERIFIED,
+    actions,
+    begun,
+    judged,
+    planned_snapshot,
+    tried,
+    with_events,
+    with_next,
 )
-def test_the_engine_s_state_says_which_step_it_is(
-    snapshot: Maker, state: State, step: Step
-) -> None:
-    wizard = Wizard()
-    view = wizard.view(snapshot(state))
-    assert view.step is step
-    assert view.sentence.endswith(".")
+
+Maker = Callable[..., Snapshot]
+PAPER = PlanSettings("paper", in_turn=True, is_automatic=True)
+BOTH = dict.fromkeys(EYES, VERIFIED)
 
 
-def test_the_whole_way_of_one_eye_after_the_other(
-    start: Snapshot, snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
-) -> None:
-    wizard = Wizard("each")
-    way = []
-    for step in (Step.CONNECT, Step.SHOW_HAND):
-        view = wizard.view(start)
-        way.append(view.main.action)
-        assert (view.step, view.main.is_enabled) == (step, True)
-        wizard.move(view.main.action, start)
-    assert wizard.eyes(start) == ("left",)
-    way.append(wizard.view(start).main.action)
-    one = aligned(record, alignments[0], ("left",))
-    states = (State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLYING, State.APPLIED)
-    way += [wizard.view(snapshot(state, record=one)).main.action for state in states]
-    applied = snapshot(State.APPLIED, record=one)
-    assert wizard.view(applied).main.label == "Align the right eye"
-    wizard.move(Action.ANOTHER, applied)
-    assert wizard.step(applied) is Step.SHOW_HAND
-    assert wizard.eyes(applied) == ("right",)
-    two = aligned(record, alignments[0], ("left",), ("right",))
-    wizard.view(snapshot(State.ALIGN, record=two))
-    applied = judged(snapshot, "accept", "accept", State.APPLIED, record=two)
-    assert wizard.view(applied).main.label == "Finish"
-    wizard.move(Action.NEXT, applied)
-    way.append(wizard.view(applied).main.action)
-    finished = snapshot(State.APPLIED, record=replace(two, is_finished=True))
-    way.append(wizard.view(finished).main.action)
-    assert way == [
-        Action.NEXT,
-        Action.NEXT,
-        Action.MAKE_CURSOR,
-        Action.CONFIRM,
-        Action.SOLVE,
-        Action.APPLY,
-        Action.APPLY,
-        Action.ANOTHER,
-        Action.FINISH,
-        Action.NEXT_WEARER,
-    ]
-
-
-def test_a_hand_is_needed_and_the_engine_s_reason_is_given(start: Snapshot) -> None:
-    wizard = Wizard()
-    reach(wizard, start, Step.SHOW_HAND)
-    assert start.observation is not None
-    lost = replace(start.observation, hand=None, problem="hand cut by the image border")
-    view = wizard.view(replace(start, observation=lost))
-    assert not view.main.is_enabled
-    assert view.preconditions[0].text == "Hand cut by the image border"
-    assert not wizard.view(replace(start, observation=None)).main.is_enabled
-
-
-def test_a_cursor_needs_a_steady_hand(start: Snapshot) -> None:
-    wizard = Wizard()
-    reach(wizard, start, Step.MAKE_CURSOR)
-    assert start.observation is not None
-    waiting = replace(start.observation, is_steady=False, needs_delay=True)
-    view = wizard.view(replace(start, observation=waiting))
-    asked = view.preconditions[-1]
-    assert "look slowly to the left" in view.sentence
-    assert "looked slowly to the left" in asked.text
-    assert not asked.holds
-    restless = replace(start, observation=replace(start.observation, is_steady=False))
-    assert not wizard.view(restless).main.is_enabled
-    assert wizard.view(start).main.is_enabled
-
-
-def test_verify_points_at_the_advice_while_an_eye_is_not_accepted(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    repeat = wizard.view(judged(snapshot, "repeat", "accept", State.APPLIED))
-    assert "Not accepted yet" in repeat.sentence
-    accepted = wizard.view(judged(snapshot, "accept", "accept", State.APPLIED))
-    assert "Not accepted yet" not in accepted.sentence
-
-
-def advised(
-    snapshot: Maker, advice: Mapping[Eye, tuple[tuple[Eye, ...], int]], **changes: Any
-) -> Snapshot:
-    """Return a snapshot in which eyes are to repeat, with the eyes and the number of alignments."""
-    names: list[VerdictName] = ["repeat" if eye in advice else "accept" for eye in EYES]
-    left, right = names
-    seen = judged(snapshot, left, right, State.APPLIED, **changes)
+def with_verdicts(seen: Snapshot, *names: VerdictName) -> Snapshot:
     assert seen.procedure.results is not None
-    given = {
-        eye: Advice(eyes, count, 5.0, 0.97, meets_target=True, is_accepted=True)
-        for eye, (eyes, count) in advice.items()
-    }
-    results = replace(seen.procedure.results, advice=given)
+    verdicts = {eye: Verdict(name, "as told") for eye, name in zip(EYES, names, strict=True)}
+    results = replace(seen.procedure.results, verdicts=verdicts)
     return replace(seen, procedure=replace(seen.procedure, results=results))
 
 
 @pytest.mark.parametrize(
-    ("eyes", "label"),
-    [(EYES, "Align both eyes"), (("right",), "Align the right eye"), ((), "Align both eyes")],
+    ("name", "step"),
+    [
+        (StepName.RAISE, Step.SHOW_HAND),
+        (StepName.CURSOR, Step.MAKE_CURSOR),
+        (StepName.ALIGN, Step.ALIGN),
+        (StepName.SOLVE, Step.SOLVE),
+        (StepName.APPLY, Step.SOLVE),
+        (StepName.WAIT, Step.SOLVE),
+        (StepName.VERIFY, Step.VERIFY),
+        (StepName.NUDGE, Step.VERIFY),
+        (StepName.DONE, Step.VERIFY),
+    ],
 )
-def test_an_eye_that_is_not_accepted_does_not_fit(
-    snapshot: Maker, eyes: tuple[Eye, ...], label: str
+def test_the_plan_s_next_step_is_shown(snapshot: Maker, name: StepName, step: Step) -> None:
+    wizard = begun()
+    for is_held in (False, True):
+        wizard.is_held = is_held
+        view = wizard.view(planned_snapshot(snapshot, name))
+        assert view.step is step
+        assert view.sentence.endswith(".")
+
+
+@pytest.mark.parametrize("name", [StepName.CURSOR, StepName.SOLVE, StepName.APPLY, StepName.VERIFY])
+def test_a_person_takes_a_step_only_of_a_held_plan(snapshot: Maker, name: StepName) -> None:
+    wizard = begun()
+    main = wizard.view(planned_snapshot(snapshot, name)).main
+    assert (main.action, main.is_enabled) == (Action.TAKE_STEP, False)
+    assert main.label.endswith("…")  # an activity, not an offer
+    wizard.is_held = True
+    held = wizard.view(planned_snapshot(snapshot, name)).main
+    assert (held.action, held.is_enabled) == (Action.TAKE_STEP, True)
+    assert not held.label.endswith("…")
+
+
+@pytest.mark.parametrize(
+    ("left", "label", "doing", "says"),
+    [
+        ("accept", "Send left eye", "Sending…", "the right eye keeps the offline calibration"),
+        ("contradicted", "Keep offline", "Keeping offline…", "Do not use this result"),
+    ],
+)
+def test_a_plan_says_what_is_sent_as_the_paper_s_guide_does(
+    snapshot: Maker, left: VerdictName, label: str, doing: str, says: str
 ) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    repeat = advised(snapshot, {"right": (eyes, 1)})
-    view = wizard.view(repeat)
-    assert (view.main.action, view.main.label) == (Action.ANOTHER, label)
-    labels = [offer.label.replace("&", "") for offer in view.others]
-    assert not any("fits" in one for one in labels)
-    assert label.replace("the ", "") not in labels, "one action has one name"
-    wizard.move(Action.ANOTHER, repeat)
-    assert wizard.eyes(repeat) == (eyes or EYES)
+    wizard = begun()
+    solved = with_verdicts(planned_snapshot(snapshot, StepName.APPLY), left, "implausible")
+    assert wizard.view(solved).main.label == doing
+    wizard.is_held = True
+    view = wizard.view(solved)
+    assert view.main.label == label
+    assert says in view.sentence
+    assert view.sentence.endswith(". The hand stays up.")
 
 
-def test_the_advice_for_the_worst_eye_comes_first(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    both = advised(snapshot, {"left": (("left",), 1), "right": (("right",), 1)})
-    results = both.procedure.results
-    assert results is not None
-    worst = max(EYES, key=lambda eye: results.benefits[eye].after_arcmin)
-    assert wizard.view(both).main.label == f"Align the {worst} eye"
+def test_the_plan_is_held_before_it_begins_and_after_it_ends(snapshot: Maker) -> None:
+    wizard = Wizard()
+    done = planned_snapshot(snapshot, StepName.DONE)
+    holds = []
+    for action in (Action.NEXT, Action.NEXT, Action.BACK, Action.BACK):
+        holds.append(wizard.holds_plan)
+        wizard.move(action)
+    assert holds == [True, False, True, False]
+    assert wizard.step(done) is Step.CONNECT
+    wizard.move(Action.NEXT)
+    wizard.is_held = True
+    assert wizard.holds_plan
 
 
-def test_a_result_that_must_not_be_used_does_not_fit_either(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    view = wizard.view(judged(snapshot, "implausible", "accept", State.APPLIED))
-    assert view.sentence.startswith("Do not use this result.")
-    assert view.main.action is Action.ANOTHER
-    view = wizard.view(judged(snapshot, "contradicted", "accept", State.APPLIED))
-    assert view.sentence.startswith("Do not use this result.")
-    assert view.main.action is Action.NEXT, "no alignment removes the evidence"
+def test_the_state_counts_if_the_plan_s_step_is_older(snapshot: Maker) -> None:
+    wizard = begun()
+    cursor = planned_snapshot(snapshot, StepName.CURSOR)
+    aligning = replace(cursor, procedure=replace(cursor.procedure, state=State.ALIGN))
+    assert wizard.view(aligning).main.action is Action.CONFIRM
 
 
-def test_only_what_a_person_need_not_decide_runs_by_itself(
-    snapshot: Maker, start: Snapshot, record: SessionRecord, alignments: tuple[Alignment, ...]
+def test_the_wearer_looks_around_first_where_that_is_needed(snapshot: Maker) -> None:
+    raising = planned_snapshot(snapshot, StepName.RAISE)
+    assert raising.observation is not None
+    waiting = replace(raising.observation, is_steady=False, needs_delay=True)
+    assert begun().view(raising).sentence.startswith("Raise one bare hand")
+    view = begun().view(replace(raising, observation=waiting))
+    assert "look slowly to the left" in view.sentence
+
+
+def test_the_wearer_keeps_the_hand_up(snapshot: Maker) -> None:
+    wizard = begun()
+    assert wizard.view(planned_snapshot(snapshot, StepName.ALIGN)).sentence.endswith("stays up.")
+    assert wizard.view(planned_snapshot(snapshot, StepName.CURSOR)).sentence.startswith("Keep the")
+    none = replace(planned_snapshot(snapshot, StepName.CURSOR).record, alignments={})
+    first = planned_snapshot(snapshot, StepName.CURSOR, record=none)
+    assert wizard.view(first).sentence.startswith("Hold the hand still")
+
+
+@pytest.mark.parametrize(
+    ("name", "is_verified", "action", "label", "says"),
+    [
+        ("accept", True, Action.FINISH, "Finish", "has verified"),
+        ("keep", True, Action.FINISH, "Finish", "not used for every eye"),
+        ("accept", False, Action.NEXT, "Finish as it is", "Not every eye has been verified"),
+        ("repeat", True, Action.ANOTHER, "Add alignment", "Not accepted yet. Raise the hand"),
+        ("implausible", True, Action.ANOTHER, "Add alignment", "Do not use"),
+        ("contradicted", True, Action.NEXT, "Finish", "Do not use this result. Finish"),
+    ],
+)
+def test_the_end_says_what_was_reached(
+    snapshot: Maker, name: VerdictName, is_verified: bool, action: Action, label: str, says: str
 ) -> None:
-    wizard = Wizard("each")
-    runs: dict[Step | State, float | None] = {}
-    for step in (Step.CONNECT, Step.SHOW_HAND, Step.MAKE_CURSOR):
-        reach(wizard, start, step)
-        runs[step] = wizard.view(start).runs_after_s
-    one = aligned(record, alignments[0], ("left",))
-    for state in (State.ALIGN, State.ALIGNED, State.SOLVED, State.APPLIED):
-        runs[state] = wizard.view(snapshot(state, record=one)).runs_after_s
-    assert [what for what, after_s in runs.items() if after_s is None] == [
-        Step.CONNECT,
-        State.ALIGN,
-    ]
-    two = aligned(record, alignments[0], ("left",), ("right",))
-    accepted = judged(snapshot, "accept", "accept", State.APPLIED, record=two)
-    assert wizard.view(accepted).runs_after_s is None  # the wearer says if it fits
-    few, many = (advised(snapshot, {"left": (("left",), count)}, record=two) for count in (1, 5))
-    assert wizard.view(few).runs_after_s is not None
-    assert wizard.view(many).runs_after_s is None
-    wizard.move(Action.NEXT, accepted)
-    assert wizard.view(accepted).runs_after_s is not None
-    assert wizard.view(replace(accepted, problem="the disk is full")).runs_after_s is None
-    assert wizard.view(many).runs_after_s is None, "it is not accepted"
-    assert wizard.view(many).sentence.startswith("Not accepted. Go back")
-    finished = replace(many, record=replace(many.record, is_finished=True))
-    assert "not accepted" in wizard.view(finished).sentence
-    unsolved = replace(many, procedure=replace(many.procedure, results=None))
-    view = wizard.view(unsolved)
-    assert (view.step, view.main.action) == (Step.VERIFY, Action.SOLVE)
+    done = planned_snapshot(snapshot, StepName.DONE, verified=BOTH if is_verified else {})
+    assert done.procedure.results is not None
+    verdicts = dict.fromkeys(EYES, Verdict(name, "as told"))
+    results = replace(done.procedure.results, verdicts=verdicts)
+    done = replace(done, procedure=replace(done.procedure, results=results))
+    view = begun().view(done)
+    assert says in view.sentence
+    assert (view.main.action, view.main.label) == (action, label)
+    other = Action.NEXT if action is Action.ANOTHER else Action.ANOTHER
+    others = [one.action for one in view.others]
+    verify = [Action.VERIFY_LEFT, Action.VERIFY_RIGHT] if name != "contradicted" else []
+    assert sorted(others) == sorted([other, *verify])
+    assert done.observation is not None
+    lowered = replace(done, observation=replace(done.observation, is_steady=False))
+    assert begun().view(lowered).main.is_enabled == (action is not Action.ANOTHER)
 
 
-def test_each_solved_eye_is_verified_before_anything_is_said_to_fit(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
-    labels = []
-    for eyes in ((), ("left",), EYES):
-        verifications = dict.fromkeys(eyes, VERIFIED)
-        procedure = replace(accepted.procedure, verifications=verifications)
-        view = wizard.view(replace(accepted, procedure=procedure))
-        labels.append(view.main.label)
-        assert (view.runs_after_s is not None) == (eyes != EYES)
-    assert labels == ["Verify the left eye", "Verify the right eye", "Finish"]
-    unverified = replace(
-        accepted,
-        procedure=replace(accepted.procedure, verifications={}),
-        record=replace(accepted.record, verified_now=frozenset()),
+def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot: Maker) -> None:
+    done = planned_snapshot(snapshot, StepName.DONE, verified=BOTH)
+    assert done.procedure.results is not None
+    verdicts = dict.fromkeys(EYES, Verdict("accept", "as told"))
+    results = replace(done.procedure.results, verdicts=verdicts)
+    done = replace(done, procedure=replace(done.procedure, results=results))
+    assert begun().view(done).sentence.startswith("The wearer has verified and")
+    aligned = replace(done, record=replace(done.record, verified_now=frozenset()))
+    view = begun().view(aligned)
+    assert view.sentence.startswith("Verified before the alignments changed.")
+    doubted = tried(done)
+    view = begun().view(doubted)
+    assert view.sentence.startswith("Trials of the left eye are over the target. Add an alignment")
+    assert view.main.label == "Finish as it is"
+    shifted = replace(doubted.record.trials[1], calibrated_shift_m=np.full(3, 0.01))
+    record = replace(doubted.record, trials={1: shifted}, verified_now=frozenset())
+    view = begun().view(replace(doubted, record=record))
+    assert view.sentence.startswith("Verified, and tested in trials, before the alignments")
+    solving = planned_snapshot(snapshot, StepName.SOLVE, verified=BOTH)
+    assert begun().view(solving).step is Step.VERIFY
+    solving = replace(solving, record=aligned.record)
+    assert begun().view(solving).step is Step.SOLVE
+
+
+def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
+    done = planned_snapshot(snapshot, StepName.DONE, verified=BOTH)
+    assert done.procedure.results is not None
+    again = Advice((), 0, 3.0, 0.98, meets_target=True, is_accepted=False, verify=True)
+    results = replace(
+        done.procedure.results,
+        verdicts={"left": Verdict("accept", "as told"), "right": Verdict("repeat", "as told")},
+        advice={"right": again},
     )
-    for _ in EYES:
-        assert Action.SKIP in actions(wizard.view(unverified))
-        wizard.move(Action.SKIP, unverified)
-    assert wizard.view(unverified).main.label == "It fits"
-    again = [Action.ANOTHER, Action.VERIFY_LEFT, Action.VERIFY_RIGHT]
-    assert actions(wizard.view(unverified)) == again, "what was skipped can still be done"
-    wizard.move(Action.NEXT, unverified)
-    assert wizard.view(unverified).unearned == {Step.VERIFY}
+    done = replace(done, procedure=replace(done.procedure, results=results))
+    view = begun().view(done)
+    assert view.sentence == (
+        "Not accepted yet: verify the right eye again. Another alignment would change little."
+    )
+    assert (view.main.action, view.main.label) == (Action.VERIFY_RIGHT, "Verify the right eye")
+    others = [one.action for one in view.others]
+    assert others == [Action.ANOTHER, Action.VERIFY_LEFT, Action.NEXT]
+    worse = replace(results.benefits["right"], after_arcmin=20.0)
+    results = replace(
+        results,
+        verdicts=dict.fromkeys(EYES, Verdict("repeat", "as told")),
+        advice=dict.fromkeys(EYES, again),
+        benefits=dict(results.benefits) | {"right": worse},
+    )
+    both = replace(done, procedure=replace(done.procedure, results=results))
+    view = begun().view(both)
+    assert "verify both eyes again" in view.sentence
+    assert view.main.action is Action.VERIFY_RIGHT, "the one with the larger error first"
 
 
-def test_a_restless_hand_is_not_verified(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    assert wizard.view(snapshot(State.APPLIED)).main.is_enabled
-    restless = snapshot(State.APPLIED, observation={"is_steady": False})
-    assert not wizard.view(restless).main.is_enabled
+def test_one_usable_eye_is_the_only_one_offered(snapshot: Maker) -> None:
+    for plan in (RECOMMENDED, PAPER):
+        right = replace(plan, usable_eyes=("right",))
+        done = planned_snapshot(snapshot, StepName.DONE, plan=right)
+        assert Action.VERIFY_LEFT not in actions(begun().view(done))
 
 
-def test_what_a_verification_leads_to_is_sent_at_the_same_step(snapshot: Maker) -> None:
-    verified = {"verifications": {"left": VERIFIED}}
-    view = Wizard().view(snapshot(State.APPLYING, procedure=verified))
-    assert view.step is Step.VERIFY
-    assert not view.main.is_enabled
+def test_a_drawing_of_another_phi_is_said(snapshot: Maker) -> None:
+    wizard = begun()
+    done = planned_snapshot(snapshot, StepName.DONE)
+    assert done.procedure.results is not None
+    rendered = done.procedure.results.rendered_shift_m
+    as_solved = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=rendered)
+    assert wizard.view(as_solved).fact == ""
+    back = {eye: np.array([0.009, 0.0, 0.0]) for eye in EYES}
+    gone_back = planned_snapshot(snapshot, StepName.DONE, applied_shift_m=back)
+    assert "saved and exported" in wizard.view(gone_back).fact
+    one = planned_snapshot(
+        snapshot, StepName.DONE, applied_shift_m={**rendered, "left": back["left"]}
+    )
+    assert wizard.view(one).fact.startswith("Left eye: drawn, saved and exported with")
+    fine_tuned, went_back = SessionEvent.FINE_TUNED, WENT_BACK
+    zero = {eye: np.zeros(3) for eye in EYES}
+    for names, drawn_m, former_m, which, how in (
+        ([fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
+        ([went_back, fine_tuned], back, rendered, "an earlier φ", "Press G"),
+        ([went_back, fine_tuned], zero, rendered, "the offline calibration's φ", "Press G"),
+        (
+            [went_back, fine_tuned],
+            zero,
+            back,
+            "the offline calibration's φ",
+            "Reset φ in Fine-tune",
+        ),
+        ([went_back, fine_tuned, fine_tuned], back, zero, "a fine-tuned φ", "Reset φ in Fine-tune"),
+    ):
+        data = {"shift_m": {eye: one.tolist() for eye, one in drawn_m.items()}}
+        seen = planned_snapshot(
+            snapshot, StepName.DONE, applied_shift_m=drawn_m, former_shift_m=former_m
+        )
+        record = with_events(seen.record, *((name, data) for name in names))
+        seen = replace(seen, record=record)
+        said = (
+            f"Both eyes: drawn, saved and exported with {which}; the verdict applies to the solved "
+            f"φ. {how} to return."
+        )
+        assert wizard.view(seen).fact == said
+        wizard.move(Action.NEXT)
+        assert wizard.view(seen).fact == said, "at the last step, too"
+        wizard = begun()
 
 
-def test_verify_offers_another_alignment_and_each_eye_alone(snapshot: Maker) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    applied = judged(snapshot, "accept", "accept", State.APPLIED)
-    assert actions(wizard.view(applied)) == [
+def test_every_other_action_is_the_engine_s() -> None:
+    with pytest.raises(ValueError, match="engine"):
+        begun().move(Action.TAKE_STEP)
+
+
+@pytest.mark.parametrize("state", [State.SHOW_HAND, State.APPLIED])
+def test_alignments_without_a_result_are_solved_again_also_from_save(
+    snapshot: Maker, state: State
+) -> None:
+    wizard = begun()
+    done = planned_snapshot(snapshot, StepName.DONE, verified=BOTH)
+    wizard.move(Action.NEXT)
+    assert wizard.step(done) is Step.SAVE
+    changed = planned_snapshot(snapshot, StepName.SOLVE, results=None)
+    changed = replace(changed, procedure=replace(changed.procedure, state=state))
+    assert wizard.step(changed) is Step.SOLVE
+    assert not wizard.holds_plan, "the station solves by itself"
+    wizard.is_held = True
+    view = wizard.view(changed)
+    assert view.sentence == "The alignments have changed. Solve again."
+    assert (view.main.action, view.main.label) == (Action.TAKE_STEP, "Solve")
+    assert view.main.is_enabled
+
+
+def test_a_held_plan_does_not_say_that_the_next_cursor_follows(snapshot: Maker) -> None:
+    wizard = begun()
+    cursor = planned_snapshot(snapshot, StepName.CURSOR)
+    assert wizard.view(cursor).sentence.endswith("follows at once.")
+    wizard.is_held = True
+    assert wizard.view(cursor).sentence.startswith("Keep the hand up, and make the next cursor")
+
+
+def test_the_first_verification_says_that_the_other_eye_follows(snapshot: Maker) -> None:
+    wizard = begun()
+    some: list[dict[Eye, Verification]] = [{}, {"left": VERIFIED}]
+    texts = [
+        wizard.view(
+            planned_snapshot(snapshot, StepName.VERIFY, verified=verified)
+        ).sentence.partition("error of ")[2]
+        for verified in some
+    ]
+    assert texts == ["each eye, the left first.", "the left eye."]
+
+
+def test_in_the_paper_s_plan_the_hand_may_be_lowered(snapshot: Maker) -> None:
+    for name in (StepName.ALIGN, StepName.SOLVE, StepName.APPLY, StepName.WAIT, StepName.CURSOR):
+        says = begun().view(planned_snapshot(snapshot, name, plan=PAPER)).sentence
+        assert "stays up" not in says
+        assert "Keep the hand up" not in says
+    solving = planned_snapshot(snapshot, StepName.SOLVE, plan=PAPER)
+    assert begun().view(solving).sentence.endswith("The wearer may lower the hand.")
+    asking = planned_snapshot(snapshot, StepName.VERIFY, plan=PAPER)
+    assert begun().view(asking).sentence.startswith("Raise the hand and hold it still to measure")
+
+
+def test_the_plan_names_the_eyes_of_the_next_alignment(snapshot: Maker) -> None:
+    raising = planned_snapshot(snapshot, StepName.RAISE, plan=PAPER)
+    raising = with_next(raising, eyes=("right",), awaited=StepName.CURSOR)
+    view = begun().view(raising)
+    assert view.sentence.startswith("For the right eye: raise one bare hand")
+    first = replace(raising, record=replace(raising.record, alignments={}))
+    assert begun().view(first).sentence.startswith("Raise one bare hand")
+
+
+def test_a_hand_is_waited_for_at_the_step_that_needs_it(snapshot: Maker) -> None:
+    raising = planned_snapshot(snapshot, StepName.RAISE, plan=PAPER)
+    assert raising.observation is not None
+    lost = replace(raising.observation, hand=None, is_steady=False, problem="hand cut")
+    waiting = replace(with_next(raising, awaited=StepName.VERIFY), observation=lost)
+    view = begun(is_held=True).view(waiting)
+    assert (view.step, view.main.is_enabled) == (Step.VERIFY, False)
+    assert view.main.label == "Verify the left eye"
+    assert view.preconditions[0].text == "Hand cut"
+    assert Action.SKIP in actions(view), "a wearer who cannot verify is not waited for"
+
+
+def test_a_requested_alignment_can_be_withdrawn_and_a_half_done_plan_ended(
+    snapshot: Maker,
+) -> None:
+    cursor = planned_snapshot(snapshot, StepName.CURSOR, plan=PAPER)
+    assert actions(begun().view(with_next(cursor, is_requested=True))) == [Action.WITHDRAW]
+    assert cursor.procedure.results is not None
+    left: dict[Eye, EyeShift] = {"left": cursor.procedure.results.eyes["left"]}
+    results = replace(cursor.procedure.results, eyes=left)
+    one = replace(cursor, procedure=replace(cursor.procedure, results=results))
+    view = begun().view(one)
+    assert view.others[0] == ButtonSpec(Action.NEXT, "Fini&sh with one eye")
+    before = replace(cursor, procedure=replace(cursor.procedure, results=None))
+    assert actions(begun().view(before)) == [Action.BACK]
+
+
+def test_the_paper_s_plan_offers_each_eye_alone_at_its_end(snapshot: Maker) -> None:
+    done = judged(snapshot, "accept", "accept", State.APPLIED, plan=PAPER)
+    assert actions(begun().view(done)) == [
         Action.ANOTHER,
         Action.REPEAT_LEFT,
         Action.REPEAT_RIGHT,
     ]
-    assert wizard.view(applied).main.label == "Finish"
-    doubted = wizard.view(tried(applied))
-    assert doubted.sentence.startswith("Trials of the left eye are over the target.")
-    assert doubted.main.label == "Finish as it is"
-    wizard.move(Action.REPEAT_RIGHT, applied)
-    assert wizard.step(applied) is Step.SHOW_HAND
-    assert wizard.eyes(applied) == ("right",)
-    wizard.move(Action.BACK, applied)
-    assert wizard.step(applied) is Step.VERIFY
-    assert wizard.eyes(applied) == EYES  # the plan again
+    facts = replace(done.record.facts, verified={"left": VERIFIED})
+    skipped = replace(done, record=replace(done.record, facts=facts))
+    assert actions(begun().view(skipped)) == [Action.ANOTHER, Action.VERIFY_RIGHT]
 
 
-def test_a_resumed_calibration_continues_where_it_was_interrupted(
-    snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
-) -> None:
-    wizard = Wizard("each")
-    resumed = snapshot(State.APPLIED, record=aligned(record, alignments[0], ("left",)))
-    assert wizard.step(resumed) is Step.CONNECT
-    wizard.move(Action.NEXT, resumed)
-    assert wizard.view(resumed).main.label == "Align the right eye"
-
-
-def test_a_repeated_eye_stays_when_its_alignment_is_discarded(
-    snapshot: Maker, start: Snapshot
-) -> None:
-    wizard = Wizard("both")
-    wizard.view(snapshot(State.SOLVED))
-    wizard.move(Action.REPEAT_LEFT, snapshot(State.APPLIED))
-    wizard.view(snapshot(State.ALIGNED))
-    assert wizard.step(start) is Step.SHOW_HAND  # as after a redo
-    assert wizard.eyes(start) == ("left",)
-
-
-def test_giving_up_a_further_cursor_keeps_what_is_solved(snapshot: Maker) -> None:
-    wizard = Wizard()
-    wizard.view(snapshot(State.ALIGN))
-    view = wizard.view(snapshot(State.SHOW_HAND))
-    assert view.step is Step.SHOW_HAND
-    assert actions(view) == [Action.SOLVE]
-
-
-def test_changed_alignments_are_solved_again(snapshot: Maker) -> None:
-    wizard = Wizard()
-    wizard.view(snapshot(State.SOLVED))
-    view = wizard.view(snapshot(State.APPLIED, procedure={"results": None}))
-    assert view.main.action is Action.SOLVE
-
-
-def test_back_leads_through_every_free_step(start: Snapshot) -> None:
-    wizard = Wizard()
-    reach(wizard, start, Step.MAKE_CURSOR)
-    for step in (Step.SHOW_HAND, Step.CONNECT):
-        wizard.move(Action.BACK, start)
-        assert wizard.step(start) is step
-    assert Action.BACK not in actions(wizard.view(start))
-
-
-def test_after_the_end_one_may_go_back_and_on(snapshot: Maker, record: SessionRecord) -> None:
-    wizard = Wizard()
-    wizard.view(snapshot(State.SOLVED))
-    finished = snapshot(State.APPLIED, record=replace(record, is_finished=True))
-    wizard.move(Action.NEXT, finished)
-    assert wizard.view(finished).main.action is Action.NEXT_WEARER
-    wizard.move(Action.BACK, finished)
+def test_finish_leads_to_the_last_page_and_back_again(snapshot: Maker) -> None:
+    wizard = begun()
+    done = judged(snapshot, "accept", "accept", State.APPLIED)
+    wizard.move(Action.FINISH)
+    assert wizard.step(done) is Step.SAVE
+    wizard.move(Action.FINISH)  # of a session that was continued
+    assert wizard.step(done) is Step.SAVE
+    finished = replace(done, record=replace(done.record, is_finished=True))
+    view = wizard.view(finished)
+    assert view.main.action is Action.NEXT_WEARER
+    assert Action.SLIPPED in actions(view)
+    wizard.move(Action.BACK)
     assert wizard.step(finished) is Step.VERIFY
-    wizard.move(Action.NEXT, finished)
-    more = snapshot(State.APPLIED, record=replace(record, is_finished=False))
-    assert wizard.view(more).main.action is Action.FINISH
-
-
-def test_a_plan_of_one_eye_is_complete_with_it(
-    snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
-) -> None:
-    wizard = Wizard("left")
-    wizard.view(snapshot(State.SOLVED))
-    one = aligned(record, alignments[0], ("left",))
-    applied = judged(snapshot, "accept", "accept", State.APPLIED, record=one)
-    assert wizard.view(applied).main.label == "Finish"
-
-
-@pytest.mark.parametrize(
-    ("plan", "done", "wanted"),
-    [
-        ("both", [], EYES),
-        ("both", [EYES], EYES),
-        ("each", [], ("left",)),
-        ("each", [("left",)], ("right",)),
-        ("each", [("left",), ("right",)], ("left",)),
-        ("each", [EYES, ("left",)], ("right",)),
-        ("left", [("left",)], ("left",)),
-        ("right", [], ("right",)),
-    ],
-)
-def test_the_plan_says_whose_turn_it_is(
-    plan: EyePlan,
-    done: list[tuple[Eye, ...]],
-    wanted: tuple[Eye, ...],
-    alignments: tuple[Alignment, ...],
-) -> None:
-    made = [replace(alignments[0], eyes=eyes) for eyes in done]
-    assert next_eyes(plan, made) == wanted
-    planned = {"left": ("left",), "right": ("right",)}.get(plan, EYES)
-    assert is_complete(plan, made) == all(any(eye in eyes for eyes in done) for eye in planned)
-
-
-def test_the_engine_s_actions_are_no_moves(start: Snapshot) -> None:
-    with pytest.raises(ValueError, match="engine"):
-        Wizard().move(Action.SOLVE, start)
-    assert len(STEPS) == 7
 
 
 def test_an_eye_of_the_plan_that_is_not_aligned_leaves_align_without_a_tick(
-    snapshot: Maker, record: SessionRecord, alignments: tuple[Alignment, ...]
+    snapshot: Maker,
 ) -> None:
-    left = aligned(record, alignments[0], ("left",))
-    both = aligned(record, alignments[0], ("left",), ("right",))
-    for wizard in (Wizard("each"), PlannedWizard()):
-        seen = [wizard.view(snapshot(State.SOLVED, record=one)).is_aligned for one in (left, both)]
-        assert seen == [False, True]
+    solving = planned_snapshot(snapshot, StepName.APPLY)
+    left = replace(next(iter(solving.record.alignments.values())), eyes=("left",))
+    half = replace(solving, record=replace(solving.record, alignments={1: left}))
+    assert [begun().view(one).is_aligned for one in (half, solving)] == [False, True]
+    alone = replace(half, plan=replace(half.plan, usable_eyes=("left",)))
+    assert begun().view(alone).is_aligned

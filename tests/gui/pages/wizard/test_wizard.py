@@ -10,12 +10,10 @@ from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushB
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import SessionRecord
-from handcal.station.plan import StepName
+from handcal.station.plan import PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES
-from handcal_gui.pages.wizard.planned import PlannedWizard
-from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
@@ -24,7 +22,7 @@ from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.progress_ring import ProgressRing
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from tests.gui.helpers import text
-from tests.gui.views import NUDGED, VERIFIED, all_views, planned_snapshot
+from tests.gui.views import NUDGED, VERIFIED, all_views, begun, judged, planned_snapshot
 
 Maker = Callable[..., Snapshot]
 
@@ -38,6 +36,7 @@ def panel(qtbot: QtBot) -> WizardPanel:
     qtbot.addWidget(panel.bar)
     panel.bar.resize(900, panel.bar.height())
     panel.bar.show()
+    panel.wizard = begun(is_held=True)
     return panel
 
 
@@ -55,10 +54,10 @@ def test_the_main_button_asks_for_what_it_says(
     assert button.text() == "Solve"
     with qtbot.waitSignal(panel.asked) as asked:
         QTest.mouseClick(button, Qt.MouseButton.LeftButton)
-    assert asked.args == [Action.SOLVE]
+    assert asked.args == [Action.TAKE_STEP]
     with qtbot.waitSignal(panel.asked) as asked:
         panel.press_main()
-    assert asked.args == [Action.SOLVE]
+    assert asked.args == [Action.TAKE_STEP]
 
 
 def test_another_step_is_reported_once(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
@@ -93,11 +92,7 @@ def test_the_main_button_has_its_colour_only_where_a_press_is_needed_and_the_bar
         for theme in ("light", "dark"):
             use_theme(theme)
             panel.show_snapshot(snapshot(State.ALIGNED))
-            panel.hold(True)
             assert is_colored()
-            panel.hold(False)
-            assert not is_colored()  # solved by itself
-            panel.hold(True)
             for asked in (
                 snapshot(State.ALIGN),
                 snapshot(State.VERIFY, procedure={"verifying": NUDGED}),
@@ -209,16 +204,14 @@ def test_a_click_meant_for_the_button_before_does_not_discard(
 def test_the_focus_does_not_stay_on_a_button_that_becomes_another(
     qtbot: QtBot, panel: WizardPanel, snapshot: Maker
 ) -> None:
-    wizard = panel.wizard
-    wizard.view(snapshot(State.SOLVED))
-    panel.show_snapshot(snapshot(State.APPLIED))
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
+    panel.show_snapshot(accepted)
     other = child(panel, "wizardOther0")
     panel.bar.activateWindow()
     qtbot.waitActive(panel.bar)
     other.setFocus()
     assert other.hasFocus()
-    wizard.move(Action.ANOTHER, snapshot(State.APPLIED))
-    panel.show_snapshot(snapshot(State.APPLIED))
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.RAISE))
     assert other.text() == "&Back"
     assert panel.bar.focusWidget() is None
 
@@ -242,7 +235,7 @@ def test_the_key_shown_is_the_one_that_works(
     assert field.text() == " "
     with qtbot.waitSignal(panel.asked) as asked:
         QTest.keyClick(field, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
-    assert asked.args == [Action.SOLVE]
+    assert asked.args == [Action.TAKE_STEP]
     field.setReadOnly(True)
     field.clearFocus()
     assert key.text() == "Space"
@@ -253,16 +246,22 @@ def test_the_plan_is_chosen_before_the_cursor_is_made(
 ) -> None:
     plan = panel.findChild(QComboBox, "wizardPlan")
     assert isinstance(plan, QComboBox)
-    panel.start(Wizard("both"))
-    assert plan.currentText() == "Both eyes at once"
     panel.show_snapshot(snapshot(State.SHOW_HAND))
-    assert plan.isEnabled()
-    with qtbot.waitSignal(panel.plan_changed) as changed:
+    assert (plan.currentText(), plan.isEnabled()) == ("Both eyes at once", True)
+    with qtbot.waitSignal(panel.eyes_chosen) as chosen:
         plan.setCurrentText("Right eye only")
-    assert changed.args == ["right"]
-    assert panel.wizard.plan == "right"
-    panel.show_snapshot(snapshot(State.ALIGN))
+    assert chosen.args == ["right"]
+    panel.show_snapshot(snapshot(State.SHOW_HAND, number=2))
+    assert plan.currentText() == "Right eye only", "until the station has heard of it"
+    right = PlanSettings("paper", ("right",))
+    with qtbot.assertNotEmitted(panel.eyes_chosen):
+        panel.show_snapshot(snapshot(State.SHOW_HAND, plan=right))
+        panel.show_snapshot(snapshot(State.SHOW_HAND, plan=PlanSettings("paper", in_turn=True)))
+    assert plan.currentText() == "One eye after the other"
+    panel.show_snapshot(snapshot(State.ALIGN, plan=right))
     assert not plan.isEnabled()
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.RAISE))
+    assert not plan.isVisible(), "the recommended plan chooses"
 
 
 def test_the_refusal_is_read(panel: WizardPanel, snapshot: Maker) -> None:
@@ -279,11 +278,7 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_ey
 ) -> None:
     ring = panel.findChild(ProgressRing)
     assert isinstance(ring, ProgressRing)
-    panel.start(PlannedWizard(), is_held=False)
     first = planned_snapshot(snapshot, StepName.SOLVE)
-    panel.show_snapshot(first)
-    assert ring.share is None  # it counts, and no step runs itself
-    panel.wizard.move(Action.NEXT, first)
     panel.show_snapshot(first)
     assert "✓ Align" in _texts(panel)
     assert ring.accessibleDescription() == "2/2 aligned"
@@ -298,12 +293,7 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_ey
         alignments={},
         verified_now=frozenset({"left"}),
     )
-    slipped = replace(
-        planned_snapshot(
-            snapshot, StepName.VERIFY, alignments={}, verifications={"left": VERIFIED}
-        ),
-        record=again,
-    )
+    slipped = planned_snapshot(snapshot, StepName.VERIFY, record=again, verified={"left": VERIFIED})
     panel.show_snapshot(slipped)
     texts = _texts(panel)
     assert "✓ Show hand" in texts

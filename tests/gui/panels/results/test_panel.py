@@ -26,8 +26,9 @@ from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import colors
 from handcal_gui.widgets.number_table import NumberTable
-from handcal_gui.widgets.result_rows import QUANTITIES
+from handcal_gui.widgets.result_rows import REGISTRATION
 from tests.gui.helpers import child, show
+from tests.gui.views import with_target
 
 Make = Callable[..., Snapshot]
 
@@ -90,8 +91,8 @@ def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
     results = seen.procedure.results
     assert results is not None
     accepted = replace(results, verdicts=dict.fromkeys(EYES, Verdict("accept", "as told")))
-    procedure = replace(seen.procedure, results=accepted, target_arcmin=7.5)
-    seen = replace(seen, procedure=procedure)
+    procedure = replace(seen.procedure, results=accepted)
+    seen = replace(seen, procedure=procedure, settings=with_target(7.5))
     panel.resize(360, 416)
     both = {
         number: make_trial(rig.eyes[eye], eye, 0.4, accepted.eyes[eye].shift_m, [0.05, 0.0, 0.0])
@@ -202,7 +203,7 @@ def test_convergence_has_a_line_for_each_alignment_and_eye(
 def test_the_measures_of_fit_have_different_names(solved: ResultsPanel, results: Results) -> None:
     plot = child(solved, ConvergencePlot)
     assert plot.item.getAxis("left").labelText == "Surface RMS (mm)"
-    assert "Point RMS (mm)" in [quantity.name for quantity in QUANTITIES]
+    assert "Point RMS (mm)" in [quantity.name for quantity in REGISTRATION]
     shift = results.alignments[1]["left"]
     full = replace(shift, method="paper"), replace(shift, history_m2=np.array([shift.rms_m**2]))
     for one in full:

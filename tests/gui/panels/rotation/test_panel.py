@@ -9,10 +9,10 @@ import pytest
 from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
-from handcal.register.guard import turn_advice
+from handcal.register.guard import GuardSettings, turn_advice
 from handcal.session.journal import Event
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
+from handcal.station.states import CalibrationSettings, State
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.widgets.plots import Plot
@@ -77,10 +77,13 @@ def test_the_word_says_whether_it_may_be_confirmed(
     assert child(panel, RotationDial).is_over == expected.startswith("▲")
 
 
+def limited(limit_deg: float) -> CalibrationSettings:
+    return CalibrationSettings(guard=GuardSettings(limit_rad=float(np.radians(limit_deg))))
+
+
 def test_a_strict_limit_is_reported_however_small(panel: RotationPanel, snapshot: Make) -> None:
     seen = {"rotation_rad": np.radians([0.0, 1.5, 0.0]), "is_over_limit": True}
-    limit = {"guard_limit_rad": float(np.radians(1.0))}
-    panel.show_snapshot(snapshot(observation=seen, procedure=limit))
+    panel.show_snapshot(snapshot(observation=seen, settings=limited(1.0)))
     assert word(panel) == "▲ Turn back"
 
 
@@ -192,7 +195,7 @@ def test_refusals_are_counted_and_the_last_one_told(panel: RotationPanel, snapsh
 
 
 def test_the_limit_is_the_procedures(panel: RotationPanel, snapshot: Make) -> None:
-    panel.show_snapshot(snapshot(procedure={"guard_limit_rad": float(np.radians(5.0))}))
+    panel.show_snapshot(snapshot(settings=limited(5.0)))
     limit_line, _ = child(panel, Plot).item.listDataItems()
     np.testing.assert_allclose(limit_line.getData()[1], [5.0, 5.0])
 

@@ -20,6 +20,7 @@ from pytestqt.qtbot import QtBot
 from handcal.register.results import Results
 from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
+from handcal.session.state import SessionEvent
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
@@ -85,13 +86,11 @@ def test_alignments_that_are_not_written_yet_are_counted(
     panel: SessionPanel, snapshot: Callable[..., Snapshot], record: SessionRecord
 ) -> None:
     told = child(panel, QLabel, "unwritten")
-    first = dict([*record.alignments.items()][:1])
-    confirmed = {"alignments": record.alignments}
-    stored = replace(record, alignments=first)
-    seen = snapshot(State.SOLVED, record=stored, procedure=confirmed)
-    panel.show_snapshot(seen)
+    panel.show_snapshot(snapshot(State.SOLVED))
     assert not told.isVisible()
-    panel.show_snapshot(replace(seen, not_stored="cannot write"))
+    saved = [event for event in record.events if event.name == SessionEvent.ALIGNMENT_SAVED]
+    unwritten = replace(record, unwritten=(saved[-1],))
+    panel.show_snapshot(snapshot(State.SOLVED, record=unwritten))
     assert (told.text(), told.isVisible()) == ("1 alignment not written yet.", True)
     panel.show_snapshot(snapshot(State.SOLVED))
     assert not told.isVisible()
