@@ -307,7 +307,7 @@ class CalibrationController(QObject):
         panels.cloud.clear()
         self._wizard_panel.picture.begin()
         panels.fine_tune.set_rig(station.rig)
-        panels.results.show_results(None, {}, station.rig)
+        panels.results.show_results(None, {})
         panels.session.set_read_only(False)
         panels.trials.set_read_only(False)
         panels.link.show_pairing(

@@ -133,9 +133,7 @@ class ReviewController(QObject):
         panels = self._window.panels
         lack = _without_alignments(record)
         target_arcmin = stored.settings.verdict.target_arcmin
-        panels.results.show_results(
-            stored.results, record.alignments, record.rig, has_verdicts=False
-        )
+        panels.results.show_results(stored.results, record.alignments, has_verdicts=False)
         panels.results.show_trials(record, target_arcmin)
         panels.session.set_read_only(True)
         panels.session.show_record(record, stored.results)

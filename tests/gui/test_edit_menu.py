@@ -109,9 +109,9 @@ def test_results_are_copied_once_there_are_some(
     window: MainWindow, record: SessionRecord, results: Results
 ) -> None:
     window.show_page("review")
-    window.panels.results.show_results(results, record.alignments, record.rig)
+    window.panels.results.show_results(results, record.alignments)
     assert offered(window) == {"edit-copy": "Copy: Results"}
-    window.panels.results.show_results(None, {}, record.rig)
+    window.panels.results.show_results(None, {})
     assert offered(window) == {}
 
 

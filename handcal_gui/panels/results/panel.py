@@ -9,7 +9,6 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
 from handcal.register.results import Results
-from handcal.rig_types import Rig
 from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial
@@ -91,14 +90,13 @@ class ResultsPanel(QWidget):
         """Show the results of a snapshot if they have changed."""
         procedure, record = snapshot.procedure, snapshot.record
         if procedure.results is not self._results:
-            self.show_results(procedure.results, record.alignments, record.rig)
+            self.show_results(procedure.results, record.alignments)
         self.show_trials(record, snapshot.settings.solve.verdict.target_arcmin)
 
     def show_results(
         self,
         results: Results | None,
         alignments: Mapping[int, Alignment],
-        rig: Rig,
         *,
         has_verdicts: bool = True,
     ) -> None:
@@ -110,7 +108,6 @@ class ResultsPanel(QWidget):
         alignments : mapping of int to Alignment
             By number. A solved alignment that is missing here has no residual map, such as one
             that could not be written to a full disk.
-        rig : Rig
         has_verdicts : bool
             False if the page beside the panel shows the verdicts.
         """

@@ -178,7 +178,7 @@ def test_each_letter_of_a_stored_session_leads_to_one_place(
     review = child(window, ReviewPage)
     review.show_session(record, results, 8.0)
     window.panels.session.show_record(record, results)
-    window.panels.results.show_results(results, record.alignments, record.rig)
+    window.panels.results.show_results(results, record.alignments)
     window.show_page("review")
     around = letters(review, is_shown=True)
     assert len(around) == 4

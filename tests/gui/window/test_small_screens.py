@@ -301,7 +301,7 @@ def test_the_panels_of_a_stored_session_have_the_room_that_its_page_leaves(
 ) -> None:
     window, panel = program.window, program.window.panels.results
     window.resize(*SMALL_PX[0])
-    panel.show_results(results, record.alignments, record.rig)
+    panel.show_results(results, record.alignments)
     window.show_page("review")
     panel.show_comparison(replace(results, method="paper"))
     tabs, compare = child(panel, QTabWidget, "results-tabs"), child(panel, CompareTab)

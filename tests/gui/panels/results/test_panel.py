@@ -46,7 +46,7 @@ def panel(qtbot: QtBot) -> ResultsPanel:
 def solved(
     panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
 ) -> ResultsPanel:
-    panel.show_results(results, numbered(alignments), rig)
+    panel.show_results(results, numbered(alignments))
     return panel
 
 
@@ -118,7 +118,7 @@ def test_trials_stand_among_the_numbers_as_soon_as_they_are_recorded(
 def test_without_alignments_no_tab_is_of_them(
     panel: ResultsPanel, results: Results, rig: Rig
 ) -> None:
-    panel.show_results(replace(results, alignments={}), {}, rig)
+    panel.show_results(replace(results, alignments={}), {})
     tabs = child(panel, QTabWidget)
     seen = [tabs.tabText(i) for i in range(tabs.count()) if tabs.isTabVisible(i)]
     assert seen == ["Eyes", "Compare"]
@@ -181,7 +181,7 @@ def test_an_eye_without_part_is_not_judged(
     panel: ResultsPanel, alignments: Sequence[Alignment], rig: Rig
 ) -> None:
     one = replace(alignments[0], eyes=("right",))
-    panel.show_results(solve_session({3: one}, rig, SolveSettings()), {3: one}, rig)
+    panel.show_results(solve_session({3: one}, rig, SolveSettings()), {3: one})
     card = child(panel, VerdictCard, "verdict-left")
     texts = [label.text() for label in card.findChildren(QLabel)]
     assert "– Not solved" in texts
@@ -262,11 +262,11 @@ def test_the_map_shows_each_point_of_the_chosen_hand_once(
 def test_an_alignment_whose_cloud_is_missing_has_no_map(
     panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
 ) -> None:
-    panel.show_results(results, numbered(alignments[:1]), rig)
+    panel.show_results(results, numbered(alignments[:1]))
     child(panel, QTabWidget).setCurrentIndex(2)
     assert child(panel, QComboBox, "residuals-choice").count() == 2
     assert len(child(panel, ResidualMap).scatters[0].getData()[0])
-    panel.show_results(results, {}, rig)
+    panel.show_results(results, {})
     assert child(panel, QComboBox, "residuals-choice").count() == 0
     assert not len(child(panel, ResidualMap).scatters[0].getData()[0])
 
@@ -274,7 +274,7 @@ def test_an_alignment_whose_cloud_is_missing_has_no_map(
 def test_an_alignment_added_since_is_not_among_the_results(
     panel: ResultsPanel, results: Results, alignments: Sequence[Alignment], rig: Rig
 ) -> None:
-    panel.show_results(results, numbered([*alignments, alignments[0]]), rig)
+    panel.show_results(results, numbered([*alignments, alignments[0]]))
     table = child(panel, NumberTable, "each-alignment-alone")
     labels = [line.split("\t")[0] for line in table.as_text().splitlines()[1:]]
     assert labels == ["1 left", "1 right", "2 left", "2 right"]
@@ -332,7 +332,7 @@ def test_other_results_cancel_a_comparison_under_way(
 ) -> None:
     button(solved, "start").click()
     with qtbot.waitSignal(solved.compare_cancelled):
-        solved.show_results(replace(results), {}, rig)
+        solved.show_results(replace(results), {})
     assert button(solved, "start").isEnabled()
 
 
