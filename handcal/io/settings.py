@@ -56,6 +56,10 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
 
 def _convert(kind: Any, value: object, where: str) -> Any:
     """Convert a JSON value to the declared type of a field."""
+    alias = getattr(kind, "__value__", None)
+    if alias is not None:  # of a `type` statement, as NumPy's NDArray from 2.5 on
+        parts = get_args(kind)
+        return _convert(alias[parts] if parts else alias, value, where)
     origin, choices = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
         if value is None and type(None) in choices:

@@ -6,17 +6,20 @@ import json
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
 from types import UnionType
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typing_extensions import TypeAliasType
 
 from handcal.errors import FileError
 from handcal.io.settings import read_settings, settings_json
 from handcal.lab.demo import DemoSettings
 from handcal.register.fuse import FuseSettings
 from handcal.station.states import CalibrationSettings
+from handcal.types import Float64
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses
@@ -42,6 +45,22 @@ class Outer:
     limit_s: float | None = None
     names: tuple[str, ...] = ()
     inner: Inner = field(default_factory=Inner)
+
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+_Array = TypeAliasType(
+    "_Array", np.ndarray[tuple[Any, ...], np.dtype[_Scalar]], type_params=(_Scalar,)
+)
+_Words = TypeAliasType("_Words", tuple[str, ...])
+
+
+@dataclass(frozen=True, eq=False)
+class Aliased:
+    """What `type` statements name, as NumPy's NDArray is one from 2.5 on."""
+
+    place_m: _Array[np.float64]
+    other_m: Float64 | None = None
+    words: _Words = ()
 
 
 def any_settings(kind: type) -> st.SearchStrategy[Any]:
@@ -160,3 +179,17 @@ def test_shipped_settings_are_plain_values(settings: Any) -> None:
 def test_a_field_without_a_name_is_refused() -> None:
     with pytest.raises(FileError, match="settings has no field without a name; it has count"):
         read_settings(Outer, {"": 1})
+
+
+def test_what_an_alias_names_is_read_as_that() -> None:
+    data = {"place_m": [1, 2.5], "other_m": [[3.0], [4.0]], "words": ["a", "b"]}
+    read = read_settings(Aliased, data)
+    assert read.other_m is not None
+    np.testing.assert_array_equal(read.place_m, [1.0, 2.5])
+    np.testing.assert_array_equal(read.other_m, [[3.0], [4.0]])
+    assert read.place_m.dtype == np.float64
+    assert read.words == ("a", "b")
+    with pytest.raises(FileError, match=r"^settings\.place_m must be an array of finite numbers"):
+        read_settings(Aliased, data | {"place_m": [1.0, "x"]})
+    with pytest.raises(FileError, match=r"^settings\.words must be a text, not '3'"):
+        read_settings(Aliased, data | {"words": [3]})
