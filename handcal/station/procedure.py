@@ -27,7 +27,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,7 +40,7 @@ from handcal.link.nudges import VerifyRequest
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
 from handcal.register.results import Results, results_json
-from handcal.session.facts import CameraUsed
+from handcal.session.facts import CameraUsed, facts_json
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import VERIFYING, WENT_BACK
 from handcal.station.aligning import KEEP_PROMPT, Accepted, Aligning, Refused, align_prompt
@@ -76,6 +76,7 @@ from handcal.types import (
     EyePlan,
     Float64,
     Frame,
+    HeadsetIdentity,
     Verification,
 )
 
@@ -175,6 +176,7 @@ class Calibration:
         self._aligning: Aligning | None = None
         self._cursor_id = 0
         self._sent_cursor: Outgoing | None = None
+        self._headset: HeadsetIdentity | None = None
         self._looks_around = False
         self._before_verifying = State.SHOW_HAND
         self._apply_until_s = 0.0
@@ -278,6 +280,7 @@ class Calibration:
         LinkError
             If the link is closed.
         """
+        self._record_headset()
         observation = self._sight.see(
             frame,
             self.camera,
@@ -808,6 +811,21 @@ class Calibration:
             with suppress(FileError):  # the cursor, recorded next, raises it again
                 self._session.save_facts(camera=used)
 
+    def _record_headset(self) -> None:
+        """Record a headset that has introduced itself, if it is new.
+
+        It is new with another device, name, runtime, app or protocol, or once it tells its views or
+        an eye distance. What eye tracking changes many times a minute, where the views are and how
+        far apart the eyes, is not recorded again.
+        """
+        device, known = self._link.device, self._session.contents.facts.headset
+        if device is None or device is self._headset:
+            return
+        self._headset = device
+        if known is None or _named(device) != _named(known):
+            with suppress(FileError):
+                self._session.save_facts(headset=device)
+
     def _require_settled(self, what: str) -> None:
         if self.state in _UNSETTLED:
             raise ProcedureError(f"{what} cannot be changed now ({self.state})")
@@ -928,6 +946,12 @@ def _moved(hand: PlacedHand, displacement_W_m: ArrayLike) -> PlacedHand:
         points_W_m=hand.points_W_m + moved_m,
         middle_W_m=hand.middle_W_m + moved_m,
     )
+
+
+def _named(device: HeadsetIdentity) -> Any:
+    """Return what makes two introductions those of one headset, without what the eyes move."""
+    known = sorted(device.views), device.eye_distance_m is not None
+    return facts_json(replace(device, views={}, eye_distance_m=None)), known
 
 
 def _earlier_evidence(record: SessionRecord) -> list[Contradiction]:

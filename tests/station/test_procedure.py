@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,15 +16,17 @@ from handcal.geometry import invert, rigid, transform
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.register.results import results_json
+from handcal.session.facts import facts_json
 from handcal.session.session import Session
 from handcal.station.evidence import FROZEN_FRAMES
 from handcal.station.procedure import Calibration
 from handcal.station.states import CalibrationSettings, ProcedureError, State
-from handcal.types import EYES, Eye, Float64, Frame
+from handcal.types import EYES, Eye, Float64, Frame, HeadsetIdentity, HeadsetView
 from tests.helpers import eventually
 from tests.station.stage import (
     CAMERA,
     CAMERA_AHEAD_NS,
+    IDENTITY,
     PERIOD_NS,
     RIG,
     SENSOR,
@@ -34,6 +37,8 @@ from tests.station.stage import (
     depth_of,
     events,
 )
+
+TANGENTS = np.array([-0.3, 0.3, 0.2, -0.2])
 
 
 def cursor_for(
@@ -109,13 +114,53 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
     assert record.results == results_json(results)
     assert record.alignments[1].hand_m.tobytes() == alignment.hand_m.tobytes()
     assert [name for name, _ in events(session)] == [
-        "created", "facts_saved", "cursor_made", "alignment_saved", "solved", "applied",
+        "created", "facts_saved", "facts_saved", "cursor_made", "alignment_saved", "solved",
+        "applied",
     ]  # fmt: skip
     assert record.facts.camera is not None
     assert record.facts.camera.depth_intrinsics == CAMERA
     age_s = record.alignment_facts[1].match_age_s
     assert age_s is not None
     assert 0.0 <= age_s <= CalibrationSettings().match_tolerance_s
+
+
+def test_the_headset_is_stored_when_it_is_another_and_not_when_its_eyes_move(
+    server: HeadsetServer, client: HeadsetClient, session: Session
+) -> None:
+    views: dict[Eye, HeadsetView] = {
+        eye: HeadsetView(rigid([0.0, 0.0, 0.0], [x_m, 0.0, 0.0]), TANGENTS, 1268, 720)
+        for eye, x_m in zip(EYES, (0.0321, -0.0322), strict=True)
+    }
+    moved = views | {"left": replace(views["left"], T_V_H=np.eye(4))}
+    told = [
+        IDENTITY,
+        replace(IDENTITY, views=views),
+        replace(IDENTITY, views=views, eye_distance_m=0.0631),
+        replace(IDENTITY, views=moved, eye_distance_m=0.0632),  # as the eyes are tracked
+        replace(IDENTITY, views=moved, eye_distance_m=0.0632, app="app 2"),
+    ]
+
+    def stored() -> list[Any]:
+        return [data["headset"] for name, data in events(session) if name == "facts_saved"]
+
+    def introduce(stage: Stage, identity: HeadsetIdentity) -> None:
+        client.set_identity(identity)
+        eventually(lambda: facts_json(server.device) == facts_json(identity))
+        for _ in range(2):
+            stage.see(None)
+
+    first = Stage(server, client, session)
+    for identity in told:
+        introduce(first, identity)
+    assert stored() == [facts_json(told[number]) for number in (0, 1, 2, 4)]
+    record = Session.open(session.path)
+    assert facts_json(record.facts.headset) == facts_json(told[4])
+
+    again = Stage(server, client, session)
+    introduce(again, told[4])
+    assert len(stored()) == 4
+    introduce(again, replace(told[4], runtime="runtime 2"))
+    assert stored()[4]["runtime"] == "runtime 2"
 
 
 def test_one_eye_at_a_time_finds_each_eye(stage: Stage) -> None:

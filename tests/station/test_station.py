@@ -21,6 +21,7 @@ from handcal.link.pairing import new_pairing_key
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.rig.example import example_rig
+from handcal.session.facts import facts_json
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
@@ -108,6 +109,10 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
             PATIENCE_S,
         )
         assert (steady.problem, steady.link_problem, steady.camera.problem) == ("", "", "")
+        assert station.headset is not None
+        assert set(station.headset.views) == set(EYES)
+        stored = Session.open(station.session.path).facts.headset
+        assert facts_json(stored) == facts_json(station.headset)
         with pytest.raises(ProcedureError, match="solve the left eye"):
             station.trials.save("left", 0.5)
         with pytest.raises(ProcedureError, match="solve and apply"):
