@@ -81,7 +81,7 @@ def _depthwise(tensors: _Tensors, number: int) -> tuple[Float32, Float32]:
         tensors[f"{layer}/BatchNorm/{name}"]
         for name in ("gamma", "beta", "moving_mean", "moving_variance")
     )
-    factor = gamma / np.sqrt(variance + _EPSILON)
+    factor = (gamma / np.sqrt(variance + _EPSILON)).astype(np.float32)  # as it is already
     weights = tensors[f"{layer}/depthwise_weights"].transpose(2, 3, 0, 1)
     return weights * factor[:, None, None, None], beta - mean * factor
 

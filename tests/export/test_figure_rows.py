@@ -41,7 +41,7 @@ def test_residuals_are_the_means_of_the_points_in_each_cell(outcome: SessionOutc
         low_mm = np.array([row["x_mm"], row["y_mm"]], dtype=float)
         is_in = ((hand_mm >= low_mm - 1e-9) & (hand_mm < low_mm + CELL_MM - 1e-9)).all(axis=1)
         inliers_m = shift.residuals_m[is_in & np.isfinite(shift.residuals_m)]
-        assert (row["points"], row["inliers"]) == (is_in.sum(), len(inliers_m))
+        assert (row["points"], row["inliers"]) == (int(is_in.sum()), len(inliers_m))
         if len(inliers_m):
             assert row["mean_residual_mm"] == pytest.approx(1e3 * inliers_m.mean())
         else:

@@ -248,5 +248,5 @@ def test_real_hands_are_found_in_dim_light(shared_data: Path, model: str, skin: 
         color = read_image(folder / name, cv2.IMREAD_COLOR_RGB)
         boxes = hands.detect((0.3 * color).astype(np.uint8)).boxes_px
         [hand] = entries[name]["hands"]
-        hits += overlaps(boxes, np.array([hand["box"]])).max(initial=0.0) >= 0.5
+        hits += int(overlaps(boxes, np.array([hand["box"]])).max(initial=0.0) >= 0.5)
     assert hits >= 0.85 * len(chosen)

@@ -113,10 +113,9 @@ def test_contour_goes_around_the_hand_in_order(shot: Shot) -> None:
     step_m = np.linalg.norm(np.diff(cloud.contour_m[:, :2], axis=0), axis=1)
     assert np.median(step_m) < 0.002
     assert np.percentile(step_m, 98) < 0.01
-    x0, y0, x1, y1 = cloud.box_px
     rows, columns = np.nonzero(cloud.mask)
-    assert (x0, y0) == (columns.min(), rows.min())
-    assert (x1, y1) == (columns.max() + 1, rows.max() + 1)
+    around = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+    assert list(cloud.box_px) == [int(edge) for edge in around]
 
 
 @pytest.mark.parametrize("wall_m", [0.60, 0.66, 0.72])
