@@ -10,27 +10,44 @@ fail() {
 }
 
 # What the wheels load from the system: librealsense needs libusb and udev, Open3D and Qt need
-# OpenGL, and Qt's windows the libraries of X11. A caller may ask for more in test_packages.
-apt_packages=(
-    python3 python3-venv
-    libusb-1.0-0 libudev1 libgl1 libegl1 libx11-6 libidn2-0
-    libglib2.0-0 libfontconfig1 libdbus-1-3 libxkbcommon0 libxkbcommon-x11-0 fonts-dejavu-core
-    libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0
-    libxcb-shape0 libxcb-xkb1 libxcb-shm0 libxcb-sync1 libxcb-xfixes0 libx11-xcb1
-    ${test_packages[@]+"${test_packages[@]}"}
+# OpenGL, and Qt's windows the libraries of X11. Each is a library, program or file, and Debian's
+# package of it. Packages are renamed, as libglib2.0-0 on Debian 13; apt-get knows the former name.
+system_needs=(
+    python3=python3 libusb-1.0.so.0=libusb-1.0-0 libudev.so.1=libudev1 libGL.so.1=libgl1
+    libEGL.so.1=libegl1 libX11.so.6=libx11-6 libX11-xcb.so.1=libx11-xcb1 libidn2.so.0=libidn2-0
+    libglib-2.0.so.0=libglib2.0-0 libfontconfig.so.1=libfontconfig1 libdbus-1.so.3=libdbus-1-3
+    libxkbcommon.so.0=libxkbcommon0 libxkbcommon-x11.so.0=libxkbcommon-x11-0
+    libxcb-cursor.so.0=libxcb-cursor0 libxcb-icccm.so.4=libxcb-icccm4
+    libxcb-image.so.0=libxcb-image0 libxcb-keysyms.so.1=libxcb-keysyms1
+    libxcb-randr.so.0=libxcb-randr0 libxcb-render-util.so.0=libxcb-render-util0
+    libxcb-shape.so.0=libxcb-shape0 libxcb-xkb.so.1=libxcb-xkb1 libxcb-shm.so.0=libxcb-shm0
+    libxcb-sync.so.1=libxcb-sync1 libxcb-xfixes.so.0=libxcb-xfixes0
+    /usr/share/fonts/truetype/dejavu/DejaVuSans.ttf=fonts-dejavu-core
+    ${test_needs[@]+"${test_needs[@]}"}
 )
 
+# Prints the packages of what is not there.
+missing_packages() {
+    local libraries need
+    libraries=$(PATH=$PATH:/usr/sbin:/sbin ldconfig -p)
+    for need in "${system_needs[@]}"; do
+        case ${need%=*} in
+        /*) [[ -e ${need%=*} ]] ;;
+        *.so.*) [[ $libraries == *[[:space:]]"${need%=*} (libc6,"* ]] ;; # 64 bits: 32 have no comma
+        *) command -v "${need%=*}" >/dev/null ;;
+        esac || echo "${need#*=}"
+    done
+    python3 -c 'import venv, ensurepip' 2>/dev/null || echo python3-venv
+}
+
 install_system_packages() {
-    command -v dpkg-query >/dev/null || {
-        echo "handcal: not a Debian system; these must be there: ${apt_packages[*]}" >&2
+    local missing
+    mapfile -t missing < <(missing_packages)
+    [[ ${#missing[@]} -eq 0 ]] && return
+    command -v apt-get >/dev/null || {
+        echo "handcal: not a Debian system; these must be there: ${missing[*]}" >&2
         return
     }
-    local missing=() package
-    for package in "${apt_packages[@]}"; do
-        dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
-            missing+=("$package")
-    done
-    [[ ${#missing[@]} -eq 0 ]] && return
     local as_root=()
     if [[ $EUID -ne 0 ]]; then
         command -v sudo >/dev/null || fail "as root, run: apt-get install ${missing[*]}"

@@ -4,8 +4,13 @@
 # Arguments go to pytest: -m quick for a check within two minutes, -m "" for every test.
 set -euo pipefail
 lock=installer/requirements.lock # everything, also what the checks and the extras need
-# Real windows on a virtual screen, PDF pages, the headset's program in C#, sockets that are opened.
-test_packages=(xvfb xauth xdotool poppler-utils mono-mcs mono-runtime strace)
+# Real windows on a virtual screen, PDF pages, the headset's program in C#, sockets that are opened,
+# a Turkish locale, faults of system calls.
+test_needs=(
+    Xvfb=xvfb xauth=xauth xdotool=xdotool pdftoppm=poppler-utils mcs=mono-mcs mono=mono-runtime
+    strace=strace /usr/share/i18n/locales/tr_TR=locales cc=gcc
+    /usr/include/stdio.h=libc6-dev
+)
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 export HANDCAL_REQUIRE_MONO=1 # installed above: no test may be skipped for want of it
