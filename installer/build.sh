@@ -7,7 +7,7 @@
 #                                      handcal-open3d-VERSION-windows.zip, to unpack beside it
 #   bash installer/build.sh all
 # Runs on Debian 12 or newer with Python 3.11 to 3.13 (PYTHON names another than python3); deb
-# needs binutils, windows needs nsis, zip and unzip. docs/platforms.md says what was measured.
+# needs binutils and libpython3.X, windows needs nsis, zip and unzip. docs/platforms.md says what was measured.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 work=$PWD/dist/work
@@ -20,6 +20,29 @@ fail() {
 
 require() {
     command -v "$1" >/dev/null || fail "$1 is missing; run apt-get install $2"
+}
+
+# Each is asked for what its programs need before anything is built, which takes minutes.
+needs_wheel() { :; }
+
+needs_deb() {
+    require objdump binutils
+    # PyInstaller bundles Python's shared library, which Debian's python3 runs without.
+    local library
+    library=$("${PYTHON:-python3}" -c 'import sys; print("libpython%d.%d" % sys.version_info[:2])')
+    "${PYTHON:-python3}" -c 'import ctypes, os, sys, sysconfig
+name = sys.argv[1] + ".so.1.0"
+path = os.path.join(sysconfig.get_config_var("LIBDIR"), name)
+ctypes.CDLL(path if os.path.exists(path) else name)' "$library" 2>/dev/null ||
+        fail "$library.so.1.0 is missing; run apt-get install $library"
+}
+
+needs_deb-open3d() { needs_deb; }
+
+needs_windows() {
+    require makensis nsis
+    require unzip unzip
+    require zip zip
 }
 
 # Installs the tools and the packages of a lock by their hashes: make_environment FOLDER LOCK
@@ -51,7 +74,6 @@ build_deb-open3d() {
 
 # make_deb PACKAGE PYTHON OTHER SENTENCE: of the packages of a Python, in place of another package.
 make_deb() {
-    require objdump binutils
     local package=$1 python=$2 other=$3 sentence=$4 root=$work/deb depends size
     "$python" -m pip --quiet install --no-deps --force-reinstall "$wheel"
     # Elsewhere, so that it finds the installed program and not the checkout.
@@ -103,9 +125,6 @@ system_packages() {
 }
 
 build_windows() {
-    require makensis nsis
-    require unzip unzip
-    require zip zip
     local root=$work/windows open3d=$work/handcal-open3d file=handcal-open3d-$version-windows.zip
     rm -rf "$root" "$open3d" "dist/$file"
     mkdir -p "$root" "$open3d"
@@ -141,6 +160,9 @@ wheel | deb | deb-open3d | windows) wanted=(wheel "$1") ;;
 all) wanted=(wheel deb deb-open3d windows) ;;
 *) fail "say what to build: wheel, deb, deb-open3d, windows or all" ;;
 esac
+for one in "${wanted[@]}"; do
+    "needs_$one"
+done
 mkdir -p "$work"
 make_environment "$work/venv" installer/requirements-build.lock
 for one in $(printf '%s\n' "${wanted[@]}" | awk '!seen[$0]++'); do
