@@ -49,9 +49,13 @@ GOLDEN = DATA / "golden.json"
 MODE = os.environ.get("HANDCAL_GOLDEN", "")
 TEXTS = "*.csv", "*.json", "*.yaml"
 POINTS, DEPTH_SIGMA_M = 1500, 0.001
-# Relative and absolute. The iteration of `paper` swings between two states and amplifies rounding:
-# with OpenBLAS's kernels for other processors its φ differs by up to 0.014 mm.
-ROUNDED, UNSETTLED = (1e-6, 1e-9), (0.1, 3e-5)
+# Relative and absolute. The iteration of `paper` swings between two states until its limit, and
+# amplifies rounding: with OpenBLAS's kernels for other processors its φ differs by up to 0.014 mm,
+# with NumPy 2.5 and SciPy 1.18 by 0.069 mm. So it does with the lock that wrote the numbers if
+# every coordinate of the hand clouds is moved by ±1e-12 m: by up to 0.10 mm in 72 tries.
+ROUNDED, UNSETTLED, OTHER_LOCK = (1e-6, 1e-9), (0.1, 3e-5), (0.1, 1.5e-4)
+WRITTEN_WITH = "2.4."
+"""NumPy of the lock that wrote the numbers, of Python 3.11; newer Pythons take another."""
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 
@@ -151,7 +155,8 @@ def simulated_alignments(seed: int) -> list[Alignment]:
 def test_the_example_session_solved(method: Any, golden: dict[str, Any]) -> None:
     record = Session.open(resource_path("example_session"))
     results = solve_again(record, SolveSettings(method=method))
-    tolerance = UNSETTLED if method == "paper" else ROUNDED
+    unsettled = UNSETTLED if np.__version__.startswith(WRITTEN_WITH) else OTHER_LOCK
+    tolerance = unsettled if method == "paper" else ROUNDED
     check(f"example-{method}", solved(results), golden, tolerance)
 
 
