@@ -10,6 +10,9 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+NOT_RUN = 77
+"""Exit code of a campaign that lacks what it needs; 77 as of Automake's skipped tests."""
+
 
 @dataclass(slots=True)
 class Tally:
@@ -47,6 +50,8 @@ class Tally:
 def campaign(what: str, run: Callable[[Tally, bool], None]) -> None:
     """Run a campaign, in its short form with ``--short``; exit with 1 if anything failed.
 
+    The exit code is `NOT_RUN` if nothing could be tried here.
+
     `run` gets a tally to fill, and True for the short form.
     """
     parser = argparse.ArgumentParser(description=what)
@@ -59,4 +64,4 @@ def campaign(what: str, run: Callable[[Tally, bool], None]) -> None:
     if not tally.tried and not tally.note:
         tally.fail("nothing was tried")
     print(tally.line(time.monotonic() - start_s), flush=True)  # noqa: T201
-    sys.exit(bool(tally.failures))
+    sys.exit(1 if tally.failures else 0 if tally.tried else NOT_RUN)
