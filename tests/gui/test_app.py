@@ -9,6 +9,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -40,16 +42,22 @@ def complaint(
     return errors
 
 
-def run(*words: str | Path) -> subprocess.Popen[str]:
+@contextmanager
+def run(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
+    """Start the program; it ends with the block, whatever fails there."""
     environment = os.environ | {"QT_QPA_PLATFORM": "offscreen", "OMP_NUM_THREADS": "1"}
     environment["QT_LOGGING_RULES"] = "default.warning=false"  # what offscreen cannot do
-    return subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-m", "handcal_gui", *map(str, words)],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-    )
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize(
@@ -113,10 +121,10 @@ def test_help_tells_every_option(
 @pytest.mark.process
 def test_pictures_that_cannot_be_saved_end_it_before_it_begins(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    process = run(
+    with run(
         "--screenshots", tmp_path / "file", "--preferences", tmp_path / "preferences.json"
-    )
-    _, errors = process.communicate(timeout=START_S)
+    ) as process:
+        _, errors = process.communicate(timeout=START_S)
     assert process.returncode == 2, errors
     assert errors.count("\n") == 1
     assert "file" in errors
@@ -125,10 +133,10 @@ def test_pictures_that_cannot_be_saved_end_it_before_it_begins(tmp_path: Path) -
 @pytest.mark.process
 def test_a_picture_that_cannot_be_saved_ends_it(tmp_path: Path) -> None:
     (tmp_path / "pictures" / "start.png").mkdir(parents=True)
-    process = run(
+    with run(
         "--screenshots", tmp_path / "pictures", "--preferences", tmp_path / "preferences.json"
-    )
-    _, errors = process.communicate(timeout=START_S)
+    ) as process:
+        _, errors = process.communicate(timeout=START_S)
     assert (process.returncode, errors.count("\n")) == (1, 1), errors
     assert "cannot write" in errors
     assert "start.png" in errors
@@ -146,24 +154,27 @@ def test_it_starts_where_the_capital_of_i_has_a_dot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = tmp_path / "tr_TR.UTF-8"
-    subprocess.run(["localedef", "-i", "tr_TR", "-f", "UTF-8", made], check=False)
-    if not made.exists():
+    # Without Debian's package locales it fails, but leaves an empty folder.
+    if subprocess.run(["localedef", "-i", "tr_TR", "-f", "UTF-8", made], check=False).returncode:
         pytest.skip("no definitions of locales, which Debian's package locales has")
     monkeypatch.setenv("LOCPATH", str(tmp_path))
     monkeypatch.setenv("LC_ALL", made.name)
+    loaded = "import locale; print(locale.setlocale(locale.LC_ALL, ''))"
+    found = subprocess.check_output([sys.executable, "-c", loaded], text=True)
+    assert found.strip() == made.name  # a locale that cannot be loaded raises
     start_and_end(tmp_path)
 
 
 def start_and_end(folder: Path) -> None:
     """Start the program, tell it to end, and expect that it ends well."""
     preferences = folder / "preferences.json"
-    process = run("--preferences", preferences, folder / "no session")
-    deadline_s = time.monotonic() + START_S
-    while process.poll() is None and not is_listening(process.pid):
-        assert time.monotonic() < deadline_s
-        time.sleep(0.1)
-    process.send_signal(signal.SIGTERM)
-    _, errors = process.communicate(timeout=START_S)
+    with run("--preferences", preferences, folder / "no session") as process:
+        deadline_s = time.monotonic() + START_S
+        while process.poll() is None and not is_listening(process.pid):
+            assert time.monotonic() < deadline_s
+            time.sleep(0.1)
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=START_S)
     assert (process.returncode, errors) == (0, "")
     assert preferences.exists()  # the window's place is remembered
 
