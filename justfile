@@ -18,6 +18,10 @@ test *arguments:
 test-all:
     bash installer/test.sh -m ""
 
+# both commands of the README on bare systems of Debian 12 and 13, as root; about half an hour
+matrix *arguments:
+    bash installer/matrix.sh {{arguments}}
+
 # the documentation site, in results/site
 docs:
     mkdocs build --strict
