@@ -21,12 +21,12 @@ command -v debootstrap >/dev/null || fail "debootstrap is missing; run apt-get i
 
 # Makes a bare system with the clone in it, and this computer's way to the network: make SYSTEM SUITE
 make() {
-    local system=$1 suite=$2 file
+    local system=$1 suite=$2
     rm -rf --one-file-system "$system"
     debootstrap --variant=minbase "$suite" "$system"
-    for file in /etc/resolv.conf /etc/pip.conf /etc/ssl/certs/ca-certificates.crt; do
-        [[ ! -e $file ]] || install -D "$file" "$system$file"
-    done
+    cp /etc/resolv.conf "$system/etc"
+    # Elsewhere than at home, where the package ca-certificates would replace them.
+    cp /etc/ssl/certs/ca-certificates.crt "$system/root"
     git clone -q . "$system/root/handcal"
     [[ ! -d ../shared ]] || mkdir "$system/root/shared"
 }
@@ -34,7 +34,9 @@ make() {
 # Runs a command of the clone in a system, whose mounts end with it: inside SYSTEM COMMAND
 inside() {
     local network
-    mapfile -t network < <(env | grep -iE '^(pip|ssl)_|_proxy=')
+    local certificates=/root/ca-certificates.crt
+    mapfile -t network < <(env | grep -iE '^pip_|_proxy=')
+    network+=("PIP_CERT=$certificates" "SSL_CERT_FILE=$certificates")
     # shellcheck disable=SC2016
     unshare --mount bash -c '
         set -e
