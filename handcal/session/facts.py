@@ -63,7 +63,7 @@ class AlignmentFacts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionFacts:
-    """Facts about a session; None or empty where unknown, as in sessions of older versions."""
+    """Facts about a session; None or empty where unknown."""
 
     camera: CameraUsed | None = None
     headset: HeadsetIdentity | None = None

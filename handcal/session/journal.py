@@ -17,12 +17,8 @@ from handcal.errors import FileError
 from handcal.io.files import read_limited, whole_number, write_atomic
 
 JOURNAL_VERSION = 3
-"""Version 3 added checksums and facts; 2 deletion, trials and fine-tuning; all can be read."""
-
 MAX_JOURNAL_BYTES = 64 * 2**20
 JOURNAL, JOURNAL_END = "journal.jsonl", "journal.end"
-UPGRADED = "upgraded"
-"""The event between the lines of an older version and those of this one."""
 _MAX_END_BYTES = 1024
 _CHECKSUM_DIGITS = 32
 
@@ -65,12 +61,8 @@ class JournalContent:
     """Length of the complete lines."""
     torn_bytes: int
     """Length of an incomplete last line, which is ignored; 0 if there is none."""
-    version: int = JOURNAL_VERSION
-    """Version of the last sound line."""
     next_number: int = 1
     """Number of the next event; greater than that of any damaged or missing line."""
-    sha256: str = ""
-    """Checksum of the complete lines of a journal of an older version; else empty."""
     ended: int = 0
     """Number of the last event when the journal was closed; 0 if it never was."""
     notes_sha256: str | None = None
@@ -106,20 +98,17 @@ def read_journal(path: Path) -> JournalContent:
     Raises
     ------
     FileError
-        If it cannot be read, is too large, of an unknown version, or without any sound line.
+        If it cannot be read, is too large, of another version, or without any sound line.
     """
     content = read_limited(path, MAX_JOURNAL_BYTES)
     *lines, torn = content.split(b"\n")
     events: list[Event] = []
     damaged: list[Damage] = []
-    version, expected, done_bytes = 0, 1, 0
+    expected, done_bytes = 1, 0
     for place, line in enumerate(lines, 1):
         try:
-            found, event = _parse_line(line)
-            last = events[-1].number if events else 0
-            # Lines of versions 1 and 2 have no checksum: a number far off is a changed digit.
-            is_far = found < JOURNAL_VERSION and abs(event.number - expected) > 1
-            if found < version or event.number <= last or is_far:
+            event = _parse_line(path, line)
+            if event.number <= (events[-1].number if events else 0):
                 raise ValueError("is not the event expected there")
         except ValueError as error:
             damaged.append(Damage(path.name, place, f"{error}; left out"))
@@ -127,12 +116,8 @@ def read_journal(path: Path) -> JournalContent:
         else:
             if event.number > expected:
                 damaged.append(_missing(path, place, expected, event.number - 1))
-            before = event.data.get("journal_sha256") if event.name == UPGRADED else None
-            if before is not None and before != _sha256(content[:done_bytes]):
-                changed = "the lines before it, of an older version, have changed since"
-                damaged.append(Damage(path.name, place, changed))
             events.append(event)
-            version, expected = found, event.number + 1
+            expected = event.number + 1
         done_bytes += len(line) + 1
     if not events:
         why = damaged[0].what.removesuffix("; left out") if damaged else "is missing"
@@ -144,9 +129,7 @@ def read_journal(path: Path) -> JournalContent:
         events=tuple(events),
         complete_bytes=done_bytes,
         torn_bytes=len(torn),
-        version=version,
         next_number=max(expected, ended + 1),
-        sha256=_sha256(content[:done_bytes]) if version < JOURNAL_VERSION else "",
         ended=ended,
         notes_sha256=notes_sha256,
         damaged=tuple(damaged),
@@ -231,11 +214,8 @@ class JournalWriter:
 
 
 def _ending(content: bytes) -> bytes:
-    return b', "sha256": "%s"}\n' % _sha256(content)[:_CHECKSUM_DIGITS].encode()
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+    checksum = hashlib.sha256(content).hexdigest()[:_CHECKSUM_DIGITS]
+    return b', "sha256": "%s"}\n' % checksum.encode()
 
 
 def _missing(path: Path, place: int, first: int, last: int) -> Damage:
@@ -243,29 +223,29 @@ def _missing(path: Path, place: int, first: int, last: int) -> Damage:
     return Damage(path.name, place, f"{what} missing here")
 
 
-def _parse_sound(line: bytes) -> dict[str, Any]:
-    """Return the object in a line with its checksum, which versions 1 and 2 do not have.
+def _parse_sound(path: Path, line: bytes) -> dict[str, Any]:
+    """Return the object in a line that ends with its checksum.
 
     Raises
     ------
     FileError
-        If the line is sound, but of an unknown version.
+        If the line is sound, but of another version.
     ValueError
         If it is damaged.
     """
     try:
         fields: dict[str, Any] = json.loads(line, parse_int=whole_number)
-        version, has_checksum = fields["version"], "sha256" in fields
+        version = fields["version"]
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise ValueError("is not an event of a session") from error
     content = line[: 1 - len(_ending(b""))] + b"}"
     is_sound = line + b"\n" == content[:-1] + _ending(content)
-    if type(version) is not int or not 1 <= version <= JOURNAL_VERSION:
-        problem = f"has version {version!r}, not one of 1 to {JOURNAL_VERSION}"
+    if type(version) is not int or version != JOURNAL_VERSION:
+        problem = f"has version {version!r}, not {JOURNAL_VERSION}; use the handcal that wrote it"
         if is_sound:
-            raise FileError(f"the session's journal {problem}; update handcal to read it")
+            raise FileError(f"{path} {problem}")
         raise ValueError(problem)
-    if not is_sound and (version == JOURNAL_VERSION or has_checksum):
+    if not is_sound:
         raise ValueError("does not have its checksum")
     return fields
 
@@ -279,9 +259,9 @@ def find_journals(folder: Path) -> list[Path]:
     return [journal for journal in journals if os.path.exists(journal)]
 
 
-def _parse_line(line: bytes) -> tuple[int, Event]:
-    """Return the version and the event of a line; ValueError if it is damaged."""
-    fields = _parse_sound(line)
+def _parse_line(path: Path, line: bytes) -> Event:
+    """Return the event of a line; ValueError if it is damaged."""
+    fields = _parse_sound(path, line)
     try:
         event = Event(fields["number"], fields["time"], fields["event"], fields["data"])
     except KeyError as error:
@@ -289,7 +269,7 @@ def _parse_line(line: bytes) -> tuple[int, Event]:
     kinds = isinstance(event.name, str), isinstance(event.time, str), isinstance(event.data, dict)
     if type(event.number) is not int or not all(kinds) or not _is_time(event.time):
         raise ValueError("is not the event expected there")
-    return fields["version"], event
+    return event
 
 
 def _read_end(path: Path, damaged: list[Damage]) -> tuple[int, str | None]:
@@ -300,7 +280,7 @@ def _read_end(path: Path, damaged: list[Damage]) -> tuple[int, str | None]:
         line = read_limited(path, _MAX_END_BYTES)
         if not line.endswith(b"\n"):
             raise ValueError("is cut short")
-        fields = _parse_sound(line[:-1])
+        fields = _parse_sound(path, line[:-1])
         number, notes_sha256 = fields["number"], fields["notes_sha256"]
         if type(number) is not int or not isinstance(notes_sha256, str | None):
             raise ValueError("holds no number or no checksum")

@@ -10,16 +10,15 @@ from types import MappingProxyType
 from typing import Any
 
 from handcal.errors import FileError
-from handcal.io.files import make_folder, read_json, read_limited, sync_folder
+from handcal.io.files import make_folder, read_limited, sync_folder
 from handcal.io.lock import FileLock
 from handcal.progress import Progress
 from handcal.register.results import read_rendered_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
-from handcal.session.journal import JOURNAL, JOURNAL_VERSION, find_journals
+from handcal.session.journal import JOURNAL, find_journals
 from handcal.session.judged_trials import EyeTrials, judge_trials
 from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
-    Replayed,
     alignment_path,
     replay,
     sha256,
@@ -212,7 +211,7 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
         former_wearers=tuple(state.former_wearers),
         rig=_rig_name(path, state),
         headset=state.facts.headset.name if state.facts.headset else "",
-        eyes=MappingProxyType(eye_outcomes(path, replayed)),
+        eyes=MappingProxyType(eye_outcomes(state)),
         alignments=len(state.alignments.active),
         trials=len(state.trials.active),
         target_arcmin=_lab_target_arcmin(state.settings),
@@ -222,14 +221,14 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
     )
 
 
-def eye_outcomes(path: Path, replayed: Replayed) -> dict[Eye, EyeOutcome]:
+def eye_outcomes(state: SessionState) -> dict[Eye, EyeOutcome]:
     """Return the results of a session's eyes; those that it does not hold are left out."""
-    results = _results(path, replayed)
+    results = (state.results if state.is_solved else None) or {}
     found = results.get("eyes")
     eyes = found if isinstance(found, dict) else {}
-    trials = replayed.state.trials.active.values()
+    trials = state.trials.active.values()
     errors = trial_errors_arcmin(trials, read_rendered_shift_m(results))
-    target_arcmin = _lab_target_arcmin(replayed.state.settings)
+    target_arcmin = _lab_target_arcmin(state.settings)
     judged = judge_trials(errors, math.inf if target_arcmin is None else target_arcmin)
     return {
         eye: _outcome(eyes[eye], judged.get(eye)) for eye in EYES if isinstance(eyes.get(eye), dict)
@@ -266,19 +265,6 @@ def _rig_name(path: Path, state: SessionState) -> str:
         return parse_rig(content).name
     except (FileError, ValueError):
         return ""
-
-
-def _results(path: Path, replayed: Replayed) -> dict[str, Any]:
-    """Return the results that hold; those of older versions are in a file."""
-    state = replayed.state
-    if not state.is_solved:
-        return {}
-    if state.results is None and replayed.journal.version < JOURNAL_VERSION:
-        try:
-            return read_json(path / "results.json")
-        except FileError:
-            return {}
-    return state.results or {}
 
 
 def _outcome(one: Mapping[str, Any], trials: EyeTrials | None) -> EyeOutcome:

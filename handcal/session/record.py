@@ -9,8 +9,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from handcal.errors import FileError
 from handcal.io.files import read_json, read_limited
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
@@ -25,13 +23,11 @@ from handcal.session.journal import (
     read_journal,
 )
 from handcal.session.state import SessionEvent, SessionState
-from handcal.session.trial import Trial, make_trial
+from handcal.session.trial import Trial
 from handcal.types import Alignment, Eye, Float64
 
 MAX_ALIGNMENT_BYTES = 16 * 2**20
 MAX_NOTES_CHARACTERS = 20_000
-_SAME_PX = 1e-6
-"""Rounding of a trial's error by another version of NumPy."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,7 +227,6 @@ def load_session(path: Path, rig: Rig | None = None) -> LoadedSession:
     rig = _read_rig(path, state, damaged) if rig is None else rig
     checksums = {**state.alignments.active, **state.alignments.deleted}
     alignments = _read_alignments(path, checksums, damaged)
-    _leave_out_unsound_trials(state, rig, journal.events, damaged)
     _check_results(path / "results.json", state, damaged)
     settings = _read_settings(path / "settings.json", state, damaged)
     notes, notes_sha256 = _read_notes(path / "notes.txt", _notes_checksums(replayed), damaged)
@@ -294,7 +289,7 @@ def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
 
 
 def _read_settings(file: Path, state: SessionState, damaged: list[Damage]) -> dict[str, Any]:
-    """Return the settings of the journal, or for older versions of the file."""
+    """Return the settings of the journal, or of the file if the journal's first line is lost."""
     try:
         settings = read_json(file)
         if state.settings is not None and settings != state.settings:
@@ -363,35 +358,3 @@ def _read_alignment(file: Path, checksum: str) -> Alignment:
     if sha256(data) != checksum:
         raise ValueError("its checksum is not the journal's")
     return decode_alignment(data)
-
-
-def _leave_out_unsound_trials(
-    state: SessionState, rig: Rig, events: Sequence[Event], damaged: list[Damage]
-) -> None:
-    """Remove the trials whose stored errors do not agree with their φ."""
-    state.trials.taken = state.trials.last()
-    for trials in (state.trials.active, state.trials.deleted):
-        for number, trial in list(trials.items()):
-            if not _is_sound(trial, rig):
-                del trials[number]
-                line = next(one.number for one in events if one.time == trial.time)
-                what = f"the error is not that of its φ; trial {number} was left out"
-                damaged.append(Damage(JOURNAL, line, what))
-
-
-def _is_sound(trial: Trial, rig: Rig) -> bool:
-    try:
-        again = make_trial(
-            rig.eyes[trial.eye],
-            trial.eye,
-            trial.target_depth_m,
-            trial.calibrated_shift_m,
-            trial.adjusted_shift_m,
-            trial.corners_E_m,
-        )
-    except ValueError:
-        return False
-    return all(
-        np.allclose(getattr(trial, name), getattr(again, name), rtol=1e-9, atol=_SAME_PX)
-        for name in ("drawn_px", "truth_px", "error_px", "error_arcmin")
-    )

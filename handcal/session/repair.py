@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from handcal.errors import FileError
 from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
@@ -18,7 +18,7 @@ from handcal.session.record import SessionRecord, alignment_path, load_session, 
 from handcal.session.state import SessionEvent, SessionState
 
 SessionHealth: TypeAlias = Literal["sound", "damaged", "none"]
-_REPLACED = (SessionEvent.CREATED, SessionEvent.UPGRADED, SessionEvent.NOTES_SAVED)
+_REPLACED = (SessionEvent.CREATED, SessionEvent.COPIED, SessionEvent.NOTES_SAVED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +92,11 @@ def _events(record: SessionRecord, folder: Path) -> Iterator[Event]:
     """Yield the events of the repaired session in `folder`."""
     alignments = {*record.alignments, *record.deleted_alignments}
     trials = {*record.trials, *record.deleted_trials}
-    bound: dict[str, Any] = {
+    created = {
         "rig": (folder / "rig.yaml").read_text("utf-8"),
         "settings": record.settings,
+        "wearer": record.wearer,
     }
-    created = {**bound, "wearer": record.wearer}
     yield Event(1, record.events[0].time, SessionEvent.CREATED, created)
     damaged = {"damaged": [asdict(damage) for damage in record.damaged]}
     yield happens_now(2, SessionEvent.REPAIRED, damaged)
@@ -118,4 +118,4 @@ def _events(record: SessionRecord, folder: Path) -> Iterator[Event]:
         "is_solved": record.is_solved,  # not if one of the alignments is lost
         "notes_sha256": notes,
     }
-    yield happens_now(2, SessionEvent.UPGRADED, bound | rest)
+    yield happens_now(2, SessionEvent.COPIED, rest)

@@ -429,7 +429,7 @@ def open_session(path: str | PathLike[str]) -> SessionRecord:
     Raises
     ------
     FileError
-        If the folder is not a session, is of an unknown version, or nothing in it can be read.
+        If the folder is not a session, is of another version, or nothing in it can be read.
 
     Examples
     --------

@@ -9,7 +9,6 @@ from enum import StrEnum
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 from handcal.display import as_shifts
-from handcal.session import journal
 from handcal.session.comparison import COMPARED
 from handcal.session.facts import AlignmentFacts, SessionFacts, read_facts, with_facts
 from handcal.session.journal import Event
@@ -32,16 +31,14 @@ class SessionEvent(StrEnum):
     """The events that a session writes itself and that make up its state."""
 
     CREATED = "created"
-    UPGRADED = journal.UPGRADED
-    """Copies and checksums from here on, in a session begun by version 1 or 2."""
     REPAIRED = "repaired"
     """In a copy of a damaged session: its numbers have gaps."""
+    COPIED = "copied"
+    """The last event of such a copy: the results and the notes that it holds."""
     NOTES_SAVED = "notes_saved"
     WEARER_CORRECTED = "wearer_corrected"
     FACTS_SAVED = "facts_saved"
     ALIGNMENT_SAVED = "alignment_saved"
-    ALIGNMENT_DROPPED = "alignment_dropped"
-    """Version 1 only: deleted for good; the next alignment took its number."""
     ALIGNMENT_DELETED = "alignment_deleted"
     ALIGNMENT_RESTORED = "alignment_restored"
     TRIAL_SAVED = "trial_saved"
@@ -56,7 +53,7 @@ class SessionEvent(StrEnum):
 ASIDE = (
     SessionEvent.NOTES_SAVED,
     SessionEvent.WEARER_CORRECTED,
-    SessionEvent.UPGRADED,
+    SessionEvent.COPIED,
     SessionEvent.TRIAL_SAVED,
     SessionEvent.TRIAL_DELETED,
     SessionEvent.TRIAL_RESTORED,
@@ -141,19 +138,19 @@ class SessionState:
     Attributes
     ----------
     rig : str
-        Content of the rig file; empty before version 3.
+        Content of the rig file; empty if the first line of the journal is lost.
     rig_sha256 : str
         Its checksum.
     settings : dict or None
-        None before version 3.
+        None if that line is lost.
     wearer : str
     former_wearers : list of str
         Names before each correction.
     notes_sha256 : tuple of str or None
         Checksums of the notes that may be stored: the newest, and those before; an empty text if
-        there are none. Empty before version 3.
+        there are none. Empty if unknown.
     results : dict or None
-        The newest results of version 3, or of an older one with the event `solved`.
+        The newest results.
     older_results : list of dict
         Those before.
     facts : SessionFacts
@@ -230,16 +227,15 @@ class SessionState:
     def _apply(self, name: str, data: dict[str, Any], time: str) -> None:
         match name:
             case SessionEvent.CREATED:
-                self._bind(data)
+                self._bind(data["rig"], data["settings"])
                 self.wearer = clean_wearer(data.get("wearer", ""))
-            case SessionEvent.UPGRADED:
-                self._bind(data)
-                self.notes_sha256 = (data["notes_sha256"],)
-                self._set_results(data["results"])
-                if not data.get("is_solved", True):
-                    self.is_solved = self.is_applied = False
             case SessionEvent.REPAIRED:
                 self.alignments.has_gaps = self.trials.has_gaps = True
+            case SessionEvent.COPIED:
+                self.notes_sha256 = (data["notes_sha256"],)
+                self._set_results(data["results"])
+                if not data["is_solved"]:
+                    self.is_solved = self.is_applied = False
             case SessionEvent.NOTES_SAVED:
                 self.notes_sha256 = data["sha256"], data["before_sha256"]
             case SessionEvent.WEARER_CORRECTED:
@@ -250,16 +246,18 @@ class SessionState:
                 before, self.facts = self.facts, with_facts(self.facts, data)
                 now = dict.fromkeys(data.get("verified", ()), frozenset(self.alignments.active))
                 self._verified_with.update(now)
-                is_known = self.facts.eye_distance == before.eye_distance
-                if not (is_known and dict(self.facts.verified) == dict(before.verified)):
+                is_same = (
+                    self.facts.eye_distance == before.eye_distance
+                    and self.facts.usable_eyes == before.usable_eyes
+                    and dict(self.facts.verified) == dict(before.verified)
+                )
+                if not is_same:
                     self.is_solved = self.is_applied = False
                     self._set_results(None)
             case SessionEvent.ALIGNMENT_SAVED:
                 facts = read_facts(AlignmentFacts, data.get("facts", {}))
                 self.alignments.save(_number(data), data["sha256"])
                 self.alignment_facts[_number(data)] = facts
-            case SessionEvent.ALIGNMENT_DROPPED:
-                self.alignments.active.pop(_number(data))
             case SessionEvent.ALIGNMENT_DELETED:
                 self.alignments.delete(_number(data))
             case SessionEvent.ALIGNMENT_RESTORED:
@@ -274,7 +272,7 @@ class SessionState:
                 self._set_results(data)
                 self.is_solved, self.is_applied, self.fine_tuned = True, False, None
                 self._by_hand = {}
-            case SessionEvent.APPLIED if "shift_m" in data:  # not in version 1
+            case SessionEvent.APPLIED:
                 self.applied_shift_m |= as_shifts(data["shift_m"])
                 self.is_applied = self.is_solved
             case SessionEvent.FINE_TUNED:
@@ -292,17 +290,13 @@ class SessionState:
         if name in (SessionEvent.ALIGNMENT_DELETED, SessionEvent.ALIGNMENT_RESTORED):
             self._set_results(None)
 
-    def _bind(self, data: Mapping[str, Any]) -> None:
+    def _bind(self, rig: str, settings: object) -> None:
         """Take the rig and the settings from an event."""
-        if "rig" in data:
-            rig, settings = data["rig"], data["settings"]
-            if not isinstance(settings, dict):
-                raise TypeError("the settings are not an object")
-            self.rig_sha256 = hashlib.sha256(rig.encode()).hexdigest()
-            self.rig, self.settings = rig, settings
-            self.notes_sha256 = ("",)
-        else:
-            self.rig_sha256 = data["rig_sha256"]
+        if not isinstance(settings, dict):
+            raise TypeError("the settings are not an object")
+        self.rig_sha256 = hashlib.sha256(rig.encode()).hexdigest()
+        self.rig, self.settings = rig, settings
+        self.notes_sha256 = ("",)
 
     def _set_results(self, results: dict[str, Any] | None) -> None:
         if self.results is not None:

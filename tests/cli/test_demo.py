@@ -203,7 +203,7 @@ def test_a_torn_session_is_solved_with_another_method(
     torn = tmp_path / "torn"
     shutil.copytree(session, torn)
     with (torn / "journal.jsonl").open("ab") as journal:
-        journal.write(b'{"version": 1, "numb')
+        journal.write(b'{"version": 3, "numb')
     again = tmp_path / "again.json"
     arguments = ["solve", str(torn), "--method", "icp", "--json", str(again)]
     monkeypatch.setattr(sys, "argv", ["handcal", *arguments])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from dataclasses import fields
 from pathlib import Path
@@ -19,7 +18,7 @@ from handcal.session.repair import check_session, repair_session
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.types import Alignment
-from tests.helpers import DATA, ROOT
+from tests.helpers import ROOT
 
 RESULTS = {"left": {"shift_m": [0.001, 0.0, 0.0]}}
 ASIDE = ("path", "damaged", "journal_bytes", "torn_bytes")
@@ -258,51 +257,6 @@ def test_a_repaired_session_goes_on(
         session.restore("alignment", 2)
     again = Session.open(repaired.path)
     assert (list(again.alignments), again.damaged) == ([2, 3, 4], ())
-
-
-@pytest.mark.parametrize("name", ["session-v1", "session-v2"])
-def test_older_versions_are_read_upgraded_and_repaired(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(DATA / name, path)
-    old = Session.open(path)
-    assert old.damaged == ()
-    Session(path).close()
-    new = Session.open(path)
-    assert new.events[-1].name == "upgraded"
-    assert {**contents(new), "events": 0} == {**contents(old), "events": 0}
-    repaired = repair_session(DATA / name, tmp_path / "repaired")
-    assert {**contents(repaired), "events": 0} == {**contents(old), "events": 0}
-    journal = path / "journal.jsonl"  # from now on the old lines have a checksum too
-    journal.write_bytes(journal.read_bytes().replace(b"cursor_id", b"cursor_ID", 1))
-    assert "of an older version, have changed" in Session.open(path).damaged[0].what
-
-
-def test_version_2_comes_back_as_it_was_written() -> None:
-    record = Session.open(DATA / "session-v2")
-    assert (record.wearer, record.notes) == ("Ana", "Größe passt.\nLinks nochmal.")
-    assert (list(record.alignments), list(record.deleted_alignments)) == ([1, 3], [2])
-    assert (list(record.trials), list(record.deleted_trials)) == ([2], [1])
-    assert record.results == {"left": {"shift_m": [0.001, -0.002, 0.0005]}}
-    assert (record.is_solved, record.is_finished) == (True, True)
-    assert record.facts.camera is None
-
-
-def test_a_digit_of_an_old_trial_is_noticed_by_its_phi(tmp_path: Path) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(DATA / "session-v2", path)
-    journal = path / "journal.jsonl"
-    lines = journal.read_bytes().splitlines(keepends=True)
-    number = next(i for i, line in enumerate(lines) if b'"number": 2, "trial"' in line)
-    event = json.loads(lines[number])
-    event["data"]["trial"]["error_arcmin"][0] += 80.0
-    lines[number] = json.dumps(event).encode() + b"\n"
-    journal.write_bytes(b"".join(lines))
-    record = Session.open(path)
-    assert not record.trials
-    assert [(damage.file, damage.line) for damage in record.damaged] == [
-        ("journal.jsonl", number + 1)
-    ]
-    assert "the error is not that of its φ; trial 2 was left out" in record.damaged[0].what
 
 
 def test_a_journal_can_be_checked_as_its_page_says(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,7 +27,7 @@ def test_a_torn_line_is_left_out_and_goes_with_the_next(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     begin(path)
     with path.open("ab") as file:
-        file.write(b'{"version": 2, "numb')
+        file.write(b'{"version": 3, "numb')
     torn = read_journal(path)
     assert (len(torn.events), torn.torn_bytes) == (1, 20)
     JournalWriter(path, torn).append(journal_line(happens_now(2, "next", {})))
@@ -49,10 +49,21 @@ def test_a_full_journal_refuses_and_stays_readable(
         read_journal(path)
 
 
-@pytest.mark.parametrize("version", [0, 4, "2", None])
-def test_an_unknown_version_is_refused(tmp_path: Path, version: object) -> None:
+@pytest.mark.parametrize("version", [0, 2, 4, "3", None])
+@pytest.mark.parametrize("has_checksum", [True, False])
+def test_another_version_is_refused_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: object, has_checksum: bool
+) -> None:
     path = tmp_path / "journal.jsonl"
-    begin(path)
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": version}) + "\n")
-    with pytest.raises(FileError, match="not one of 1 to 3"):
+    with monkeypatch.context() as patch:
+        patch.setattr(journal, "JOURNAL_VERSION", version)
+        line = journal_line(happens_now(1, "created", {}))
+    fields = json.loads(line)
+    assert fields.pop("sha256")
+    path.write_bytes(line if has_checksum else json.dumps(fields).encode() + b"\n")
+    with pytest.raises(FileError) as refused:
         read_journal(path)
+    said = str(refused.value)
+    assert said.startswith(str(path))
+    assert said.endswith(f"has version {version!r}, not 3; use the handcal that wrote it")
+    assert "\n" not in said

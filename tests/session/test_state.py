@@ -33,7 +33,8 @@ def test_an_event_that_cannot_follow_is_refused_with_its_reason() -> None:
         (SessionEvent.TRIAL_RESTORED, {"number": 1}, "there is no deleted trial 1"),
         (SessionEvent.TRIAL_SAVED, {"number": 1, "trial": {}}, "the trial has no 'target_depth_m'"),
         (SessionEvent.FINE_TUNED, {}, "fine_tuned lacks 'shift_m'"),
-        (SessionEvent.CREATED, {"rig_sha256": "x", "wearer": 3}, "contains invalid data"),
+        (SessionEvent.APPLIED, {"eyes": ["left"]}, "applied lacks 'shift_m'"),
+        (SessionEvent.CREATED, {"rig": "x", "settings": {}, "wearer": 3}, "contains invalid data"),
     ):
         with pytest.raises(ValueError, match=problem):
             state.apply(Event(1, "", name, data))

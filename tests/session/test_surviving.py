@@ -251,10 +251,10 @@ def test_a_changed_file_is_noticed(tmp_path: Path, finished: SessionRecord, name
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        ({"version": 4}, "has version 4, not one of 1 to 3"),
+        ({"version": 4}, "has version 4, not 3"),
         ({"number": 7}, "does not have its checksum"),
         ({"event": "made_up"}, "does not have its checksum"),
-        ({"version": 2}, "does not have its checksum"),
+        ({"version": 2}, "has version 2, not 3"),
         ({"time": "2026-11-22T00:00:00+00:00"}, "does not have its checksum"),
         (None, "is not an event of a session"),
     ],
@@ -285,7 +285,7 @@ def test_a_newer_version_is_refused_as_a_whole(
     line = journal_line(happens_now(13, "later", {}))
     monkeypatch.undo()
     journal.write_bytes(journal.read_bytes() + line)
-    with pytest.raises(FileError, match="has version 4, not one of 1 to 3; update handcal"):
+    with pytest.raises(FileError, match="has version 4, not 3; use the handcal that wrote it"):
         Session.open(path)
 
 
@@ -306,13 +306,20 @@ def numbers_of(record: SessionRecord) -> tuple[list[int], ...]:
 
 
 JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5),
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(max_size=5),
     lambda part: (
         st.lists(part, max_size=4) | st.dictionaries(st.text(max_size=5), part, max_size=3)
     ),
     max_leaves=8,
 )
-FIELDS = ["number", "sha256", "rig_sha256", "wearer", "trial", "shift_m"]
+FIELDS = [
+    "number", "sha256", "before_sha256", "wearer", "before", "trial", "shift_m", "results",
+    "is_solved", "notes_sha256",
+]  # fmt: skip
 
 
 @given(st.sampled_from(list(SessionEvent)), st.dictionaries(st.sampled_from(FIELDS), JSON))
@@ -325,15 +332,8 @@ def test_a_strange_event_is_refused_or_harmless(
 ) -> None:
     path = tmp_path_factory.mktemp("copy") / "session"
     shutil.copytree(finished.path, path)
-    line = {"version": 2, "number": 13, "event": event, "data": data}
-    line["time"] = "2026-11-21T12:00:00+00:00"
-    with (path / "journal.jsonl").open("a") as journal:
-        journal.write(json.dumps(line) + "\n")
-    try:
-        record = Session.open(path)
-    except FileError as error:
-        assert "has version" in str(error)  # noqa: PT017
-        return
-    assert record.damaged
+    with (path / "journal.jsonl").open("ab") as journal:
+        journal.write(journal_line(happens_now(13, event, data)))
+    record = Session.open(path)
     assert set(record.alignments) | set(record.deleted_alignments) <= {1, 2}
     assert record.trials or record.deleted_trials

@@ -103,7 +103,7 @@ def _recent(path: Path) -> Entry | None:
         return None
     counts = len(alignments.active), len(state.facts.verified), len(trials.active)
     text = _text(state.wearer, events[0].time, *counts)
-    return Entry(path, text, wearer=state.wearer, eyes=eye_outcomes(path, replayed))
+    return Entry(path, text, wearer=state.wearer, eyes=eye_outcomes(state))
 
 
 def _unreadable(path: Path, why: str) -> Entry:

@@ -22,7 +22,6 @@ from handcal_gui.widgets.session_rows import (
     statistics_text,
     trial_rows,
 )
-from tests.helpers import DATA
 
 
 def trial(eye: Eye, depth_m: float, off_m: float) -> Trial:
@@ -132,9 +131,3 @@ def test_deletions_in_their_order(record: SessionRecord) -> None:
         session.delete("alignment", 1)
         session.restore("alignment", 2)
     assert deletions(Session.open(record.path)) == [Deletion("trial", 1), Deletion("alignment", 1)]
-
-
-def test_an_old_session_has_nothing_to_take_back() -> None:
-    old = Session.open(DATA / "session-v1")
-    assert deletions(old) == []
-    assert list(alignment_rows(old, None)) == list(old.alignments)
