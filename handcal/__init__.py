@@ -4,7 +4,7 @@
 >>> session = handcal.open_session("resources/example_session")
 >>> results = handcal.solve(session)
 >>> print(results.eyes["left"])
-φ = (-3.95 ± 0.70, +0.84 ± 0.67, +2.29 ± 1.87) mm; rms 1.42 mm, 97 % inliers, converged
+φ = (+3.16 ± 1.29, -4.42 ± 0.92, +0.99 ± 1.86) mm; rms 1.58 mm, 97 % inliers, converged
 
 Lengths are in metres, angles in radians, axes OpenCV's; `handcal.types` names the frames.
 """

@@ -297,7 +297,7 @@ class EyeShift:
 
 
 def phi_text(shift: EyeShift) -> str:
-    """Return φ ± σ in one line: ``φ = (-3.95 ± 0.70, +0.84 ± 0.67, +2.29 ± 1.87) mm``."""
+    """Return φ ± σ in one line: ``φ = (+3.16 ± 1.29, -4.42 ± 0.92, +0.99 ± 1.86) mm``."""
     return f"φ = ({', '.join(_coordinates_mm(shift))}) mm"
 
 

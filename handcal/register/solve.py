@@ -88,7 +88,7 @@ def solve_eye_shift(
     ...     hand_cut=alignment.hand_is_cut,
     ... )
     >>> print(shift)
-    φ = (-4.19 ± 0.27, +0.91 ± 0.19, +0.14 ± 0.65) mm; rms 1.42 mm, 97 % inliers, converged
+    φ = (+3.59 ± 1.29, -4.06 ± 0.74, +1.16 ± 1.02) mm; rms 1.58 mm, 97 % inliers, converged
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")

@@ -146,13 +146,30 @@ def test_the_example_is_opened_from_the_start_page(
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
     numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
-    assert "Trials\t⚠ 9.0′ n=3\t⚠ 12.2′ n=3" in numbers, "of the φ that it was solved with then"
-    said = child(program, QLabel, "reviewNote").text()  # the example is of an older version
-    assert said.startswith("Solved again by this version; when it was recorded, the verdict was")
+    assert "Trials\t5.8′ n=3\t3.8′ n=3" in numbers
+    assert program.window.findChild(QLabel, "reviewNote") is None
     program.show_start()
     assert program.start.new.settings.sessions == entered  # kept for the next wearer
     program.start.example_requested.emit(tmp_path / "preferences.json" / "none")
     assert "preferences.json" in program.window.banner.text
+
+
+def test_other_results_than_those_of_solving_again_are_named(
+    program: Program, qtbot: QtBot, tmp_path: Path
+) -> None:
+    path = copy_example(tmp_path / "sessions")
+    stored = Session.open(path).results
+    assert stored is not None
+    stored["eyes"]["left"]["verdict"] = "repeat"
+    with Session(path) as session:
+        session.save_results(stored)
+    program.open_session(path)
+    qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
+    numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
+    assert "Trials\t5.8′ n=3\t3.8′ n=3" in numbers
+    assert child(program, QLabel, "reviewNote").text() == (
+        "Solved again by this version; when it was recorded, the verdict was left eye ↻ Repeat."
+    )
 
 
 def test_a_session_without_alignments_shows_no_hand_of_another(
