@@ -108,6 +108,12 @@ def _confirm(calibration: Calibration) -> None:
         calibration.confirm()
 
 
+def _take_step(station: Station) -> None:
+    """Take the plan's next step; the session keeps what it cannot write yet."""
+    with suppress(FileError):
+        station.take_step()
+
+
 def _skip(station: Station) -> None:
     """Skip the verification, which the wearer may have ended already."""
     with suppress(FileError):
@@ -115,7 +121,7 @@ def _skip(station: Station) -> None:
 
 
 COMMANDS: dict[Action, Command] = {
-    Action.TAKE_STEP: Station.take_step,
+    Action.TAKE_STEP: _take_step,
     Action.CONFIRM: calibrating(_confirm),
     Action.REDO: calibrating(Calibration.redo),
     Action.VERIFIED: calibrating(Calibration.verified),

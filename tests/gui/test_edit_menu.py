@@ -21,7 +21,7 @@ from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.window import MainWindow
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.helpers import child
-from tests.gui.views import NUDGED
+from tests.gui.views import NUDGED, begun
 
 
 @pytest.fixture
@@ -86,6 +86,7 @@ def test_an_open_menu_offers_to_undo_the_nudges_made_since(
     qtbot: QtBot, window: MainWindow, snapshot: Callable[..., Snapshot]
 ) -> None:
     guide = child(window, WizardPanel, "wizard")
+    guide.start(begun())
     window.show_page("live")
 
     def verify(can_undo: bool) -> None:

@@ -277,7 +277,7 @@ def test_an_interrupted_session_is_offered_and_resumed(
     second.wait_for_page("live")
     assert second.snapshot.session_path == path
     assert second.snapshot.procedure.state is State.ALIGNED
-    second.wait(lambda: second.snapshot.link.connected)
+    second.press_space_for(Action.NEXT)
     solve_and_apply(second)
     assert second.record.is_applied
 

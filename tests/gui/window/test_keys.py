@@ -33,6 +33,7 @@ from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
 from handcal_gui.program import Program
 from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.window import MainWindow
+from tests.gui.views import begun
 from tests.gui.window.conftest import Maker, main_button, offer_solve, press, say
 
 
@@ -280,6 +281,7 @@ def test_keys_move_the_outline_the_way_they_point_and_only_while_it_is_verified(
     moved: list[tuple[float, float, float]] = []
     guide.nudged.connect(lambda *nudge: moved.append(nudge))
     keys = (Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down)
+    guide.start(begun())
     guide.show_snapshot(snapshot(State.ALIGN))
     for key in keys:
         press(window, key)

@@ -34,7 +34,7 @@ from handcal_gui.program import Program
 from handcal_gui.widgets.legend import LegendEntry
 from handcal_gui.widgets.record_tabs import RecordTabs
 from tests.gui.helpers import button, child, letters
-from tests.gui.views import all_views
+from tests.gui.views import all_views, begun
 from tests.gui.window.conftest import Maker, press, say
 
 EACH_SIZE = pytest.mark.parametrize("size_px", [(960, 510), (1920, 1050)])
@@ -128,6 +128,7 @@ def test_keys_print_and_copy_a_result_in_sight_only(
     begin(program, snapshot, (1280, 690))
     program.window.activateWindow()
     qtbot.waitActive(program.window)
+    program.wizard_panel.start(begun())
     for state in (State.ALIGN, State.APPLIED):
         assert not calls
         seen = snapshot(state)

@@ -34,7 +34,7 @@ from handcal_gui.program import Program
 from handcal_gui.widgets.result_card import ResultCard
 from handcal_gui.window import MainWindow, Page
 from tests.gui.helpers import child, text
-from tests.gui.views import NUDGED, all_views, fine_tuned
+from tests.gui.views import NUDGED, all_views, begun, fine_tuned
 from tests.gui.window.conftest import Maker, main_button, say, shown
 
 
@@ -93,6 +93,7 @@ def test_no_step_needs_scrolling(
     viewport = guide.parent()
     assert viewport is not None
     area = viewport.parent()
+    guide.start(begun())
     applied = snapshot(State.APPLIED)
     states = (State.SHOW_HAND, State.ALIGN, State.ALIGNED, State.SOLVED)
     procedure = replace(applied.procedure, results=accepted(results))

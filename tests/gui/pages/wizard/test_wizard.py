@@ -14,6 +14,7 @@ from handcal.station.plan import PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.types import EYES
+from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas
@@ -131,7 +132,10 @@ def test_a_large_guide_has_larger_texts(panel: WizardPanel, snapshot: Maker) -> 
         assert now == pytest.approx([scale * one for one in before], rel=0.1)
 
 
-def test_the_other_buttons_come_and_go(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
+def test_the_other_buttons_come_and_go(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    none = replace(record, alignments={})
     panel.show_snapshot(snapshot(State.ALIGNED))
     other = child(panel, "wizardOther0")
     assert (other.isVisible(), other.text()) == (True, "&Discard and repeat")
@@ -139,7 +143,9 @@ def test_the_other_buttons_come_and_go(qtbot: QtBot, panel: WizardPanel, snapsho
     with qtbot.waitSignal(panel.asked) as asked:
         QTest.mouseClick(other, Qt.MouseButton.LeftButton)
     assert asked.args == [Action.REDO]
-    panel.show_snapshot(snapshot(State.APPLYING))
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.NUDGE))
+    assert other.text() == "&Undo"
+    panel.show_snapshot(snapshot(State.ALIGNED, record=none))
     assert not other.isVisible()
 
 
@@ -307,6 +313,7 @@ def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_ey
 def test_names_and_paths_like_markup_are_shown_as_they_are(
     panel: WizardPanel, snapshot: Maker
 ) -> None:
+    panel.start(Wizard())
     panel.show_snapshot(snapshot(State.SHOW_HAND, camera={"name": "<b>D415</b>"}))
     [label] = [one for one in panel.findChildren(QLabel) if "D415" in one.text()]
     assert label.textFormat() is Qt.TextFormat.PlainText
