@@ -20,6 +20,7 @@ from handcal.register.prior import (
     learn_prior,
     observe_eye_distance,
 )
+from handcal.register.results import RESULTS_VERSION
 from handcal.rig.rig_file import read_rig
 from handcal.rig_types import Rig
 from handcal.session.facts import read_facts
@@ -105,6 +106,8 @@ def _read_session(journal: Path, rig: Rig) -> tuple[str, str, list[Observed]]:
         raise _NotUsableError("not finished")
     if state.results is None or not state.is_solved:
         raise _NotUsableError("not solved")
+    if state.results.get("version") != RESULTS_VERSION:
+        raise _NotUsableError("solved by another version")
     eyes = state.results.get("eyes")
     verdicts = [one.get("verdict") for one in eyes.values()] if isinstance(eyes, dict) else []
     if "contradicted" in verdicts or "implausible" in verdicts:
@@ -138,7 +141,7 @@ def _eye_distance(stored: object) -> EyeDistance | None:
 def _observations(stored: object) -> list[Observed]:
     """Return observations from JSON; `_NotUsableError` if they are missing or damaged."""
     if not isinstance(stored, list) or not 0 < len(stored) <= _MAX_OBSERVATIONS:
-        raise _NotUsableError("solved by an older version")
+        raise _NotUsableError("not readable")
     try:
         observed = [
             tuple(np.array(one[name], dtype=np.float64) for name in _OBSERVED_SHAPES)

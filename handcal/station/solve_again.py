@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import replace
-from typing import Any
 
 from handcal.errors import FileError
 from handcal.io.settings import read_settings
@@ -75,26 +73,7 @@ def solve(
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:
     """Return the solve settings of a session; FileError if they cannot be read."""
     where = f"{record.path / 'settings.json'}: calibration"
-    stored = _upgraded(record.settings.get("calibration", {}))
-    return read_settings(CalibrationSettings, stored, where).solve
-
-
-def _upgraded(calibration: Any) -> Any:
-    """Return stored settings with today's names; those of version 1 had no prior."""
-    fuse = calibration.get("solve", {}).get("fuse") if isinstance(calibration, dict) else None
-    if not isinstance(fuse, dict) or "eye_box_sigma_m" not in fuse:
-        return calibration
-    upgraded = deepcopy(calibration)
-    solve = upgraded["solve"]
-    # These sessions were solved for a wearer of known precision, and judged by their error alone.
-    solve["fuse"] |= {"wearer_scales": [1.0], "wearer_weights": [1.0]}
-    names = "eye_box_sigma_m", "eye_difference_sigma_m"
-    solve["fuse"]["prior"] = {
-        name: solve["fuse"].pop(name) for name in names if name in solve["fuse"]
-    }
-    if isinstance(solve.get("verdict"), dict):
-        solve["verdict"].pop("error_max_arcmin", None)
-    return upgraded
+    return read_settings(CalibrationSettings, record.settings.get("calibration", {}), where).solve
 
 
 def solve_again(

@@ -41,7 +41,7 @@ def error_bars(eyes: Mapping[Eye, EyeOutcome]) -> QPixmap:
 
 
 def has_bars(eyes: Mapping[Eye, EyeOutcome]) -> bool:
-    """Return whether an error of an eye is known: results of the first versions have none."""
+    """Return whether an error of an eye is known; damaged results may have none."""
     errors = (error for one in eyes.values() for error in (one.before_arcmin, after_arcmin(one)))
     return any(error is not None for error in errors)
 

@@ -136,15 +136,14 @@ def test_measured_eye_distances_are_learned_from(tmp_path: Path, alignment: Alig
     assert mean_m[1, 0] - mean_m[0, 0] == pytest.approx(0.003, abs=0.0006)
 
 
-def test_results_without_observations_do_not_count(tmp_path: Path, alignment: Alignment) -> None:
-    with Session.create(tmp_path, RIG, {}, "old") as session:
-        session.save_alignment(alignment)
-        session.save_results({"version": 1, "eyes": {}})
-        session.finish()
-    with Session.create(tmp_path, RIG, {}, "damaged") as session:
-        session.save_alignment(alignment)
-        observed = {"H": np.eye(3).tolist(), "seen_m": [0.0] * 3, "covariance_m2": [[1.0]]}
-        session.save_results({"version": 2, "eyes": {}, "observed": [observed]})
-        session.finish()
+def test_results_of_another_version_or_without_observations_do_not_count(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    damaged = {"H": np.eye(3).tolist(), "seen_m": [0.0] * 3, "covariance_m2": [[1.0]]}
+    for version, observed in ((1, [damaged]), (3, [damaged]), (2, [damaged]), (2, [])):
+        with Session.create(tmp_path, RIG, {}) as session:
+            session.save_alignment(alignment)
+            session.save_results({"version": version, "eyes": {}, "observed": observed})
+            session.finish()
     found = run_learn_prior(tmp_path, RIG, SETTINGS)
-    assert dict(found.left_out) == {"solved by an older version": 1, "not readable": 1}
+    assert dict(found.left_out) == {"solved by another version": 2, "not readable": 2}

@@ -137,7 +137,7 @@ def test_trials_over_the_target_are_marked_and_no_tick_stands_beside_them(tmp_pa
     over = "⚠ Trials over 8′"
     assert said(10.4, 8.0, *both) == (f"Left {over}, Right ✓ Accept", "⚠ 10.4 / 2.0 n=1/1")
     assert said(7.9, 8.0, *both) == ("✓ Accept", "7.9 / 2.0 n=1/1")
-    assert said(10.4, None, *both) == ("✓ Accept", "10.4 / 2.0 n=1/1")  # of an older version
+    assert said(10.4, None, *both) == ("✓ Accept", "10.4 / 2.0 n=1/1")  # no target is set
     assert said(10.4, 8.0, "accept", "repeat")[0] == f"Left {over}, Right ↻ Repeat"
     assert said(10.4, 8.0, "repeat", "accept")[0] == "Left ↻ Repeat, Right ✓ Accept"
 
