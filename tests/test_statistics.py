@@ -155,3 +155,22 @@ def test_too_little_is_refused() -> None:
         mean_interval([1.0, 2.0], level=95)
     with pytest.raises(ValueError, match="two clusters"):
         variance_components([1.0, 2.0], ["a", "b"])
+
+
+def test_the_skewness_is_corrected_for_bias() -> None:
+    """The interval of ten numbers by Hall's formula, with the skewness as a textbook has it.
+
+    That is n / ((n - 1)(n - 2)) times the sum of the cubes of (value - mean) / standard deviation.
+    """
+    values = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 3.0, 8.0])
+    count, mean, sd = len(values), values.mean(), values.std(ddof=1)
+    skewness = count / ((count - 1) * (count - 2)) * (((values - mean) / sd) ** 3).sum()
+    t = 2.2621572  # of 9 degrees of freedom
+
+    def bound(of_t: float) -> float:
+        """Return the bound at which Hall's transformation of the mean's error is `of_t`."""
+        w = np.cbrt(1.0 + skewness * (of_t / np.sqrt(count) - skewness / (6.0 * count)))
+        return float(mean - sd * (w - 1.0) * 3.0 / skewness)
+
+    found = mean_interval(values)
+    assert [found.low, found.high] == pytest.approx([bound(t), bound(-t)])

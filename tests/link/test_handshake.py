@@ -122,6 +122,17 @@ def test_a_clock_that_was_set_back_is_forgiven_when_no_cookie_is_left(desk: Desk
     assert isinstance(desk.hear(desk.hello(5, cookie), now_s=late_s), Caller)
 
 
+@pytest.mark.parametrize("later_s", [0.01, PERIOD_S, 2 * PERIOD_S])
+def test_hellos_are_remembered_while_a_cookie_may_be_left(desk: Desk, later_s: float) -> None:
+    """Who recorded a hello with its cookie may send it as long as the cookie is valid."""
+    cookie = desk.cookie(1)
+    admitted = desk.hello(2, cookie)
+    assert isinstance(desk.hear(admitted), Caller)
+    assert desk.hear(desk.hello(1), now_s=later_s) is Rejection.REPLAYED
+    assert not isinstance(desk.hear(admitted, now_s=later_s), Caller)
+    assert isinstance(desk.hear(desk.hello(3), now_s=later_s), bytes)
+
+
 def test_a_key_of_another_device_is_named_and_a_strange_one_is_not() -> None:
     pairings = Pairings((Pairing(KEY, "00000000000000aa", "Owner"),))
     desk = Desk(pairings=pairings)

@@ -236,3 +236,28 @@ def test_eye_distance() -> None:
     apart_m = eye_distance_m(RIG, {"left": GOOD, "right": moved})
     assert apart_m == pytest.approx(2 * HALF_EYE_DISTANCE_M + 0.002, abs=1e-4)
     assert eye_distance_m(RIG, {"left": GOOD}) is None
+
+
+@pytest.mark.parametrize(("alignments", "name"), [(2, "repeat"), (3, "keep")])
+def test_within_the_target_only_two_more_alignments_are_asked_for(
+    alignments: int, name: str
+) -> None:
+    """An offline calibration that is good enough is kept rather than bettered at length."""
+    slight = replace(
+        GOOD,
+        shift_m=np.array([0.001, 0.0, 0.0]),
+        covariance_m2=np.diag([0.0005, 0.0005, 0.001]) ** 2,
+    )
+    fused = _fused({"left": slight})
+    gain = eye_benefit(RIG, fused, "left")
+    assert gain.after_arcmin < gain.without_arcmin < SETTINGS.target_arcmin
+    assert gain.probability_better < SETTINGS.probability_min
+    soon = Advice(
+        ("left",),
+        alignments,
+        after_arcmin=2.0,
+        probability_better=0.995,
+        meets_target=True,
+        is_accepted=True,
+    )
+    assert judge(RIG, fused, {"left": soon}, SETTINGS)["left"].name == name

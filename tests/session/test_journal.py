@@ -1,11 +1,16 @@
 import json
+import os
+import sys
 from pathlib import Path
 
 import pytest
 
 from handcal.errors import FileError
+from handcal.rig.example import example_rig
 from handcal.session import journal
 from handcal.session.journal import JournalWriter, happens_now, journal_line, read_journal
+from handcal.session.session import Session
+from handcal.types import Alignment
 
 
 def begin(path: Path) -> JournalWriter:
@@ -67,3 +72,32 @@ def test_another_version_is_refused_in_one_line(
     assert said.startswith(str(path))
     assert said.endswith(f"has version {version!r}, not 3; use the handcal that wrote it")
     assert "\n" not in said
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the files are told by Linux's /proc")
+def test_each_event_and_each_new_file_are_on_the_disk_when_they_are_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alignment: Alignment
+) -> None:
+    """A session that starts syncs its folders, an alignment its file and folder, an event itself.
+
+    A power cut loses what is not synced; that cannot be tried in a test, but the calls are seen.
+    """
+    synced: list[tuple[Path, int]] = []
+
+    def sync(descriptor: int) -> None:
+        path = Path(f"/proc/self/fd/{descriptor}").readlink()
+        synced.append((path, path.stat().st_size))
+
+    monkeypatch.setattr(os, "fsync", sync)
+    with Session.create(tmp_path, example_rig(), {}, name="one") as session:
+        path = session.path / "journal.jsonl"
+        assert {tmp_path, session.path} <= {folder for folder, _ in synced}
+        synced.clear()
+        session.record("said", text="φ")
+        assert synced == [(path, path.stat().st_size)]
+        synced.clear()
+        session.save_alignment(alignment)
+        stored = session.path / "alignments" / "1.npz"
+        assert synced[0] == (stored, stored.stat().st_size)
+        assert [one for one, _ in synced[1:]] == [stored.parent, path]
+        assert synced[-1][1] == path.stat().st_size
