@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from functools import partial
 from typing import Any
 
@@ -65,6 +66,33 @@ def test_the_wizard_one_eye_after_the_other_by_the_space_bar(
     live.program.start_calibration(studio.settings, "Grace")
     live.wait_for_page("live")
     assert ["Hold a hand in front" in text for text in shown_first] == [True]  # no hand of Ada's
+
+
+def test_no_name_of_a_wearer_is_logged(
+    technician: Technician, studio: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The log is sent with reports of errors; names are only in the sessions."""
+    caplog.set_level(logging.DEBUG)
+    first, corrected = "Zdenka Quorvath", "Ilse Quorvath"
+    program = technician.program
+    program.start_calibration(studio.settings, first)
+    technician.wait_for_page("live")
+    technician.wait(lambda: technician.snapshot.link.connected)
+    align(technician, studio)
+    path = technician.snapshot.session_path
+    technician.wait(lambda: program.window.windowTitle().startswith(first))
+    program.show_start()
+    technician.wait_for_page("start")
+    program.open_session(path)
+    technician.wait_for_page("review")
+    library = program.windows.show_library(path.parent)
+    technician.wait(lambda: bool(library.chosen))
+    library._correct_names(library.chosen, corrected)
+    technician.wait(lambda: program.window.windowTitle().startswith(corrected))
+    library.reject()
+    logged = "\n".join(map(logging.Formatter().format, caplog.records))
+    assert "camera: realsense, headset: network" in logged
+    assert "Quorvath" not in logged
 
 
 def test_steps_run_by_themselves_after_one_press(live: Technician, studio: Any) -> None:
