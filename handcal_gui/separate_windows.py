@@ -237,7 +237,7 @@ class SeparateWindows(QObject):
         """Open the dialog that writes a file to send with a bug report."""
         sessions = self._start.new.settings.sessions_path
         folder = self._current.folder
-        settings = SupportSettings(folder, (sessions,))
+        settings = SupportSettings(folder, sessions)
         dialog = SupportDialog(settings, Path.home(), self._window)
         self._open(dialog, dialog.stop)
         return dialog

@@ -101,7 +101,7 @@ def support(arguments: argparse.Namespace) -> None:
     from handcal.station.support import default_settings, run_support
 
     settings = default_settings()
-    sessions = (*settings.sessions, *(arguments.sessions or ()))
+    sessions = tuple(arguments.sessions or ())
     settings = replace(settings, sessions=sessions, frames=arguments.frames)
     with show_progress() as progress:
         written = run_support(arguments.output, settings, progress)

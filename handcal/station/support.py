@@ -16,7 +16,7 @@ from handcal.errors import FileError
 from handcal.io.configuration import configuration_folder
 from handcal.io.files import make_folder, read_json, read_limited, sync_folder
 from handcal.progress import Progress
-from handcal.session.library import read_library
+from handcal.session.library import DELETED, read_library
 from handcal.station.doctor import Finding, examine
 
 MAX_FRAMES_BYTES = 512 * 2**20
@@ -41,8 +41,11 @@ class SupportSettings:
 
     log_folder: Path
     """Folder of the desktop program's log and preferences."""
+    session_folder: Path | None = None
+    """Folder of sessions, read only for the names of wearers to take out. It may be missing or
+    empty: no session may have been made yet."""
     sessions: tuple[Path, ...] = ()
-    """Folders of sessions, read only for the names of wearers to take out."""
+    """Further folders for it, each with at least one session: a wrong one would leave the names."""
     names: tuple[str, ...] = ()
     """Further names to take out."""
     frames: Path | None = None
@@ -54,7 +57,7 @@ def default_settings() -> SupportSettings:
     folder = configuration_folder()
     station = _preferences(folder).get("station")
     named = station.get("sessions") if isinstance(station, dict) else None
-    return SupportSettings(folder, (Path(named),) if isinstance(named, str) and named else ())
+    return SupportSettings(folder, Path(named) if isinstance(named, str) and named else None)
 
 
 def run_support(
@@ -74,7 +77,8 @@ def run_support(
     Raises
     ------
     FileError
-        If it cannot be written, or the frames are missing or larger than 512 MiB.
+        If it cannot be written, one of `sessions` holds no session, or the frames are missing or
+        larger than 512 MiB.
     CancelledError
         If it was cancelled.
     """
@@ -111,12 +115,26 @@ def run_support(
 
 
 def known_names(settings: SupportSettings) -> frozenset[str]:
-    """Return the wearers' names in the preferences and in the journals of all sessions."""
+    """Return the wearers' names in the preferences and in the journals of all sessions.
+
+    Raises
+    ------
+    FileError
+        If one of `sessions` is missing or holds no session.
+    """
     wearers = _preferences(settings.log_folder).get("wearers")
     names = {one for one in wearers if isinstance(one, str)} if isinstance(wearers, list) else set()
     names |= set(settings.names)
-    for folder in settings.sessions:
-        for entry in read_library(folder):
+    own = (settings.session_folder,) if settings.session_folder else ()
+    for folder in (*own, *settings.sessions):
+        entries = (*read_library(folder), *read_library(folder / DELETED))
+        if not entries and folder in settings.sessions:
+            what = "holds no session" if folder.is_dir() else "is not a folder"
+            raise FileError(
+                f"{folder} {what}, so that the names of its wearers would stay in the log; give "
+                "the folder in which the sessions are"
+            )
+        for entry in entries:
             names |= {entry.wearer, *entry.former_wearers}
     return frozenset(names - {""})
 

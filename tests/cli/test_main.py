@@ -135,6 +135,7 @@ def test_misuse_is_one_line_and_exit_code_2(
         ("demo --output text.txt", "cannot create the folder text.txt: File exists"),
         ("headset --port 5000", "no pairing key: set HANDCAL_PAIRING_KEY"),
         ("headset --port 5000 --key-file none", "cannot read none"),
+        ("support --output out.zip --sessions nowhere", "nowhere is not a folder, so that"),
         (f"solve {'n' * 300}", f"cannot read {'n' * 300}: File name too long"),
         (f"replay {'n' * 300}", f"cannot use {'n' * 300}"),
         ("headset --port 5000 --key-file text.txt", "has 6 bytes; use at least"),

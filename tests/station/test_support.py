@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from handcal.errors import CancelledError, FileError
 from handcal.progress import Progress
 from handcal.rig.example import example_rig
+from handcal.session.library import delete_session
 from handcal.session.session import Session
 from handcal.station import support
 from handcal.station.doctor import Finding, Health
@@ -33,7 +35,7 @@ def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SupportSettings
     (folder / "pairing.key").write_text("a secret of the tests")
     with Session.create(tmp_path / "sessions", example_rig(), {}, wearer=WEARERS[1]) as one:
         one.correct_wearer("P-08")  # the log may hold either name
-    return SupportSettings(folder, (tmp_path / "sessions",), (WEARERS[2],))
+    return SupportSettings(folder, tmp_path / "sessions", names=(WEARERS[2],))
 
 
 def contents(path: Path) -> dict[str, str]:
@@ -57,6 +59,35 @@ def test_it_holds_checks_versions_and_log_but_no_name(
     for name in (*WEARERS, str(Path.home()), "a secret of the tests"):
         assert name.casefold() not in everything.casefold()
     assert [one.name for one in output.parent.iterdir()] == ["bundle.zip"]
+
+
+def test_a_folder_that_holds_no_names_is_refused_and_nothing_is_written(
+    tmp_path: Path, settings: SupportSettings
+) -> None:
+    """A mistyped folder, or the session itself, would leave the names in the log."""
+    output = tmp_path / "bundle.zip"
+    (session,) = (tmp_path / "sessions").iterdir()
+    (tmp_path / "empty").mkdir()
+    for given, what in (("tpyo", "is not a folder"), ("empty", "holds no session"), (session, "")):
+        wrong = replace(settings, sessions=(tmp_path / "sessions", tmp_path / given))
+        with pytest.raises(FileError, match=f"{what}.*; give the folder in which the sessions are"):
+            run_support(output, wrong)
+    assert not output.exists()
+    assert run_support(output, replace(settings, session_folder=tmp_path / "of no session yet"))
+
+
+def test_names_of_further_and_of_deleted_sessions_are_taken_out(
+    tmp_path: Path, settings: SupportSettings
+) -> None:
+    log = settings.log_folder / "handcal.log"
+    log.write_text("Grace and P-07 and P-08")
+    with Session.create(tmp_path / "more", example_rig(), {}, wearer="Grace"):
+        pass
+    (session,) = (tmp_path / "sessions").iterdir()
+    delete_session(session)
+    run_support(tmp_path / "bundle.zip", replace(settings, sessions=(tmp_path / "more",)))
+    found = contents(tmp_path / "bundle.zip")["handcal.log"]
+    assert found == "[wearer] and [wearer] and [wearer]"
 
 
 def test_frames_only_if_wanted(tmp_path: Path, settings: SupportSettings) -> None:
