@@ -11,7 +11,7 @@ mkdir -p "$output"
 if [[ -n ${DISPLAY:-}${WAYLAND_DISPLAY:-} ]]; then
     .venv/bin/handcal-gui --source simulator --autopilot --output "$output" "$@"
 else
-    .venv/bin/handcal demo --seed 1 --eyes each --output "$output" --json "$output/demo.json" "$@"
+    .venv/bin/handcal demo --seed 1 --plan recommended --output "$output" --json "$output/demo.json" "$@"
     session=$(.venv/bin/python -c "import json, sys; print(json.load(open(sys.argv[1]))['session'])" "$output/demo.json")
     .venv/bin/handcal export "$session" --output "$output/export"
 fi

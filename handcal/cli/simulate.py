@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
 from handcal.cli.run import ALIGNMENT_OPTIONS
@@ -22,9 +23,25 @@ from handcal.cli.terminal import (
 )
 from handcal.io.files import make_folder
 from handcal.station.faults import Fault
+from handcal.types import Eye, VerdictName
+
+if TYPE_CHECKING:
+    from handcal.lab.demo import DemoSettings
 
 FAULTS = [fault for fault in get_args(Fault) if fault]
 _CONTRADICTED = 3
+_MEANINGS: Mapping[VerdictName, str] = {
+    "accept": "the headset draws with this result, which is within the target and very probably "
+    "better than none.",
+    "repeat": "the headset draws with this result, which is not yet sure or precise enough to be "
+    "accepted.",
+    "keep": "the headset does not draw with this result but with the offline calibration, which "
+    "is expected to err little here, or no more than this result.",
+    "implausible": "the headset does not draw with this result, which cannot be right, but with "
+    "the offline calibration.",
+    "contradicted": "no result can be trusted, and the headset does not draw with one; the "
+    "evidence is named above.",
+}
 _MAX_CODE = 1000
 _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
@@ -103,7 +120,7 @@ def demo(arguments: argparse.Namespace) -> None:
         result = run_demo(settings, rig, make_folder(arguments.output), progress)
     save(arguments.json, result)
     if "reprojection_arcmin" not in result:
-        _say_contradictions(result)
+        _say_contradictions(result, settings)
     shown_table = table("eye", "φ solved, mm", "± σ, mm", "true φ, mm", "error, mm", "verdict")
     for eye, found in result["eyes"].items():
         triples = [triple(found[key]) for key in ("shift_mm", "sigma_mm", "true_shift_mm")]
@@ -125,19 +142,79 @@ def demo(arguments: argparse.Namespace) -> None:
     console.print(
         f"Reprojection error: {error['before']:.1f}′ before, {error['after']:.1f}′ after; "
         f"the wearer's time: {result['seconds']:.1f} s\n"
-        f"Confirmations refused: {guard['rejected']}{rotation}\n"
-        f"Session: {result['session']}"
+        f"Confirmations refused: {guard['rejected']}{rotation}"
     )
+    _say_meaning(result, settings)
     if any(found["verdict"] == "contradicted" for found in result["eyes"].values()):
         sys.exit(_CONTRADICTED)
 
 
-def _say_contradictions(result: dict[str, Any]) -> None:
+def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
     """Say why there is no result, and end."""
     for reason in dict.fromkeys(found["reason"] for found in result["eyes"].values()):
         console.print(f"contradicted: {reason}", markup=False)
-    console.print(f"Session: {result['session']}", markup=False)
+    _say_meaning(result, settings)
     sys.exit(_CONTRADICTED)
+
+
+def _say_meaning(result: dict[str, Any], settings: DemoSettings) -> None:
+    """Say what each verdict means and what to try next, and the session's folder."""
+    verdicts = {eye: found["verdict"] for eye, found in result["eyes"].items()}
+    for line in meanings(verdicts, settings, result["session"]):
+        console.print(line, markup=False)
+    console.print(f"Session: {result['session']}", markup=False)
+
+
+def meanings(
+    verdicts: Mapping[Eye, VerdictName], settings: DemoSettings, session: str
+) -> list[str]:
+    """Return what the verdicts of a demonstration mean and what to try next, one line for each.
+
+    Parameters
+    ----------
+    verdicts : mapping of eye to verdict
+        Of the eyes with a result.
+    settings : DemoSettings
+    session : str
+        Path of the session's folder.
+    """
+    eyes_by_verdict: dict[VerdictName, list[Eye]] = {}
+    for eye, verdict in verdicts.items():
+        eyes_by_verdict.setdefault(verdict, []).append(eye)
+    return [
+        f"{'Both eyes' if len(eyes) > 1 else f'The {eyes[0]} eye'}, {verdict}: "
+        f"{_MEANINGS[verdict]} {_next_step(verdict, settings, session)}"
+        for verdict, eyes in eyes_by_verdict.items()
+    ]
+
+
+def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> str:
+    match verdict:
+        case "accept":
+            return f"Export it for your app: handcal export {session}"
+        case "keep":
+            return f"Try another wearer: handcal demo --seed {settings.seed + 1}"
+        case "contradicted" if settings.fault:
+            return f"Leave out --fault {settings.fault}: handcal demo --seed {settings.seed}"
+        case "contradicted":
+            return f"Do what it asks for, and try again: handcal demo --seed {settings.seed}"
+        case "repeat" if settings.plan == "paper":
+            return (
+                "Try the plan that goes on until the result is accepted or says what is missing: "
+                f"handcal demo --seed {settings.seed} --plan recommended"
+            )
+        case "repeat" if settings.eye_distance == "none":
+            return (
+                "Measure the distance of the eyes, too: handcal demo "
+                f"--seed {settings.seed} --plan recommended --eye-distance ruler"
+            )
+        case "repeat":
+            return (
+                "Do what the reason above says, or try another wearer: "
+                f"handcal demo --seed {settings.seed + 1} --plan recommended"
+            )
+        case _:
+            return f"Check that the rig is the headset's: handcal demo --seed {settings.seed}"
 
 
 @command(

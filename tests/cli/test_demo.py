@@ -9,21 +9,23 @@ import shutil
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
-from handcal.cli.main import main
+from handcal.cli.main import main, parse
+from handcal.cli.simulate import meanings
 from handcal.display import reprojection_arcmin
 from handcal.geometry import rigid
-from handcal.lab.demo import measure_eye_distance
+from handcal.lab.demo import DemoSettings, measure_eye_distance
 from handcal.register.prior import eye_position_m
+from handcal.register.results import USED
 from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Eye, EyeDistance
+from handcal.types import EYES, Eye, EyeDistance, VerdictName
 from tests.helpers import slow_simulator, write_small_rig
 
 SEED = 3
@@ -165,7 +167,13 @@ def test_what_a_person_reads_tells_the_same(run: Run, result: dict[str, Any]) ->
     assert "100 % Done: every alignment is made" in run.out
     error = result["reprojection_arcmin"]
     assert f"{error['before']:.1f}′ before, {error['after']:.1f}′ after" in run.out
-    assert f"Session: {result['session']}" in run.out
+    *_, last = run.out.splitlines()
+    assert last == f"Session: {result['session']}"
+    verdicts = {eye: found["verdict"] for eye, found in result["eyes"].items()}
+    for line in meanings(
+        verdicts, DemoSettings(seed=SEED, eye_distance="headset"), result["session"]
+    ):
+        assert line in run.out
     assert run.err == ""
 
 
@@ -243,6 +251,42 @@ def test_a_wrong_rig_is_judged_by_the_true_eyes() -> None:
     assert moved == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.parametrize("verdict", get_args(VerdictName))
+@pytest.mark.parametrize(
+    "settings",
+    [
+        DemoSettings(seed=5),
+        DemoSettings(plan="recommended"),
+        DemoSettings(plan="recommended", eye_distance="ruler"),
+        DemoSettings(fault="frozen-camera"),
+    ],
+    ids=lambda settings: f"{settings.plan}-{settings.eye_distance}{settings.fault}",
+)
+def test_each_verdict_says_whether_it_is_drawn_and_what_to_try(
+    verdict: VerdictName, settings: DemoSettings
+) -> None:
+    (said,) = meanings({"left": verdict, "right": verdict}, settings, "results/one")
+    assert said.startswith(f"Both eyes, {verdict}: ")
+    assert ("headset draws with this result" in said) == (verdict in USED)
+    _, command = said.rsplit(": handcal ", 1)
+    tried = parse(command.split())
+    if verdict == "accept":
+        assert str(tried.session) == "results/one"
+    elif verdict == "repeat":
+        assert (tried.plan, tried.eye_distance) != (settings.plan, settings.eye_distance) or (
+            tried.seed != settings.seed
+        )
+    assert not getattr(tried, "fault", None)
+
+
+def test_eyes_with_different_verdicts_are_told_apart() -> None:
+    said = meanings({"left": "keep", "right": "accept"}, DemoSettings(), "results/one")
+    assert [one.partition(":")[0] for one in said] == [
+        "The left eye, keep",
+        "The right eye, accept",
+    ]
+
+
 @pytest.mark.parametrize(
     "fault",
     [
@@ -258,6 +302,7 @@ def test_a_fault_is_named_and_never_accepted(fault: str, tmp_path: Path) -> None
     for eye in result["eyes"].values():
         assert (eye["verdict"], eye["evidence"]) == ("contradicted", [fault])
         assert eye["reason"] in run.out.replace("\n", " ")
+    assert "Both eyes, contradicted: " in run.out
 
 
 @pytest.mark.slow
