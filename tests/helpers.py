@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -34,6 +37,8 @@ SILENCERS = "CI", "ORT_DISABLE_TELEMETRY", "ORT_TELEMETRY_DISABLED", "ORT_RUNNIN
 
 _PROBE = range(400_000)
 _PROBE_PERIOD_S = 1.0
+_WAITED_NS = 10_000_000
+"""Waits for the processor in a second that are no sign of a busy machine."""
 
 
 def eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
@@ -47,12 +52,20 @@ def eventually(is_true: Callable[[], object], timeout_s: float = 5.0) -> None:
 class Patience:
     """A time limit that runs more slowly on a busy machine.
 
-    `is_over` times a short computation once a second. If it takes ten times longer than the
-    processor worked on it, the second counts as a tenth.
+    If the threads of a process were ready to run ten times longer than they ran, a second counts
+    as a tenth. Linux tells both; elsewhere `is_over` times a short computation once a second.
+
+    Parameters
+    ----------
+    limit_s : float
+    process : int, optional
+        The process that is waited for; default: this one.
     """
 
-    def __init__(self, limit_s: float) -> None:
+    def __init__(self, limit_s: float, process: int | None = None) -> None:
         self._left_s = limit_s
+        self._process = os.getpid() if process is None else process
+        self._scheduled = _scheduled_ns(self._process)
         self._seen_s = time.monotonic()
 
     def is_over(self) -> bool:
@@ -60,9 +73,42 @@ class Patience:
         now_s = time.monotonic()
         if now_s - self._seen_s < _PROBE_PERIOD_S:
             return self._left_s <= 0.0
-        self._left_s -= (now_s - self._seen_s) / _slowness()
+        before, self._scheduled = self._scheduled, _scheduled_ns(self._process)
+        slowness = _slowness_of(before, self._scheduled) if self._scheduled else _slowness()
+        self._left_s -= (now_s - self._seen_s) / slowness
         self._seen_s = now_s
         return self._left_s <= 0.0
+
+
+def output_of(process: subprocess.Popen[str], patience_s: float) -> tuple[str, str]:
+    """Wait until a program ends, and return what it wrote to its pipes; fail if it goes on."""
+    patience = Patience(patience_s, process.pid)
+    while True:
+        with suppress(subprocess.TimeoutExpired):
+            return process.communicate(timeout=_PROBE_PERIOD_S)
+        assert not patience.is_over(), "the program did not end"
+
+
+def _scheduled_ns(process: int) -> dict[str, tuple[int, int]]:
+    """Return how long each thread of a process ran, and how long it was ready to; empty if unknown.
+
+    In ns, by Linux's ``schedstat``.
+    """
+    scheduled = {}
+    for path in Path(f"/proc/{process}/task").glob("*/schedstat"):
+        with suppress(OSError, ValueError):  # the thread has just ended
+            ran_ns, waited_ns, _ = path.read_text().split()
+            scheduled[path.parent.name] = int(ran_ns), int(waited_ns)
+    return scheduled
+
+
+def _slowness_of(before: dict[str, tuple[int, int]], after: dict[str, tuple[int, int]]) -> float:
+    """Return how many times longer threads took because others ran; at least 1."""
+    ran_ns, waited_ns = (
+        sum(times[part] - before.get(thread, (0, 0))[part] for thread, times in after.items())
+        for part in (0, 1)
+    )
+    return 1.0 + waited_ns / max(ran_ns, 1) if waited_ns > _WAITED_NS else 1.0
 
 
 def _slowness() -> float:

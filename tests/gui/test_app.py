@@ -21,6 +21,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal_gui import app
 from handcal_gui.launch import close_on_signals
+from tests.helpers import Patience, output_of
 
 START_S = 40.0
 
@@ -124,7 +125,7 @@ def test_pictures_that_cannot_be_saved_end_it_before_it_begins(tmp_path: Path) -
     with run(
         "--screenshots", tmp_path / "file", "--preferences", tmp_path / "preferences.json"
     ) as process:
-        _, errors = process.communicate(timeout=START_S)
+        _, errors = output_of(process, START_S)
     assert process.returncode == 2, errors
     assert errors.count("\n") == 1
     assert "file" in errors
@@ -136,7 +137,7 @@ def test_a_picture_that_cannot_be_saved_ends_it(tmp_path: Path) -> None:
     with run(
         "--screenshots", tmp_path / "pictures", "--preferences", tmp_path / "preferences.json"
     ) as process:
-        _, errors = process.communicate(timeout=START_S)
+        _, errors = output_of(process, START_S)
     assert (process.returncode, errors.count("\n")) == (1, 1), errors
     assert "cannot write" in errors
     assert "start.png" in errors
@@ -169,12 +170,12 @@ def start_and_end(folder: Path) -> None:
     """Start the program, tell it to end, and expect that it ends well."""
     preferences = folder / "preferences.json"
     with run("--preferences", preferences, folder / "no session") as process:
-        deadline_s = time.monotonic() + START_S
+        patience = Patience(START_S, process.pid)
         while process.poll() is None and not is_listening(process.pid):
-            assert time.monotonic() < deadline_s
+            assert not patience.is_over()
             time.sleep(0.1)
         process.send_signal(signal.SIGTERM)
-        _, errors = process.communicate(timeout=START_S)
+        _, errors = output_of(process, START_S)
     assert (process.returncode, errors) == (0, "")
     assert preferences.exists()  # the window's place is remembered
 

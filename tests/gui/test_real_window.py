@@ -23,7 +23,7 @@ from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal.types import EYES, UInt8
 from handcal_gui.pages.start.session_entries import find_sessions
-from tests.helpers import ROOT, Patience, write_small_rig
+from tests.helpers import ROOT, Patience, output_of, write_small_rig
 
 ARTEFACTS = ROOT / "artefacts"
 PATIENCE_S = 90.0
@@ -113,12 +113,8 @@ class Window(Closable):
 
     def end(self) -> tuple[int, str]:
         """Wait for the end; return the exit status and what was complained of."""
-        patience = Patience(PATIENCE_S)
-        while True:
-            with suppress(subprocess.TimeoutExpired):
-                _, errors = self.process.communicate(timeout=1.0)
-                return self.process.returncode, errors
-            assert not patience.is_over(), "the program did not end"
+        _, errors = output_of(self.process, PATIENCE_S)
+        return self.process.returncode, errors
 
     def end_well(self) -> None:
         """Wait for the end; a busy computer may make the link complain, and nothing else may."""
@@ -142,7 +138,7 @@ class Window(Closable):
 
 
 def wait_for(what: str, condition: Callable[[], bool], window: Window) -> None:
-    patience = Patience(PATIENCE_S)
+    patience = Patience(PATIENCE_S, window.process.pid)
     while not condition():
         assert window.process.poll() is None, window.end()
         assert not patience.is_over(), f"{what} did not come"

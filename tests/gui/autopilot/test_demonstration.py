@@ -43,7 +43,7 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     rig = write_small_rig(tmp_path / "rig.yaml")
     shown.start(StationSettings(seed=1, rig=str(rig), calibration=CALIBRATION))
     patience = Patience(PATIENCE_S)
-    qtbot.waitUntil(lambda: bool(codes) or patience.is_over(), timeout=round(1e4 * PATIENCE_S))
+    qtbot.waitUntil(lambda: bool(codes) or patience.is_over(), timeout=round(1e5 * PATIENCE_S))
     program.window.close()
     assert (codes, shown.complaint) == ([0], None)
     [path] = (tmp_path / "result").glob("session-*[!t]")
