@@ -108,7 +108,8 @@ class StereoPage(StepPage):
         folders = {tr("Depth camera"): path / "depth", tr("Headset camera"): path / "headset"}
 
         def then() -> None:
-            self.form.enter(**{f"{path.name}_images": str(path) for path in folders.values()})
+            # Not named `path`: Python 3.12 and 3.13 would then lose the one above (PEP 709).
+            self.form.enter(**{f"{one.name}_images": str(one) for one in folders.values()})
             files = {"imager_intrinsics": IMAGER, "depth_to_color": DEPTH_TO_COLOR}
             told = {name: path / "depth" / file for name, file in files.items()}
             self.form.enter(**{name: str(file) for name, file in told.items() if file.exists()})
