@@ -56,7 +56,7 @@ _Words = TypeAliasType("_Words", tuple[str, ...])
 
 @dataclass(frozen=True, eq=False)
 class Aliased:
-    """What `type` statements name, as NumPy's NDArray is one from 2.5 on."""
+    """Fields of types that `type` statements name, as NumPy's NDArray from 2.5 on."""
 
     place_m: _Array[np.float64]
     other_m: Float64 | None = None
