@@ -21,6 +21,9 @@ from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.types import CameraIdentity, Frame, Intrinsics
 
 _POLL_S = 0.002
+# What rendering takes longer is the computer's doing, of which a camera knows nothing: if it
+# counted, a busy computer would be told of a late camera that it does not have.
+_LATENCY_NS = 30_000_000
 # Colour of an Intel RealSense D415 at 1280x720: 69° across, 15 mm beside the depth (data sheet).
 _COLOR = Intrinsics(width=1280, height=720, fx=925.0, fy=925.0, cx=642.0, cy=362.0)
 _T_C_D = rigid([0.002, -0.003, 0.001], [0.015, 0.0, 0.0])
@@ -107,7 +110,8 @@ class SyntheticCamera(Closable):
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Render the next frame, at the camera's rate.
 
-        Its host time is the time of arrival, after exposure and rendering, as with a real camera.
+        Its host time is that of its arrival from a real camera, 30 ms after the exposure at the
+        latest, however long the rendering takes.
 
         Raises
         ------
@@ -120,6 +124,8 @@ class SyntheticCamera(Closable):
             raise CameraError("the simulated camera is closed; open it again")
         while True:
             self._under_way.append(self._expose(self._wait_for_scene(timeout_s)))
+            if not self._settings.late_s:
+                return self._under_way.popleft()
             now_ns = time.monotonic_ns()
             if now_ns >= self._under_way[0].t_host_ns + 1e9 * self._settings.late_s:
                 return replace(self._under_way.popleft(), t_host_ns=now_ns)
@@ -157,7 +163,7 @@ class SyntheticCamera(Closable):
         frame = Frame(
             index=self._index,
             t_camera_ns=self._camera_ns(state),
-            t_host_ns=time.monotonic_ns(),
+            t_host_ns=_arrival_ns(state),
             depth=depth,
             depth_scale_m=settings.sensor.depth_scale_m,
             depth_intrinsics=self.depth_intrinsics,
@@ -176,7 +182,7 @@ class SyntheticCamera(Closable):
             frame,
             index=self._index,
             t_camera_ns=self._camera_ns(state),
-            t_host_ns=time.monotonic_ns(),
+            t_host_ns=_arrival_ns(state),
         )
 
     def _camera_ns(self, state: SceneState) -> int:
@@ -186,6 +192,11 @@ class SyntheticCamera(Closable):
     def close(self) -> None:
         """Stop; safe to call twice."""
         self._is_open = False
+
+
+def _arrival_ns(state: SceneState) -> int:
+    """Return the host time at which a frame exposed at a state, and rendered now, has arrived."""
+    return min(time.monotonic_ns(), state.t_ns + _LATENCY_NS)
 
 
 def simulated_frame(seed: int = 1) -> Frame:
