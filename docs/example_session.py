@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.display import TARGET_DEPTHS_M
+from handcal.core.display import TARGET_DEPTHS_M
+from handcal.core.types import EYES, Alignment, Eye, Float64
 from handcal.io.settings import settings_json
 from handcal.lab.study.wearers import StudyWearer, align_hand, draw_wearer
 from handcal.register.results import SolveSettings, results_json, solve_session
@@ -16,7 +17,6 @@ from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.states import CalibrationSettings
-from handcal.types import EYES, Alignment, Eye, Float64
 
 TARGET = Path(__file__).parents[1] / "resources/example_session"
 SEED = 3

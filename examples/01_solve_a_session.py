@@ -12,7 +12,7 @@ import numpy as np
 
 import handcal
 from handcal.cli.terminal import errors_in_one_line
-from handcal.types import METHODS
+from handcal.core.types import METHODS
 
 EXAMPLE = Path(__file__).parents[1] / "resources/example_session"
 

@@ -16,7 +16,7 @@ import numpy as np
 
 import handcal
 from handcal.cli.terminal import errors_in_one_line
-from handcal.types import EYES, Method
+from handcal.core.types import EYES, Method
 
 # icp-open3d would be a fifth, if Open3D is installed.
 METHODS: tuple[Method, ...] = ("paper", "linear", "consistent", "icp")

@@ -10,11 +10,11 @@ import argparse
 import numpy as np
 
 from handcal.cli.terminal import errors_in_one_line
-from handcal.display import reprojection_arcmin
+from handcal.core.display import reprojection_arcmin
+from handcal.core.types import EYES, METHODS, Eye, Float64
 from handcal.lab.study.wearers import align_hand, draw_wearer
 from handcal.register.results import SolveSettings, solve_session
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, METHODS, Eye, Float64
 
 NOT_CALIBRATED: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
 

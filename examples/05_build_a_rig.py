@@ -15,6 +15,7 @@ import numpy as np
 
 import handcal
 from handcal.cli.terminal import errors_in_one_line
+from handcal.core.types import EYES
 from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.camera import calibrate_camera
 from handcal.rig.compare import compare_rigs
@@ -26,7 +27,6 @@ from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import viewpoint_from_tracked
 from handcal.rig.views import BoardImage, image_files, pair_views, read_views, used
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, write_photographs
-from handcal.types import EYES
 
 
 def main() -> None:

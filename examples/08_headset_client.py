@@ -14,10 +14,10 @@ import time
 
 import numpy as np
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.types import Float64, HeadsetIdentity
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.pairing import read_pairing_key
-from handcal.types import Float64, HeadsetIdentity
 
 IDENTITY = HeadsetIdentity("0123456789abcdef", "Example", runtime="none", app="example 08")
 """A real app creates a random identity once, stores it, and reports the views of its runtime."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from handcal.camera.hololens2 import HoloLens2Camera
 from handcal.camera.settings import HoloLens2Settings
-from handcal.errors import HandcalError, HandError
-from handcal.geometry import transform
+from handcal.core.errors import HandcalError, HandError
+from handcal.core.geometry import transform
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 

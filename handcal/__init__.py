@@ -6,7 +6,7 @@
 >>> print(results.eyes["left"])
 φ = (+3.16 ± 1.29, -4.42 ± 0.92, +0.99 ± 1.86) mm; rms 1.58 mm, 97 % inliers, converged
 
-Lengths are in metres, angles in radians, axes OpenCV's; `handcal.types` names the frames.
+Lengths are in metres, angles in radians, axes OpenCV's; `handcal.core.types` names the frames.
 """
 
 from importlib import import_module
@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from handcal.camera.images import read_frame
-    from handcal.conventions import to_opengl, to_openxr, to_unity
-    from handcal.display import projections, update_matrix
-    from handcal.errors import HandcalError, HandError
+    from handcal.core.conventions import to_opengl, to_openxr, to_unity
+    from handcal.core.display import projections, update_matrix
+    from handcal.core.errors import HandcalError, HandError
+    from handcal.core.rig_types import Rig
+    from handcal.core.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud
     from handcal.export.clouds import read_cloud
     from handcal.hand.shipped import segment
     from handcal.register.guard import rotation_between
     from handcal.register.results import Results
     from handcal.register.solve import solve_eye_shift
     from handcal.rig.rig_file import read_rig, write_rig
-    from handcal.rig_types import Rig
     from handcal.session.session import open_session
     from handcal.station.solve_again import solve
-    from handcal.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud
 
     __version__: str
 

@@ -19,7 +19,7 @@ from typing import NoReturn
 from PySide6.QtCore import QCoreApplication, QLocale, QSize, QTranslator
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.configuration import keep_font_list_in_configuration
 from handcal.io.resources import resource_path
 from handcal.io.x_display import x_server_answers

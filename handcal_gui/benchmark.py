@@ -25,8 +25,9 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from handcal.camera.camera import Camera
-from handcal.errors import HandcalError
-from handcal.geometry import rigid
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.types import CameraIdentity, Frame
 from handcal.io.closable import Closable
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.speed import noisy_frames
@@ -37,7 +38,6 @@ from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.station import Station
-from handcal.types import CameraIdentity, Frame
 from handcal_gui.app import keep_window_quick, use_english_capitals
 from handcal_gui.engine.garbage import collect_in_this_thread
 from handcal_gui.pages.wizard.view import Action
@@ -59,7 +59,7 @@ import sys, time
 import numpy as np
 from handcal.link.client import HeadsetClient
 from handcal.link.pairing import new_device_id
-from handcal.types import HeadsetIdentity
+from handcal.core.types import HeadsetIdentity
 pc, key = ("127.0.0.1", int(sys.argv[1])), sys.stdin.readline().strip().encode()
 with HeadsetClient(pc, key, HeadsetIdentity(new_device_id())) as headset:
     while not headset.dismissed:

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.resources import resource_path
 from handcal_gui.dialogs.keys import KeysDialog
 from handcal_gui.translation import tr

@@ -21,7 +21,7 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QWidget
 
 from handcal.camera.live import is_live
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
 from handcal.station.settings import StationSettings, with_source

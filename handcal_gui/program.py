@@ -11,7 +11,7 @@ from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMessageBox
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.session.session import Session
 from handcal.station.plan import with_eyes
 from handcal.station.settings import StationSettings

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QWidget
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.progress import Progress
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.many import Exported, export_sessions
 from handcal.link.server import HeadsetServer
-from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import SessionRecord
 from handcal.station.support import SupportSettings

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from handcal.geometry import image_points, invert, rigid, transform
+from handcal.core.geometry import image_points, invert, rigid, transform
+from handcal.core.types import Float32, Float64, Frame, Intrinsics
 from handcal.rig.board import Board, BoardView, corners_m
 from handcal.sim.boards import BoardPainter, board_view, pixel_rays
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import Float32, Float64, Frame, Intrinsics
 
 BOARD = Board(squares=(8, 6), square_m=0.03, marker_m=0.022)  # large, for small images
 DEPTH = Intrinsics(640, 360, 502.0, 503.0, 319.0, 179.0)

@@ -17,11 +17,11 @@ import hypothesis
 import numpy as np
 import pytest
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Alignment, Eye
 from handcal.rig.example import Z_E_S_M
 from handcal.sim.alignments import AlignmentSettings, simulate_alignment
 from handcal.sim.hand import make_hand
-from handcal.types import EYES, Alignment, Eye
 
 # A busy machine fails no test.
 hypothesis.settings.register_profile("handcal", deadline=None)

@@ -13,13 +13,13 @@ from typing import get_args
 
 import pytest
 
+from handcal.core.types import Intrinsics
 from handcal.io.resources import resource_path
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.session.session import Session
 from handcal.sim.camera import CAMERA_FAULTS, SyntheticSettings
 from handcal.station.faults import Fault
-from handcal.types import Intrinsics
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests/data"

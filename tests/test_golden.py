@@ -20,9 +20,10 @@ import matplotlib.font_manager  # noqa: F401 - at its first import it starts a p
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, METHODS, Alignment, Eye, Float64
 from handcal.export.export import ExportSettings, export_session
-from handcal.geometry import rigid
 from handcal.hand.detect import HandDetector
 from handcal.hand.finder import HandFinder
 from handcal.hand.settings import SegmentSettings
@@ -42,7 +43,6 @@ from handcal.sim.scene import SceneState
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.solve_again import solve_again
 from handcal.station.states import CalibrationSettings
-from handcal.types import EYES, METHODS, Alignment, Eye, Float64
 from tests.helpers import DATA
 
 GOLDEN = DATA / "golden.json"

@@ -18,12 +18,12 @@ import pytest
 
 import handcal
 from handcal.camera.images import write_frame
-from handcal.display import projection_matrix
+from handcal.core.display import projection_matrix
+from handcal.core.types import EYES, METHODS, Eye, EyeShift
 from handcal.register.results import Results
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.sim.camera import simulated_frame
-from handcal.types import EYES, METHODS, Eye, EyeShift
 from tests.helpers import ROOT, write_thin_session
 
 THE_TEN_LINES = """

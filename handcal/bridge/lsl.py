@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.station.snapshot import Snapshot
 
 STREAM_NAME = "handcal"

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from handcal.conventions import slicer_points_mm, slicer_transform
-from handcal.display import projection_matrix
-from handcal.errors import HandcalError, LinkError
-from handcal.geometry import invert
+from handcal.core.conventions import slicer_points_mm, slicer_transform
+from handcal.core.display import projection_matrix
+from handcal.core.errors import HandcalError, LinkError
+from handcal.core.geometry import invert
+from handcal.core.types import EYES, Float64
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Float64
 
 DEFAULT_PORT = 18944
 MAX_POINTS = 3000

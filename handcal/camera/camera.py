@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
-from handcal.types import CameraIdentity, Float32, Frame, Intrinsics
+from handcal.core.types import CameraIdentity, Float32, Frame, Intrinsics
 
 
 class Camera(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from handcal.types import Frame
+from handcal.core.types import Frame
 
 INFORM_NS = 25_000_000
 """Least time between the frames in which work is done that only informs people: all frames of a

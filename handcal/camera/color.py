@@ -7,8 +7,8 @@ from typing import TypeAlias
 
 from handcal.camera.camera import Camera
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraError
-from handcal.types import CameraIdentity, Frame, UInt8
+from handcal.core.errors import CameraError
+from handcal.core.types import CameraIdentity, Frame, UInt8
 
 Tell: TypeAlias = Callable[[Frame, CameraIdentity], object]
 """Called with the first frame with colour, and the identity of its camera."""

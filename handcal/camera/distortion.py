@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from handcal.camera.sdk_devices import librealsense
-from handcal.errors import CameraError
-from handcal.types import Float64
+from handcal.core.errors import CameraError
+from handcal.core.types import Float64
 
 _COLUMNS, _ROWS = 33, 19
 _LARGEST_ERROR_PX = 0.25

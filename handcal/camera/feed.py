@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from handcal.camera.camera import Camera, ExposesForHand
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.types import CameraIdentity, Float32, Frame
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Float32, Frame
 
 _RATE_WINDOW_S = 1.0
 

@@ -26,11 +26,11 @@ from handcal.camera.images import (
 )
 from handcal.camera.one_camera import of_one_camera
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
-from handcal.errors import CameraEndError, CameraError, FileError
-from handcal.geometry import is_rigid
+from handcal.core.errors import CameraEndError, CameraError, FileError
+from handcal.core.geometry import is_rigid
+from handcal.core.types import CameraIdentity, Float64, Frame
 from handcal.io.files import make_folder, read_json, read_limited, write_json
 from handcal.rig.check import identity_from_json
-from handcal.types import CameraIdentity, Float64, Frame
 
 DESCRIPTION = "recording.json"
 LIST = "frames.csv"

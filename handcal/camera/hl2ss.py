@@ -35,11 +35,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.conventions import opengl_transform
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import invert, is_rigid
+from handcal.core.conventions import opengl_transform
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import invert, is_rigid
+from handcal.core.types import Float32, Float64, UInt16
 from handcal.io.closable import Closable
-from handcal.types import Float32, Float64, UInt16
 
 StreamName: TypeAlias = Literal["ahat", "longthrow"]
 

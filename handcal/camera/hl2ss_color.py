@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 
 from handcal.camera.hl2ss import Hl2ssConnection, Stream, foreign, pose_of, time_of
-from handcal.frozen import freeze
-from handcal.types import Float64, Intrinsics, UInt8
+from handcal.core.frozen import freeze
+from handcal.core.types import Float64, Intrinsics, UInt8
 
 WIDTH_PX, HEIGHT_PX = 640, 360
 _SIZE = WIDTH_PX, HEIGHT_PX

@@ -7,7 +7,7 @@ import time
 from collections import deque
 
 from handcal.camera.hl2ss import Hl2ssConnection, Stream
-from handcal.errors import CameraError, CameraTimeoutError
+from handcal.core.errors import CameraError, CameraTimeoutError
 from handcal.io.closable import Closable
 
 _POLL_S = 0.2

@@ -26,10 +26,10 @@ import numpy as np
 from handcal.camera.hl2ss import Hl2ssConnection, Stream, foreign, time_of
 from handcal.camera.hl2ss_newest import NewestPackets
 from handcal.camera.settings import HoloLens2Settings
-from handcal.errors import CameraError, FileError
+from handcal.core.errors import CameraError, FileError
+from handcal.core.types import CameraIdentity, Frame, Intrinsics, UInt16
 from handcal.io.closable import Closable
 from handcal.rig.rig_file import read_rig
-from handcal.types import CameraIdentity, Frame, Intrinsics, UInt16
 
 _VIDEO_PORT, _DEPTH_PORT = 3819, 3821
 _LIST_REQUEST = struct.pack("<B", 2)

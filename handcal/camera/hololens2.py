@@ -19,10 +19,10 @@ from handcal.camera.hl2ss_color import COLOR, parse_color, start_color, stop_col
 from handcal.camera.hl2ss_newest import NewestPackets
 from handcal.camera.radial import DEPTH_SCALE_M, PinholeView, is_not_wrapped, white_brightness
 from handcal.camera.settings import HoloLens2Settings
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import invert
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import invert
+from handcal.core.types import CameraIdentity, Float32, Float64, Frame, UInt8
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Float32, Float64, Frame, UInt8
 
 PREFIX = "hololens2:"
 _LONG_THROW, _WITH_COLOR, _REALSENSE = ",longthrow", ",color", ",realsense"

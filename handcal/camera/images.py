@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Frame, Intrinsics, UInt8, UInt16
 from handcal.io.files import make_folder, read_json, write_atomic, write_json
 from handcal.io.images import MAX_SIDE_PX, read_image, write_png
-from handcal.types import Frame, Intrinsics, UInt8, UInt16
 
 DEPTH_SCALES_M = 1e-6, 0.1
 """Least and largest plausible depth scale, metres per unit."""

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 from handcal.camera.camera import Camera
 from handcal.camera.take_board import see_board
-from handcal.errors import CameraEndError
-from handcal.progress import Progress
+from handcal.core.errors import CameraEndError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import DepthCheck
+from handcal.core.types import Frame
 from handcal.rig.board import Board, BoardError
 from handcal.rig.choose import ChooseSettings, ViewSelector
 from handcal.rig.depth import DepthView, depth_view, fit_depth
 from handcal.rig.views import MAX_VIEWS, ViewsError
-from handcal.rig_types import DepthCheck
-from handcal.types import Frame
 
 _SILENT_S = 5.0
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from handcal.errors import CameraError, CameraTimeoutError
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Frame, Intrinsics
 
 _RATE_HZ = 20
 _STEREO_PX = 640, 400

@@ -7,7 +7,7 @@ from itertools import chain
 
 import numpy as np
 
-from handcal.types import Frame
+from handcal.core.types import Frame
 
 
 def of_one_camera(frames: Iterable[Frame]) -> tuple[Frame, Iterator[Frame]]:

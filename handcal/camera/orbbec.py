@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import rigid
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import rigid
+from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8
 
 _RATE_HZ = 30
 _MM_M = 1e-3

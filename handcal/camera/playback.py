@@ -6,9 +6,9 @@ import time
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Frame, Intrinsics
 
 _LATE_S = 0.05
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from handcal.errors import CameraError
-from handcal.types import Bool, Float32, Intrinsics, UInt16
+from handcal.core.errors import CameraError
+from handcal.core.types import Bool, Float32, Intrinsics, UInt16
 
 DEPTH_SCALE_M = 0.0001
 """Metres per unit of the resampled depth."""

@@ -24,10 +24,10 @@ from handcal.camera.sdk_frames import (
 )
 from handcal.camera.sdk_options import HandExposure, apply_options, depth_filter
 from handcal.camera.settings import Profile, RealSenseSettings
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import image_points, transform
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import image_points, transform
+from handcal.core.types import Float32, Frame
 from handcal.io.closable import Closable
-from handcal.types import Float32, Frame
 
 _SIZES = ("1280x720", "848x480")
 _RATE_HZ = 30

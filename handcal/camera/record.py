@@ -11,10 +11,10 @@ from pathlib import Path
 
 from handcal.camera.camera import Camera
 from handcal.camera.recordings import record_frames
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.progress import Progress
+from handcal.core.types import Frame
 from handcal.io.files import make_folder
-from handcal.progress import Progress
-from handcal.types import Frame
 
 _POLL_S = 0.2
 

@@ -18,8 +18,8 @@ from handcal.camera.sdk_frames import (
     intrinsics_of,
     with_color,
 )
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
-from handcal.types import CameraIdentity, Float64, Frame
+from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.types import CameraIdentity, Float64, Frame
 
 _BEGINNINGS = (b"SQLite format 3\0", b"#ROSBAG V")  # .db3, .bag
 _OPTION = re.compile(r"/option/([^/]*)/")

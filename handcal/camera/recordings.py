@@ -10,7 +10,7 @@ from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.camera.recording import RecordingCamera
 from handcal.camera.ros import RosCamera, ros_recording
 from handcal.camera.sdk_recorder import record_db3
-from handcal.types import CameraIdentity, Frame
+from handcal.core.types import CameraIdentity, Frame
 
 RECORDING_SUFFIXES = (".db3", ".bag")
 """Suffixes of librealsense's recordings."""

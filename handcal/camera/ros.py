@@ -17,10 +17,10 @@ from scipy.spatial.transform import Rotation
 
 from handcal.camera.images import DISTORTION_COUNTS
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
-from handcal.errors import CameraEndError, CameraError
-from handcal.geometry import invert, rigid
+from handcal.core.errors import CameraEndError, CameraError
+from handcal.core.geometry import invert, rigid
+from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8, UInt16
 from handcal.io.images import MAX_SIDE_PX
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8, UInt16
 
 METADATA = "metadata.yaml"
 

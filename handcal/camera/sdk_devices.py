@@ -15,9 +15,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from handcal.camera.usb import explain_absence
-from handcal.errors import CameraError
-from handcal.progress import Progress
-from handcal.types import CameraIdentity
+from handcal.core.errors import CameraError
+from handcal.core.progress import Progress
+from handcal.core.types import CameraIdentity
 
 _MOST_CHARACTERS = 100
 _LONGEST_LISTING_S, _POLL_S = 30.0, 0.1

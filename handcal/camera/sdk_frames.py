@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.camera.distortion import opencv_distortion
-from handcal.geometry import rigid
-from handcal.types import Float64, Frame, Intrinsics, UInt8
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, Frame, Intrinsics, UInt8
 
 
 def frame_of(depth: Any, intrinsics: Intrinsics) -> Frame:

@@ -11,8 +11,8 @@ import numpy as np
 
 from handcal.camera.sdk_devices import librealsense
 from handcal.camera.settings import RealSenseSettings
-from handcal.errors import CameraError
-from handcal.types import Float64
+from handcal.core.errors import CameraError
+from handcal.core.types import Float64
 
 _AIM_S = 1.0
 _LOST_S = 3.0

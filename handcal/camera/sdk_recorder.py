@@ -12,9 +12,9 @@ import numpy as np
 
 from handcal.camera.one_camera import of_one_camera
 from handcal.camera.sdk_devices import librealsense
-from handcal.errors import CameraError
+from handcal.core.errors import CameraError
+from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics
 from handcal.io.files import sync_folder
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics
 
 _RATE_HZ = 30
 _COEFFICIENTS = 5

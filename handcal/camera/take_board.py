@@ -10,15 +10,15 @@ from glob import escape
 from pathlib import Path
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraEndError, CameraTimeoutError
+from handcal.core.errors import CameraEndError, CameraTimeoutError
+from handcal.core.progress import Progress
+from handcal.core.types import CameraIdentity, Frame, UInt8
 from handcal.io.files import make_folder
 from handcal.io.images import png_bytes, write_png
-from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
 from handcal.rig.choose import ChooseSettings, ViewSelector
 from handcal.rig.formats import write_intrinsics, write_pose
-from handcal.types import CameraIdentity, Frame, UInt8
 
 IMAGER, DEPTH_TO_COLOR = "depth-imager.json", "depth-to-color.json"
 """Files with the calibration of a depth camera, beside its colour images."""

@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 
 from handcal.camera.playback import PlaybackSettings
-from handcal.errors import CameraEndError, CameraError, FileError
+from handcal.core.errors import CameraEndError, CameraError, FileError
+from handcal.core.types import UInt8
 from handcal.io.closable import Closable
 from handcal.io.images import IMAGE_SUFFIXES, MAX_SIDE_PX, read_image
-from handcal.types import UInt8
 
 _BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_DSHOW, "darwin": cv2.CAP_AVFOUNDATION}
 _MOST_CAMERAS = 10

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, get_args
 
 from handcal.cli.output import console, show_progress, table
 from handcal.cli.terminal import arg, flag, number, value
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.rig.board import Board, BoardKind
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder
 

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
 from handcal.cli.terminal import arg, command, fail, file_option, flag, folder_option, patience
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 
 if TYPE_CHECKING:
-    from handcal.progress import Progress
+    from handcal.core.progress import Progress
     from handcal.station.doctor import Finding
 
 

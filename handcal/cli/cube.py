@@ -12,12 +12,12 @@ from rich.markup import escape
 from handcal.cli.boards import GRID_OPTION
 from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
-from handcal.errors import CameraError, HandcalError
+from handcal.core.errors import CameraError, HandcalError
+from handcal.core.types import EYES
 from handcal.io.files import make_folder
 from handcal.lab.evaluate.cube_folder import CapturePlan
 from handcal.rig.cube import Cube
 from handcal.rig.print_page import PAPERS
-from handcal.types import EYES
 
 if TYPE_CHECKING:
     from handcal.lab.settings import CubeTestSettings

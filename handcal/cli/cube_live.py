@@ -12,13 +12,13 @@ from handcal.cli.display_check import network_server
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN
 from handcal.cli.terminal import arg, command, file_option, flag, number, patience, value
-from handcal.errors import HandcalError
-from handcal.types import EYES
+from handcal.core.errors import HandcalError
+from handcal.core.types import EYES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from handcal.types import Eye, Float64
+    from handcal.core.types import Eye, Float64
 
 _STEP_MM = 0.25
 _KEYS: Mapping[str, tuple[int, float]] = {

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 from handcal.cli.output import console
 from handcal.cli.run import KEYS, LISTEN, paired_headsets
 from handcal.cli.terminal import arg, command, file_option, patience
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
+    from handcal.core.rig_types import Rig
+    from handcal.core.types import Eye
     from handcal.link.server import HeadsetServer
     from handcal.rig.display_check import Probe
-    from handcal.rig_types import Rig
     from handcal.station.display_check import Answer, Observe, Show
-    from handcal.types import Eye
 
 _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-plane"
 
@@ -56,10 +56,10 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
 )
 def display_check(arguments: argparse.Namespace) -> None:
     """Check that a connected headset draws what it is sent, and store the check in a rig file."""
+    from handcal.core.types import EYES
     from handcal.rig.report import display_finding
     from handcal.rig.rig_file import read_rig, write_rig
     from handcal.station.display_check import run_display_check
-    from handcal.types import EYES
 
     rig = read_rig(arguments.rig)
     eyes = EYES if arguments.eyes == "both" else (arguments.eyes,)
@@ -84,12 +84,12 @@ def display_check(arguments: argparse.Namespace) -> None:
 
 @contextmanager
 def _simulated(rig: Rig, mode: str) -> Iterator[tuple[HeadsetServer, Observe]]:
+    from handcal.core.types import HeadsetIdentity
     from handcal.link.client import HeadsetClient
     from handcal.link.pairing import new_device_id, new_pairing_key
     from handcal.link.server import HeadsetServer
     from handcal.sim.display import DISPLAY_MODES, SimulatedDisplay
     from handcal.station.display_check import by_camera
-    from handcal.types import HeadsetIdentity
 
     key = new_pairing_key().encode()
     identity = HeadsetIdentity(new_device_id(), "Simulated display", "simulator", mode)

@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import arg, command, file_option, folder_option, number, value
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder, require_suffix
 

@@ -15,8 +15,8 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
+from handcal.core.progress import Progress
 from handcal.io.files import make_folder, write_json
-from handcal.progress import Progress
 
 console = Console(soft_wrap=True, highlight=False)
 

@@ -10,14 +10,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.camera.camera import Camera
-from handcal.errors import CameraEndError, HandError
-from handcal.frozen import freeze
-from handcal.geometry import transform
+from handcal.core.errors import CameraEndError, HandError
+from handcal.core.frozen import freeze
+from handcal.core.geometry import transform
+from handcal.core.types import Float64, Frame, HandCloud
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 from handcal.register.rigid import RigidSettings, register_rigid
 from handcal.register.surface import Surface, describe_surface
-from handcal.types import Float64, Frame, HandCloud
 
 
 @dataclass(frozen=True, slots=True, eq=False)

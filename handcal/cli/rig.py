@@ -25,7 +25,7 @@ from handcal.cli.boards import (
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, show_progress, until_interrupted
 from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
 from handcal.rig.camera import LENS_CHOICES
 from handcal.rig.formats import CALIBRATION_FORMATS

@@ -28,13 +28,13 @@ from handcal.cli.terminal import (
     one_of,
     value,
 )
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.types import EYES
 from handcal.io.files import make_folder
-from handcal.types import EYES
 
 if TYPE_CHECKING:
+    from handcal.core.types import Intrinsics
     from handcal.rig.viewpoint import ViewpointPose
-    from handcal.types import Intrinsics
 
 _METRES = number(float, 0.1, 100.0)
 _DISPLAY = arg(

@@ -13,12 +13,12 @@ from handcal.cli.cameras import REALSENSE_OPTIONS, open_source, realsense_of
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import KEYS, LISTEN
 from handcal.cli.terminal import arg, command, file_option, flag, patience
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
-    from handcal.rig_types import Rig
+    from handcal.core.rig_types import Rig
 
 RIG_AND_OUTPUT = (
     file_option("--rig", "rig file to start from (default: the shipped example)"),

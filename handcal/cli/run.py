@@ -22,7 +22,7 @@ from handcal.cli.terminal import (
     seed,
     value,
 )
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:

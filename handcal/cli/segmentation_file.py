@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.geometry import image_points
+from handcal.core.geometry import image_points
+from handcal.core.types import Frame, HandCloud, UInt8
 from handcal.io.files import make_folder, write_atomic, write_json, write_ply
-from handcal.types import Frame, HandCloud, UInt8
 
 _HAND_RGB = (0, 200, 80)
 _CONTOUR_RGB = (0, 220, 255)

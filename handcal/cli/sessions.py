@@ -9,9 +9,9 @@ from pathlib import Path
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
+from handcal.core.types import METHODS
 from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
-from handcal.types import METHODS
 
 _METRES = number(float, 1e-3, 1e6)
 
@@ -38,10 +38,10 @@ def solve(arguments: argparse.Namespace) -> None:
     """Solve a stored session again; the session itself is not changed."""
     import numpy as np
 
+    from handcal.core.types import EyeDistance
     from handcal.register.results import results_json
     from handcal.session.session import Session
     from handcal.station import solve_again
-    from handcal.types import EyeDistance
 
     eye_distance = None
     if arguments.eye_distance_mm is not None:
@@ -173,12 +173,12 @@ def prior(arguments: argparse.Namespace) -> None:
 
     import numpy as np
 
-    from handcal.errors import FileError
+    from handcal.core.errors import FileError
+    from handcal.core.types import EYES
     from handcal.io.resources import resource_path
     from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior, eye_slice
     from handcal.rig.rig_file import read_rig
     from handcal.station.lab_prior import run_learn_prior
-    from handcal.types import EYES
 
     if not arguments.folder.is_dir():
         raise FileError(f"{arguments.folder} is not a folder; choose the one that holds sessions")

@@ -21,9 +21,9 @@ from handcal.cli.terminal import (
     seed,
     value,
 )
+from handcal.core.types import Eye, VerdictName
 from handcal.io.files import make_folder
 from handcal.station.faults import Fault
-from handcal.types import Eye, VerdictName
 
 if TYPE_CHECKING:
     from handcal.lab.demo import DemoSettings
@@ -97,8 +97,8 @@ _LINK = (
 )
 def demo(arguments: argparse.Namespace) -> None:
     """Calibrate a simulated wearer from start to end, and compare with the truth."""
+    from handcal.core.types import EyeDistance
     from handcal.lab.demo import DemoSettings, run_demo
-    from handcal.types import EyeDistance
 
     settings = DemoSettings(
         seed=arguments.seed,

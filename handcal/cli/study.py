@@ -22,8 +22,8 @@ from handcal.cli.terminal import (
 )
 
 if TYPE_CHECKING:
+    from handcal.core.progress import Progress
     from handcal.lab.study.studies import StudyResult
-    from handcal.progress import Progress
 
 Result = TypeVar("Result")
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias
 
-from handcal.errors import CancelledError, HandcalError
+from handcal.core.errors import CancelledError, HandcalError
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite

@@ -7,8 +7,8 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from handcal.errors import FileError
-from handcal.progress import Progress
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
 from handcal.session.journal import JOURNAL_END
 from handcal.session.session import SessionRecord
 

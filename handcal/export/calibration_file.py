@@ -12,16 +12,16 @@ from typing import Any
 
 import cv2
 
-from handcal.conventions import (
+from handcal.core.conventions import (
     opengl_projection,
     opengl_transform,
     openxr_view,
     unity_world_to_camera,
 )
+from handcal.core.types import EYES, Eye, Projection
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
 from handcal.io.files import write_atomic, write_json
 from handcal.rig.rig_file import quoted
-from handcal.types import EYES, Eye, Projection
 
 CALIBRATION_VERSION = 1
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.types import Bool, Float64
 from handcal.export.outcome import SessionOutcome
 from handcal.io.files import make_folder, read_limited, write_ply
-from handcal.progress import Progress
 from handcal.register.solve import MAX_POINTS
-from handcal.types import Bool, Float64
 
 _FORMATS = ".ply", ".pcd", ".xyz"
 _MAX_CLOUD_BYTES = 256 * 2**20

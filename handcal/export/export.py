@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
+from handcal.core.progress import Progress
 from handcal.export.archive import write_archive
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.clouds import write_clouds
@@ -16,7 +17,6 @@ from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.staging import Staging
 from handcal.export.tables import write_comparisons, write_parameters, write_trials
 from handcal.export.tools import write_northstar, write_openxr, write_slicer, write_unity
-from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 
 _ALL = {**FORMATS, **TOOL_FORMATS}

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from handcal.core.types import Eye, Float64
 from handcal.export.figures import ResidualCells
 from handcal.register.results import Results
 from handcal.report.document import FigureRow
 from handcal.session.trial import Trial
-from handcal.types import Eye, Float64
 
 
 def convergence_rows(results: Results) -> Iterator[FigureRow]:

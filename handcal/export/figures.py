@@ -17,13 +17,13 @@ from matplotlib.patches import Ellipse, Polygon, Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from handcal.display import eye_projection
+from handcal.core.display import eye_projection
+from handcal.core.geometry import project, transform
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import EYES, Alignment, Eye, EyeShift, Float64
 from handcal.export.outcome import SessionOutcome
-from handcal.geometry import project, transform
 from handcal.register.results import Results
-from handcal.rig_types import EyeDisplay
 from handcal.session.trial import Trial
-from handcal.types import EYES, Alignment, Eye, EyeShift, Float64
 
 COLORS: Mapping[Eye, str] = {"left": "#0072B2", "right": "#D55E00"}
 MARKERS: Mapping[Eye, str] = {"left": "o", "right": "s"}

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from handcal.errors import CancelledError, FileError
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.progress import Progress
 from handcal.export.export import ExportSettings, export_session
-from handcal.progress import Progress
 from handcal.session.session import Session
 
 

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
+from handcal.core.types import EYES, Alignment, Eye, EyeShift, Verdict, VerdictName
 from handcal.export import figures
 from handcal.export.definitions import DEFINITIONS
 from handcal.export.figure_rows import (
@@ -29,7 +30,6 @@ from handcal.report.document import Column, Figure, Item, Report, Section, Table
 from handcal.report.provenance import at_minute, made_with, settings_items
 from handcal.session.comparison import read_comparisons
 from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
-from handcal.types import EYES, Alignment, Eye, EyeShift, Verdict, VerdictName
 
 _ORIGINS: Mapping[ShiftOrigin, str] = {
     "fine_tuned": "fine-tuned by hand",

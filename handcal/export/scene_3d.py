@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handcal.core.geometry import invert, transform
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Eye, Float64
 from handcal.export.outcome import SessionOutcome
-from handcal.geometry import invert, transform
-from handcal.rig_types import EyeDisplay
-from handcal.types import Eye, Float64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

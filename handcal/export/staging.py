@@ -11,7 +11,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.closable import Closable
 from handcal.io.files import make_folder, sync_folder
 from handcal.io.lock import FileLock

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.conventions import (
+from handcal.core.conventions import (
     opengl_projection,
     opengl_transform,
     openxr_view,
@@ -19,12 +19,12 @@ from handcal.conventions import (
     slicer_transform,
     unity_world_to_camera,
 )
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.geometry import invert, rigid
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Eye, Float64
 from handcal.export.outcome import SessionOutcome
-from handcal.geometry import invert, rigid
 from handcal.io.files import make_folder, write_atomic, write_json
-from handcal.progress import Progress
-from handcal.types import EYES, Eye, Float64
 
 _VERSION = 1
 _GRID = 65

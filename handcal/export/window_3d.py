@@ -19,15 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.progress import Progress
+from handcal.core.types import Eye, Float64
 from handcal.export.outcome import SessionOutcome
 from handcal.export.scene_3d import Scene3d, make_scenes
-from handcal.geometry import rigid
 from handcal.io.files import make_folder, read_limited, require_suffix, write_atomic
 from handcal.io.x_display import x_server_answers
-from handcal.progress import Progress
 from handcal.register.verdict import VerdictSettings
-from handcal.types import Eye, Float64
 
 _KEYS = "N, P: next, previous alignment; E: other eye; V: view from the eye; O: oblique view"
 _SIZE_PX = 1200, 800

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.geometry import camera_matrix, image_points, invert, transform
+from handcal.core.geometry import camera_matrix, image_points, invert, transform
+from handcal.core.types import Bool, Float64, Frame, Intrinsics
 from handcal.hand.settings import NEARER_M, Roi, RoiSettings
 from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
-from handcal.types import Bool, Float64, Frame, Intrinsics
 
 STEP_PX = 8
 """Step of the coarse image, in pixels of the depth image: fine enough to locate a hand."""

@@ -11,9 +11,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from handcal.errors import FileError
-from handcal.frozen import freeze
-from handcal.types import Float32, Float64, UInt8
+from handcal.core.errors import FileError
+from handcal.core.frozen import freeze
+from handcal.core.types import Float32, Float64, UInt8
 
 STRIDES = (8, 16, 32)
 """Strides of the network's three levels, in pixels."""

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from handcal.errors import HandError
+from handcal.core.errors import HandError
+from handcal.core.types import Frame, HandCloud, Intrinsics
 from handcal.hand.roi import Detector, RoiFinder
 from handcal.hand.segment import segment_hand, segmented_window
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
-from handcal.types import Frame, HandCloud, Intrinsics
 
 _EDGE_PX = 3  # a hand this close to a side of its window may continue beyond it
 _EVERYWHERE = 1000.0  # margin of a window that is the whole image

@@ -14,12 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.errors import HandError
+from handcal.core.errors import HandError
+from handcal.core.types import Bool, Float32, Float64
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, covered, goes_on, on_border, solid_surface
 from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
 from handcal.hand.wrist import EDGE_RADIUS_M, FACING_RADIUS_M, box_exit_m, find_wrist_m
-from handcal.types import Bool, Float32, Float64
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
 # Personnel: hand breadth 68–100 mm, hand length 165–220 mm). Seen from its edge the inscribed

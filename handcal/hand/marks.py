@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.types import Bool, Float64
+from handcal.core.types import Bool, Float64
 
 # A finger tip is farther from the wrist than the gaps beside it by at least this much.
 _LEAST_FINGER_M = 0.012

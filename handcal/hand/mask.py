@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.errors import HandError
+from handcal.core.errors import HandError
+from handcal.core.types import Bool, Frame, UInt8
 from handcal.hand.locate import PART_M2, LocatedHand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, goes_on, on_border, solid_surface
@@ -20,7 +21,6 @@ from handcal.hand.view import (
     pixels_of,
     view_depth,
 )
-from handcal.types import Bool, Frame, UInt8
 
 # Share of the hand's outline that may touch the image border.
 _BORDER_CONTACT_M = 0.01

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.geometry import image_points, transform
-from handcal.types import Float64, Frame, HandCloud
+from handcal.core.geometry import image_points, transform
+from handcal.core.types import Float64, Frame, HandCloud
 
 
 def contour_px(cloud: HandCloud, frame: Frame) -> tuple[Float64, Float64 | None]:

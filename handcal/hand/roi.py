@@ -6,11 +6,11 @@ from typing import Protocol
 
 import numpy as np
 
+from handcal.core.types import Float64, Frame, UInt8
 from handcal.hand.coarse_cloud import STEP_PX, CoarseCloud, Track, center, inside_box
 from handcal.hand.detect import Detections, overlaps
 from handcal.hand.settings import NEARER_M, RoiSettings, SegmentSettings
 from handcal.hand.view import Box
-from handcal.types import Float64, Frame, UInt8
 
 _SAME_OVERLAP = 0.3
 _NOT_SEEN = "no hand is seen in the colour image; raise the bare hand in front of the camera"

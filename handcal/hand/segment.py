@@ -5,13 +5,13 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from handcal.geometry import image_points, transform
+from handcal.core.geometry import image_points, transform
+from handcal.core.types import Bool, Float32, Frame, HandCloud, Intrinsics, UInt8
 from handcal.hand.locate import locate_hand
 from handcal.hand.mask import HandMask, mask_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.surface import behind_nearest
 from handcal.hand.view import Box, Pixels, deproject, pixels_of, view_depth
-from handcal.types import Bool, Float32, Frame, HandCloud, Intrinsics, UInt8
 
 __all__ = ["SegmentSettings", "segment_hand", "segmented_window"]
 

@@ -8,12 +8,12 @@ from typing import get_args
 
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Frame, HandCloud
 from handcal.hand.detect import DetectSettings, HandDetector
 from handcal.hand.finder import HandFinder
 from handcal.hand.settings import Roi, SegmentSettings
 from handcal.io.resources import resource_path
-from handcal.types import Frame, HandCloud
 
 FLOAT_MODEL, INTEGER_MODEL = "hand_detector.onnx", "hand_detector_int8.onnx"
 

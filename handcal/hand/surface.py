@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from handcal.types import Bool, UInt16
+from handcal.core.types import Bool, UInt16
 
 NEIGHBOURS = np.ones((3, 3), np.uint8)
 _UNMEASURED = np.uint16(65535)

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.geometry import camera_matrix
-from handcal.types import Bool, Float32, Frame, Intrinsics, UInt16
+from handcal.core.geometry import camera_matrix
+from handcal.core.types import Bool, Float32, Frame, Intrinsics, UInt16
 
 Box: TypeAlias = tuple[int, int, int, int]
 """x0, y0, x1, y1 in pixels, x1 and y1 exclusive."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from handcal.core.types import Bool, Float32, Float64
 from handcal.hand.view import Box, DepthView
-from handcal.types import Bool, Float32, Float64
 
 _LEAST_COS = 0.5  # of the angle between the axis and the image plane
 # Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.errors import FileError
-from handcal.types import UInt8
+from handcal.core.errors import FileError
+from handcal.core.types import UInt8
 
 MAX_JSON_BYTES = 16 * 2**20
 _MOST_DIGITS = 20  # 64 bits and a sign: neither NumPy nor a float overflows

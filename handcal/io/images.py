@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import UInt8
 from handcal.io.files import read_limited, require_suffix, write_atomic
-from handcal.types import UInt8
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_FILE_BYTES = 64 * 2**20

@@ -12,7 +12,7 @@ from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 
-from handcal.errors import FileError, InUseError
+from handcal.core.errors import FileError, InUseError
 
 if sys.platform == "win32":
     import msvcrt

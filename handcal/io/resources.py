@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 
 
 def resource_path(name: str) -> Path:

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 
 Settings = TypeVar("Settings")
 

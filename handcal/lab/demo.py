@@ -15,13 +15,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from handcal.display import reprojection_arcmin
-from handcal.errors import HandcalError
-from handcal.progress import Progress
+from handcal.core.display import reprojection_arcmin
+from handcal.core.errors import HandcalError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName
 from handcal.register.prior import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import Rig
 from handcal.sim.hand import Side
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
@@ -35,7 +36,6 @@ from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import Observation
 from handcal.station.station import Station
-from handcal.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName
 
 # A slow computer gets more time.
 _PATIENCE = Patience(60.0, frames=300)

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Eye
 from handcal.hand.settings import Roi
 from handcal.io.files import user_path
 from handcal.report.write import may_be_replaced
 from handcal.session.journal import JOURNAL, find_journals
-from handcal.types import Eye
 
 Size: TypeAlias = Literal["full", "quick"]
 """``quick`` runs few trials, as a smoke test; its results are not meaningful."""

@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
@@ -25,7 +26,6 @@ from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import Packet, Rejection, Slot
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 
 MAX_WEARERS = 16
 _POSES_PER_DATAGRAM = 3

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.errors import PosePendingError
+from handcal.core.errors import PosePendingError
 
 DRIFT_PRIOR = 50e-6
 """Prior standard deviation of a crystal's drift, s/s."""

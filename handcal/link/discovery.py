@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from zeroconf import Error, ServiceBrowser, ServiceInfo, ServiceListener, Zeroconf
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.io.closable import Closable
 from handcal.link.transport import Address
 from handcal.link.wire import VERSION

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from handcal.core.types import EYES, Eye, Projection
 from handcal.link import handcal_pb2 as pb
-from handcal.types import EYES, Eye, Projection
 
 DIGEST_BYTES = 16
 

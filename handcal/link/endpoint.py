@@ -10,7 +10,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.io.closable import Closable
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from handcal.geometry import is_rigid
+from handcal.core.geometry import is_rigid
+from handcal.core.types import EYES, Eye, Float64
 from handcal.link import handcal_pb2 as pb
-from handcal.types import EYES, Eye, Float64
 
 MAX_DISPLAY_PX = 65_535
 EYE_CODES: Mapping[Eye, pb.Eye] = {"left": pb.EYE_LEFT, "right": pb.EYE_RIGHT}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import segno
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 
 CODE_CHARACTERS = 26
 _ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZ234567"

@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
+from handcal.core.progress import Progress
 from handcal.link.discovery import Announcement
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import OFFER_S, Pairing, Pairings
 from handcal.link.server import HeadsetServer
 from handcal.link.transport import Address
-from handcal.progress import Progress
 
 _LOG = logging.getLogger(__name__)
 _POLL_S = 0.1

@@ -14,6 +14,7 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from numpy.typing import ArrayLike, NDArray
 
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView, Projection
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import DIGEST_BYTES
 from handcal.link.fields import (
@@ -32,7 +33,6 @@ from handcal.link.pairing import MAX_NAME_CHARACTERS
 from handcal.link.reliable import Receipt
 from handcal.link.shapes import Shape, Target
 from handcal.link.wire import MAX_FRAGMENTS, Slot
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView, Projection
 
 QUANTUM_M = 1e-4
 MAX_POINTS = 50_000

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from handcal.core.types import Eye
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import DIGEST_BYTES
 from handcal.link.fields import MalformedError, read_eyes
-from handcal.types import Eye
 
 MAX_NUDGE_ARCMIN = 300.0
 MAX_NUDGE_SIZE = 0.3

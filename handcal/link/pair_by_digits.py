@@ -6,7 +6,7 @@ import secrets
 import time
 from contextlib import suppress
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.link import exchange, greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.fields import MalformedError

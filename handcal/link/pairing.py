@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from threading import RLock
 
-from handcal.errors import FileError, LinkError
+from handcal.core.errors import FileError, LinkError
 from handcal.io.configuration import configuration_folder
 from handcal.io.files import make_folder, read_limited, write_atomic
 from handcal.io.lock import FileLock

@@ -7,9 +7,9 @@ import bisect
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.errors import PoseError, PosePendingError
-from handcal.geometry import interpolate_pose
-from handcal.types import Float64
+from handcal.core.errors import PoseError, PosePendingError
+from handcal.core.geometry import interpolate_pose
+from handcal.core.types import Float64
 
 SLOW_M = 0.005
 SLOW_RAD = 0.01

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handcal.core.types import EYES, Eye, Projection
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, nudges
 from handcal.link.drawn import drawn_digest, drawn_projections
@@ -19,7 +20,6 @@ from handcal.link.settings import LinkSettings
 from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Transport
 from handcal.link.wire import Slot
-from handcal.types import EYES, Eye, Projection
 
 
 class Sender(Endpoint):

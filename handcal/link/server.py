@@ -8,7 +8,8 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from handcal.errors import FileError, PosePendingError
+from handcal.core.errors import FileError, PosePendingError
+from handcal.core.types import Float64, HeadsetIdentity
 from handcal.link import greetings, messages, nudges, version1, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.clock import ClockEstimator
@@ -27,7 +28,6 @@ from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import Packet, Rejection, Welcome
-from handcal.types import Float64, HeadsetIdentity
 
 LOOPBACK: Address = ("127.0.0.1", 0)
 _LOG = logging.getLogger(__name__)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.frozen import brief, freeze
-from handcal.types import EYES, Eye, Float64
+from handcal.core.frozen import brief, freeze
+from handcal.core.types import EYES, Eye, Float64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

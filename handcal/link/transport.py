@@ -7,7 +7,7 @@ import select
 import socket
 from typing import Any, Protocol, TypeAlias
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.link.wire import MAX_DATAGRAM_BYTES
 
 Address: TypeAlias = tuple[str, int]

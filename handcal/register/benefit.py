@@ -19,15 +19,15 @@ from functools import cache, lru_cache
 import numpy as np
 from scipy.special import ndtri
 
-from handcal.display import (
+from handcal.core.display import (
     TARGET_DEPTHS_M,
     arcmin_from_px,
     eye_projection,
     target_corners_m,
 )
-from handcal.geometry import project
-from handcal.rig_types import EyeDisplay
-from handcal.types import EyeShift, Float64
+from handcal.core.geometry import project
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import EyeShift, Float64
 
 WORKING_DISTANCE_M = TARGET_DEPTHS_M[1]
 """Distance at which the error in depth is expected."""

@@ -15,8 +15,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from small_gicp import KdTree
 
-from handcal.display import update_matrix
-from handcal.geometry import rotation_matrix, rotation_vector, transform
+from handcal.core.display import update_matrix
+from handcal.core.geometry import rotation_matrix, rotation_vector, transform
+from handcal.core.types import Bool, EyeShift, Float64
 from handcal.register.cut import CUT_BAND_M, common_cut
 from handcal.register.model import balance, balanced_turn, design, predict
 from handcal.register.rcicp import best_rotation
@@ -31,7 +32,6 @@ from handcal.register.surface import (
     nearest,
     point_spacing_m,
 )
-from handcal.types import Bool, EyeShift, Float64
 
 _POINTS = 1000
 # Number of points at which the distance between neighbours of a whole cloud is measured.

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.geometry import transform
+from handcal.core.geometry import transform
+from handcal.core.types import Bool, Float64
 from handcal.register.surface import mean_point, quantile
-from handcal.types import Bool, Float64
 
 # Points this near the common cut count as beside it.
 CUT_BAND_M = 0.002

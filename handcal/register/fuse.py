@@ -31,8 +31,19 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import softmax
 
-from handcal.display import eye_projection
-from handcal.geometry import project, transform
+from handcal.core.display import eye_projection
+from handcal.core.geometry import project, transform
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import (
+    EYES,
+    Alignment,
+    Bool,
+    Eye,
+    EyeDistance,
+    EyeShift,
+    Float64,
+    Verification,
+)
 from handcal.register.prior import (
     EyePrior,
     Observed,
@@ -45,8 +56,6 @@ from handcal.register.prior import (
     with_eye_distance,
 )
 from handcal.register.surface import describe_surface
-from handcal.rig_types import EyeDisplay, Rig
-from handcal.types import EYES, Alignment, Bool, Eye, EyeDistance, EyeShift, Float64, Verification
 
 # The cursor's outline is found in this many of its points.
 _OUTLINE_FROM_POINTS = 1500

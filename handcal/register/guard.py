@@ -8,12 +8,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.geometry import rigid, rotation_vector
+from handcal.core.geometry import rigid, rotation_vector
+from handcal.core.types import Bool, Float64
 from handcal.register.rigid import RigidResult, RigidSettings, register_rigid
 from handcal.register.shape import ShapeChange, measure_shape_change
 from handcal.register.solve import check_cloud
 from handcal.register.surface import Surface, describe_surface, mean_point
-from handcal.types import Bool, Float64
 
 Axis: TypeAlias = Literal["x", "y", "z"]
 AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.display import update_matrix
-from handcal.geometry import transform
-from handcal.types import Float64
+from handcal.core.display import update_matrix
+from handcal.core.geometry import transform
+from handcal.core.types import Float64
 
 _BALANCE_STEPS = 3
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from small_gicp import KdTree
 
-from handcal.geometry import rigid, transform
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Bool, Float64
 from handcal.register.surface import nearest
-from handcal.types import Bool, Float64
 
 Pairs: TypeAlias = NDArray[np.intp]
 

@@ -15,16 +15,16 @@ from itertools import product
 
 import numpy as np
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import image_points, invert, project, transform
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.geometry import image_points, invert, project, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Bool, Eye, Float64, PlanName, Verification
 from handcal.register.benefit import expected_arcmin
 from handcal.register.fuse import Observation, seen_by
 from handcal.register.prior import EyePrior, eye_prior, eye_slice, posterior
 from handcal.register.results import Results, SolveSettings
 from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes
-from handcal.rig_types import Rig
-from handcal.types import EYES, Bool, Eye, Float64, PlanName, Verification
 
 _OUTLINE_FROM_POINTS = 1500
 # Error of a registration, and its growth with the angle by which the camera sees the moved hand

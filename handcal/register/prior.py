@@ -17,10 +17,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handcal.display import view_of_eye
-from handcal.geometry import invert, transform
-from handcal.rig_types import DepthCheck, EyeDisplay, Rig
-from handcal.types import EYES, Eye, EyeDistance, Float64
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import invert, transform
+from handcal.core.rig_types import DepthCheck, EyeDisplay, Rig
+from handcal.core.types import EYES, Eye, EyeDistance, Float64
 
 MIN_SESSIONS = 10
 """Fewer sessions than this do not make a prior."""

@@ -13,11 +13,11 @@ from typing import TypeAlias
 import numpy as np
 from small_gicp import KdTree
 
-from handcal.errors import HandcalError
-from handcal.geometry import rigid, transform
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Float64
 from handcal.register.model import fit_shift, predict
 from handcal.register.surface import nearest
-from handcal.types import Float64
 
 Checkpoint: TypeAlias = Callable[[], object]
 MAX_ITERATIONS = 800

@@ -10,8 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from handcal.frozen import html_table
-from handcal.progress import Progress
+from handcal.core.frozen import html_table
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import (
+    EYES,
+    Alignment,
+    Eye,
+    EyeDistance,
+    EyeShift,
+    Float64,
+    Method,
+    PlanName,
+    Verdict,
+    VerdictName,
+    Verification,
+    phi_text,
+    shift_rows,
+)
 from handcal.register.benefit import Benefit, expected_arcmin
 from handcal.register.fuse import Fused, FuseSettings, fuse_alignments
 from handcal.register.prior import eye_slice
@@ -27,22 +43,6 @@ from handcal.register.verdict import (
     measured_arcmin,
     planned_eyes,
 )
-from handcal.rig_types import Rig
-from handcal.types import (
-    EYES,
-    Alignment,
-    Eye,
-    EyeDistance,
-    EyeShift,
-    Float64,
-    Method,
-    PlanName,
-    Verdict,
-    VerdictName,
-    Verification,
-    phi_text,
-    shift_rows,
-)
 
 RESULTS_VERSION = 2
 USED: tuple[VerdictName, ...] = ("accept", "repeat")
@@ -54,7 +54,7 @@ class SolveSettings:
     """Settings of the solver."""
 
     method: Method = "consistent"
-    """One of `handcal.types.METHODS`."""
+    """One of `handcal.core.types.METHODS`."""
     fuse: FuseSettings = field(default_factory=FuseSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
 

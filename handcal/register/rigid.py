@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from small_gicp import KdTree
 
-from handcal.geometry import invert, rigid, rotation_matrix, transform
+from handcal.core.geometry import invert, rigid, rotation_matrix, transform
+from handcal.core.types import Float64
 from handcal.register.surface import Indices, Surface, cube_means, mean_point, nearest, quantile
-from handcal.types import Float64
 
 # Pairs are searched again at every step, which lets them slide with the motion they measure, so
 # they hold less information than their number says. Fitted to simulated clouds that are not turned,

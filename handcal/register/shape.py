@@ -16,12 +16,12 @@ from scipy.linalg import lapack
 from scipy.sparse import csr_array
 from small_gicp import KdTree
 
-from handcal.frozen import brief, freeze
-from handcal.geometry import invert, transform
+from handcal.core.frozen import brief, freeze
+from handcal.core.geometry import invert, transform
+from handcal.core.types import Float64
 from handcal.register.rcicp import best_rigid
 from handcal.register.rigid import RigidResult, RigidSettings, registration_rows, sums
 from handcal.register.surface import Indices, Surface, cube_means, mean_point
-from handcal.types import Float64
 
 _NODE_SPACING_M = 0.018
 _NODE_CUBE_M = 0.030

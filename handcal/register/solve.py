@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.geometry import is_rigid, transform
+from handcal.core.geometry import is_rigid, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method
 from handcal.register.consistent import fit_match, match_hands
 from handcal.register.model import cursor_displacement, design
 from handcal.register.rcicp import (
@@ -19,8 +21,6 @@ from handcal.register.rcicp import (
     solve_paper,
 )
 from handcal.register.surface import mean_point
-from handcal.rig_types import Rig
-from handcal.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method
 
 MIN_POINTS = 100
 MAX_POINTS = 2_000_000

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from small_gicp import KdTree, voxelgrid_sampling
 
-from handcal.errors import HandError
-from handcal.types import Bool, Float64
+from handcal.core.errors import HandError
+from handcal.core.types import Bool, Float64
 
 Indices: TypeAlias = NDArray[np.intp]
 

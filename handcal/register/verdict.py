@@ -14,6 +14,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
 from handcal.register.benefit import (
     Benefit,
     benefit,
@@ -23,8 +25,6 @@ from handcal.register.benefit import (
 )
 from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_position_m, eye_slice
-from handcal.rig_types import Rig
-from handcal.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
 
 MOST_ALIGNMENTS = 10
 # More than this are not worth it where the offline calibration is within the target.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from handcal.statistics import MeanInterval, Summary
+from handcal.report.statistics import MeanInterval, Summary
 
 NOTHING = "–"
 MINUS = "−"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from handcal.core.progress import Progress
 from handcal.io.files import make_folder, write_atomic
 from handcal.io.resources import resource_path
-from handcal.progress import Progress
 from handcal.report.document import Figure, Report, Table
 from handcal.report.figures import draw_figure
 

@@ -12,8 +12,8 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure as Page
 
+from handcal.core.progress import Progress
 from handcal.io.files import write_atomic
-from handcal.progress import Progress
 from handcal.report.document import Figure, Item, Report, Table
 from handcal.report.page import Document, plain
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from handcal.core.progress import Progress
 from handcal.io.files import make_folder
-from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.report.html import write_html
 from handcal.report.pdf import write_pdf

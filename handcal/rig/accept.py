@@ -23,15 +23,15 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from handcal.display import arcmin_from_px, eye_projection, view_of_eye
-from handcal.frozen import freeze
-from handcal.geometry import invert, project, rigid, transform
+from handcal.core.display import arcmin_from_px, eye_projection, view_of_eye
+from handcal.core.frozen import freeze
+from handcal.core.geometry import invert, project, rigid, transform
+from handcal.core.rig_types import EyeDisplay, Rig, RigPart
+from handcal.core.types import Eye, Float64, Intrinsics
 from handcal.rig.board import BoardView
 from handcal.rig.display import DisplayHomography, undistort
 from handcal.rig.viewpoint import TrackedView, board_pose, locate_viewpoint
 from handcal.rig.views import ViewsError
-from handcal.rig_types import EyeDisplay, Rig, RigPart
-from handcal.types import Eye, Float64, Intrinsics
 
 FEWEST_VIEWS = 5
 LIMIT_ARCMIN = 5.0

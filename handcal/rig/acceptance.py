@@ -9,9 +9,11 @@ from typing import Any, NamedTuple
 
 import cv2
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import EYES, Eye, Intrinsics
 from handcal.io.images import read_image
-from handcal.progress import Progress
 from handcal.report.document import Column, Report, Section, Table, facts
 from handcal.report.provenance import made_with
 from handcal.report.write import write_report
@@ -33,8 +35,6 @@ from handcal.rig.rig_file import read_rig
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import TrackedView
 from handcal.rig.views import image_files, pair_views, read_views
-from handcal.rig_types import EyeDisplay, Rig
-from handcal.types import EYES, Eye, Intrinsics
 
 
 @dataclass(frozen=True, slots=True)

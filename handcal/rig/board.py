@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from handcal.errors import HandcalError
-from handcal.frozen import freeze
-from handcal.types import Float64
+from handcal.core.errors import HandcalError
+from handcal.core.frozen import freeze
+from handcal.core.types import Float64
 
 BoardKind: TypeAlias = Literal["charuco", "checkerboard"]
 Int64: TypeAlias = NDArray[np.int64]

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.core.types import Float64, UInt8
 from handcal.rig.board import MIN_CORNERS, Board
-from handcal.types import Float64, UInt8
 
 # Fewer markers than this may be false detections, as in leaves or carpets.
 _ENOUGH_MARKERS = 4

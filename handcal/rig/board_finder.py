@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from handcal.core.types import Float32, Float64, UInt8
 from handcal.rig.board import MIN_CORNERS, Board, BoardError, BoardView, Int64, charuco, corners_m
 from handcal.rig.board_diagnosis import OTHER_BOARD, explain_missing, why_not_plain
-from handcal.types import Float32, Float64, UInt8
 
 # In squares: corners farther than this from the place predicted by the others are rejected.
 _STRAY_SQUARES = 0.5

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handcal.core.types import Float64, UInt8
 from handcal.io.images import MAX_SIDE_PX
 from handcal.rig.board import Board, charuco
 from handcal.rig.print_page import Paper, write_page
-from handcal.types import Float64, UInt8
 
 
 def draw_board(board: Board, square_px: int, margin_squares: float = 1.0) -> UInt8:

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.core.types import Float64
 from handcal.rig.board import BoardView
 from handcal.rig.fit import marginal_covariance
 from handcal.rig.lens import LensModel
 from handcal.rig.reprojection import Problem, Setup, Sighting
-from handcal.types import Float64
 
 _MAX_STEPS = 100
 # Least relative gain of a step, round by round; the first only finds corners to leave out.

@@ -13,7 +13,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from handcal.frozen import freeze
+from handcal.core.frozen import freeze
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import BoardView
 from handcal.rig.fit import rms
 from handcal.rig.lens import Camera, LensModel, as_pinhole, solved_parameters
@@ -32,7 +33,6 @@ from handcal.rig.views import (
     used,
     worst_view,
 )
-from handcal.types import Float64, Intrinsics
 
 LensChoice: TypeAlias = Literal["auto", LensModel]
 LENS_CHOICES: tuple[str, ...] = ("auto", *get_args(LensModel))

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.display import (
+from handcal.core.display import (
     TARGET_DEPTHS_M,
     arcmin_from_px,
     projection_matrix,
     target_corners_m,
     view_of_eye,
 )
-from handcal.geometry import image_points, invert, project, transform
-from handcal.rig_types import EyeDisplay, Rig
-from handcal.types import EYES, CameraIdentity, Eye, Float64, Intrinsics
+from handcal.core.geometry import image_points, invert, project, transform
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import EYES, CameraIdentity, Eye, Float64, Intrinsics
 
 # Room for intrinsics that were solved from images. At 0.5 m, 0.1 m beside the axis, the first moves
 # a point by 0.5 mm, the second by 1.5 mm. Another camera of the same model may lie within both.

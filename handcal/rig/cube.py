@@ -9,13 +9,13 @@ from types import MappingProxyType
 import cv2
 import numpy as np
 
-from handcal.errors import HandcalError
-from handcal.geometry import camera_matrix, image_points, rigid, transform
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import camera_matrix, image_points, rigid, transform
+from handcal.core.types import Float32, Float64, Intrinsics, UInt8
 from handcal.rig.board import DICTIONARIES
 from handcal.rig.board_diagnosis import light_trouble
 from handcal.rig.board_finder import shades_at
 from handcal.rig.fit import rms
-from handcal.types import Float32, Float64, Intrinsics, UInt8
 
 FACES = ("front", "right", "back", "left", "top", "bottom")
 MIN_FACES = 2

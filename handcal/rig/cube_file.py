@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import read_json, write_json
 from handcal.io.settings import read_settings
 from handcal.rig.cube import Cube

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from handcal.core.types import Float64
 from handcal.rig.board_print import marker_cells_m
 from handcal.rig.cube import FACES, Cube
 from handcal.rig.print_page import Paper, write_page
-from handcal.types import Float64
 
 # Column and row of each face in the net.
 _PLACES = {

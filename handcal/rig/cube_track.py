@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.frozen import freeze
-from handcal.geometry import interpolate_pose, transform
+from handcal.core.frozen import freeze
+from handcal.core.geometry import interpolate_pose, transform
+from handcal.core.types import Float64
 from handcal.rig.cube import Cube, face_pose
-from handcal.types import Float64
 
 _AROUND = 0.5 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 _SMOOTHING_S = 0.3

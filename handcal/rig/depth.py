@@ -14,7 +14,9 @@ from datetime import UTC, datetime
 import cv2
 import numpy as np
 
-from handcal.geometry import image_points, invert, transform
+from handcal.core.geometry import image_points, invert, transform
+from handcal.core.rig_types import DepthCheck
+from handcal.core.types import Float64, Frame
 from handcal.report.cells import signed
 from handcal.rig.board import BoardError, BoardView
 from handcal.rig.check import MAX_RANGES
@@ -22,8 +24,6 @@ from handcal.rig.display import undistort
 from handcal.rig.fit import clustered_covariance
 from handcal.rig.viewpoint import board_pose
 from handcal.rig.views import ViewsError
-from handcal.rig_types import DepthCheck
-from handcal.types import Float64, Frame
 
 MIN_DEPTH_VIEWS = 5
 _LEAST_SPREAD = 1.3

@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.frozen import freeze
-from handcal.geometry import camera_matrix, invert
+from handcal.core.frozen import freeze
+from handcal.core.geometry import camera_matrix, invert
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.check import MAX_DEVICE_SIDE_PX
 from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.grid import GridView
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose, plane_pose
 from handcal.rig.views import ViewsError, require_size
-from handcal.rig_types import EyeDisplay
-from handcal.types import Float64, Intrinsics
 
 DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")
 """Parameters of `DisplayCalibration.covariance`."""

@@ -17,11 +17,11 @@ from typing import Literal, TypeAlias, get_args
 import cv2
 import numpy as np
 
-from handcal.display import projection_matrix
-from handcal.geometry import project
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import project
+from handcal.core.rig_types import Rig
+from handcal.core.types import Eye, Float64, Projection, UInt8
 from handcal.link.shapes import Target
-from handcal.rig_types import Rig
-from handcal.types import Eye, Float64, Projection, UInt8
 
 Probe: TypeAlias = Literal["control", "shift", "eye shift", "other eye"]
 PROBES: tuple[Probe, ...] = get_args(Probe)

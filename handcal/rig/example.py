@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.display import update_matrix
-from handcal.geometry import invert, rigid
-from handcal.rig_types import EyeDisplay, Rig
-from handcal.types import Intrinsics
+from handcal.core.display import update_matrix
+from handcal.core.geometry import invert, rigid
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import Intrinsics
 
 WIDTH_PX, HEIGHT_PX = 1268, 720
 FOCAL_PX = 2456.0

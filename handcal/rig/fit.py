@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 
 
 def rms(off_px: Float64) -> float:

@@ -16,8 +16,9 @@ from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 import cv2
 import numpy as np
 
-from handcal.errors import FileError, HandcalError
-from handcal.geometry import camera_matrix, is_rigid, rigid
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.geometry import camera_matrix, is_rigid, rigid
+from handcal.core.types import CameraIdentity, Float64, Intrinsics
 from handcal.io.files import read_json, read_limited, write_atomic, write_json
 from handcal.rig.camera import CameraCalibration
 from handcal.rig.check import check_intrinsics, identity_from_json, require
@@ -26,7 +27,6 @@ from handcal.rig.stereo import StereoCalibration
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
 from handcal.rig.views import WorstView
-from handcal.types import CameraIdentity, Float64, Intrinsics
 
 CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
 CALIBRATION_FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")

@@ -15,13 +15,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.errors import FileError
-from handcal.geometry import camera_matrix
+from handcal.core.errors import FileError
+from handcal.core.geometry import camera_matrix
+from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.io.images import read_image
 from handcal.rig.board import BoardError
 from handcal.rig.display import undistort
 from handcal.rig.grid import GridView
-from handcal.types import Float64, Intrinsics, UInt8
 
 STRIPE_PX = 8
 """Width of the narrowest stripe, in pixels of the display."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.errors import HandcalError
-from handcal.frozen import freeze
+from handcal.core.errors import HandcalError
+from handcal.core.frozen import freeze
+from handcal.core.types import Float64, UInt8
 from handcal.rig.board import Board, BoardView, charuco
 from handcal.rig.board_finder import find_board
 from handcal.rig.check import MAX_DEVICE_SIDE_PX
-from handcal.types import Float64, UInt8
 
 # Boards are described in metres, grids in pixels: any constant scale works.
 _BOARD_M = 1e-4

@@ -13,10 +13,10 @@ from typing import Literal, TypeAlias
 import cv2
 import numpy as np
 
-from handcal.errors import HandcalError
-from handcal.geometry import rigid
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import BoardView
-from handcal.types import Float64, Intrinsics
 
 LensModel: TypeAlias = Literal["none", "radial", "full", "rational", "prism", "tilted", "fisheye"]
 # The number of coefficients in a result, and which of them are solved for.

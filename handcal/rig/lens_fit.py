@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.core.types import Float64
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import Adjusted, adjust
 from handcal.rig.lens import (
@@ -22,7 +23,6 @@ from handcal.rig.lens import (
 )
 from handcal.rig.reprojection import Setup, Sighting, as_vector
 from handcal.rig.uncertainty import ProjectionUncertainty, projection_uncertainty
-from handcal.types import Float64
 
 # Focal lengths tried, in widths of the image, and the views that judge them.
 _FOCAL_WIDTHS = np.geomspace(0.25, 4.0, 9)

@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from handcal.core.types import Float64
 from handcal.io.files import require_suffix, write_atomic
-from handcal.types import Float64
 
 Paper: TypeAlias = Literal["a4", "a3", "a2", "a1", "a0", "letter", "tabloid"]
 # Width and height in metres, upright.

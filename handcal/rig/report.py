@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.display import arcmin_from_px, view_of_eye
-from handcal.geometry import image_points, invert, transform
-from handcal.report.cells import signed
-from handcal.rig_types import (
+from handcal.core.display import arcmin_from_px, view_of_eye
+from handcal.core.geometry import image_points, invert, transform
+from handcal.core.rig_types import (
     PART_NAMES,
     RIG_PARTS,
     DepthCheck,
@@ -19,7 +18,8 @@ from handcal.rig_types import (
     Rig,
     RigPart,
 )
-from handcal.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, Float64
+from handcal.report.cells import signed
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0

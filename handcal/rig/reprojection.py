@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64
 from handcal.rig.board import BoardView
 from handcal.rig.lens import (
     Camera,
@@ -25,7 +26,6 @@ from handcal.rig.lens import (
     solved_parameters,
     with_parameters,
 )
-from handcal.types import Float64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

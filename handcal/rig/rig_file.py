@@ -19,12 +19,20 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.rig_types import (
+    RIG_PARTS,
+    DepthCheck,
+    DisplayCheck,
+    EyeDisplay,
+    Origin,
+    Rig,
+    RigPart,
+)
+from handcal.core.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
 from handcal.io.files import read_limited, write_atomic
 from handcal.rig.check import MAX_RANGES, check_rig, require
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
-from handcal.rig_types import RIG_PARTS, DepthCheck, DisplayCheck, EyeDisplay, Origin, Rig, RigPart
-from handcal.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
 
 RIG_VERSION = 3
 _CHECK_TEXTS = "made", "observer", "device_id", "runtime", "app"

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.rig_types import Rig
+from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics
 from handcal.rig.assemble import screen_of
 from handcal.rig.camera import CameraSettings, LensChoice
 from handcal.rig.display import (
@@ -25,8 +27,6 @@ from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_ster
 from handcal.rig.tracked_file import read_tracked
 from handcal.rig.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
 from handcal.rig.views import BoardImage, used
-from handcal.rig_types import Rig
-from handcal.types import CameraIdentity, Eye, Float64, Intrinsics
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from handcal.frozen import freeze
+from handcal.core.frozen import freeze
+from handcal.core.types import Float64
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import Adjusted, adjust
 from handcal.rig.camera import (
@@ -45,7 +46,6 @@ from handcal.rig.views import (
     check_moved,
     worst_view,
 )
-from handcal.types import Float64
 
 
 @dataclass(frozen=True, slots=True)

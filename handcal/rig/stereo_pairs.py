@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64
 from handcal.rig.board import BoardView
 from handcal.rig.bundle import adjust
 from handcal.rig.fit import rms
 from handcal.rig.lens import Camera, first_pose
 from handcal.rig.reprojection import Setup, Sighting, as_transform, as_vector
 from handcal.rig.views import BoardImage, ViewsError, one_size
-from handcal.types import Float64
 
 MIN_PAIRS = 3
 SWAPPED = "the cameras are swapped: the depth camera's images are the headset's, and the reverse"

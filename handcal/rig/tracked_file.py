@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.errors import FileError
-from handcal.geometry import is_rigid
+from handcal.core.errors import FileError
+from handcal.core.geometry import is_rigid
+from handcal.core.types import Float64
 from handcal.io.files import read_json, write_json
 from handcal.rig.views import MAX_VIEWS
-from handcal.types import Float64
 
 TRACKED_VERSION = 1
 _REACH_M = 10.0

@@ -14,12 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.frozen import freeze
-from handcal.geometry import rigid
+from handcal.core.frozen import freeze
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64
 from handcal.rig.bundle import foreseen
 from handcal.rig.lens import Camera, LensModel, pixels_of, predict, to_plane
 from handcal.rig.reprojection import Setup
-from handcal.types import Float64
 
 GRID = (12, 9)
 """Columns and rows of places in the image at which the uncertainty is known."""

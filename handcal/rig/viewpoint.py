@@ -10,14 +10,14 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from handcal.frozen import freeze
-from handcal.geometry import camera_matrix, image_points, invert, rigid, transform
+from handcal.core.frozen import freeze
+from handcal.core.geometry import camera_matrix, image_points, invert, rigid, transform
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import BoardView
 from handcal.rig.fit import clustered_covariance, rms
 from handcal.rig.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import BoardImage, ViewsError, require_size, used
-from handcal.types import Float64, Intrinsics
 
 MIN_TRACKED_VIEWS = 3
 _GOOD_PX, _BAD_PX = 1.5, 5.0

@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.io.images import IMAGE_SUFFIXES, read_image
-from handcal.progress import Progress
 from handcal.rig.board import Board, BoardError, BoardView
 from handcal.rig.board_finder import find_board
 from handcal.rig.fit import rms
-from handcal.types import Float64, Intrinsics, UInt8
 
 MAX_VIEWS = 500
 ASKED_VIEWS = 20

@@ -10,8 +10,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from handcal.geometry import camera_matrix
-from handcal.types import Float64, Intrinsics, UInt8
+from handcal.core.geometry import camera_matrix
+from handcal.core.types import Float64, Intrinsics, UInt8
 
 
 def rotation_homography(camera: Intrinsics, R_S_C: Float64) -> Float64:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from handcal.types import EYES, Alignment, Eye
+from handcal.core.types import EYES, Alignment, Eye
 
 _DTYPES = {
     "cursor_m": "<f8",

@@ -12,9 +12,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args
 
-from handcal.display import as_shifts
+from handcal.core.display import as_shifts
+from handcal.core.types import Eye, Float64
 from handcal.session.journal import Event
-from handcal.types import Eye, Float64
 
 Drawing: TypeAlias = Literal["offline", "applied"]
 Place: TypeAlias = Literal["first", "second"]

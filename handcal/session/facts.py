@@ -9,9 +9,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from handcal.errors import FileError
-from handcal.io.settings import read_settings
-from handcal.types import (
+from handcal.core.errors import FileError
+from handcal.core.types import (
     EYES,
     CameraIdentity,
     Eye,
@@ -22,6 +21,7 @@ from handcal.types import (
     PlanName,
     Verification,
 )
+from handcal.io.settings import read_settings
 
 Facts = TypeVar("Facts")
 

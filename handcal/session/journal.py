@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import read_limited, whole_number, write_atomic
 
 JOURNAL_VERSION = 3

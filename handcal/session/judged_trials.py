@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from handcal.core.types import Eye
 from handcal.register.results import Results, read_rendered_shift_m
 from handcal.session.record import SessionRecord
 from handcal.session.trial import trial_errors_arcmin
-from handcal.types import Eye
 
 
 @dataclass(frozen=True, slots=True)

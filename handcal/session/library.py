@@ -9,10 +9,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Eye
 from handcal.io.files import make_folder, read_limited, sync_folder
 from handcal.io.lock import FileLock
-from handcal.progress import Progress
 from handcal.register.results import read_rendered_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.journal import JOURNAL, find_journals
@@ -26,7 +27,6 @@ from handcal.session.record import (
 from handcal.session.session import Session
 from handcal.session.state import SessionEvent, SessionState, clean_wearer
 from handcal.session.trial import trial_errors_arcmin
-from handcal.types import EYES, Eye
 
 DELETED = ".deleted"
 """Folder, inside the folder of sessions, to which deleted sessions are moved."""

@@ -9,10 +9,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.rig_types import Rig
+from handcal.core.types import Alignment, Eye, Float64
 from handcal.io.files import read_json, read_limited
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
-from handcal.rig_types import Rig
 from handcal.session.alignment_file import decode_alignment
 from handcal.session.facts import AlignmentFacts, SessionFacts
 from handcal.session.journal import (
@@ -24,7 +25,6 @@ from handcal.session.journal import (
 )
 from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import Trial
-from handcal.types import Alignment, Eye, Float64
 
 MAX_ALIGNMENT_BYTES = 16 * 2**20
 MAX_NOTES_CHARACTERS = 20_000

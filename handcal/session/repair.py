@@ -9,10 +9,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.rig_types import Rig
 from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
 from handcal.rig.rig_file import write_rig
-from handcal.rig_types import Rig
 from handcal.session.journal import JOURNAL, Damage, Event, happens_now, journal_line
 from handcal.session.record import SessionRecord, alignment_path, load_session, sha256
 from handcal.session.state import SessionEvent, SessionState

@@ -29,8 +29,10 @@ from typing import Any, Literal, Self
 
 from numpy.typing import ArrayLike
 
-from handcal.display import as_shifts
-from handcal.errors import FileError
+from handcal.core.display import as_shifts
+from handcal.core.errors import FileError
+from handcal.core.rig_types import Rig
+from handcal.core.types import Alignment, Eye
 from handcal.io.closable import Closable
 from handcal.io.files import (
     make_folder,
@@ -43,7 +45,6 @@ from handcal.io.files import (
 )
 from handcal.io.lock import FileLock
 from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
-from handcal.rig_types import Rig
 from handcal.session.alignment_file import encode_alignment
 from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.facts import AlignmentFacts, SessionFacts, facts_json, with_facts
@@ -54,7 +55,6 @@ from handcal.session.record import SessionRecord as SessionRecord
 from handcal.session.record import alignment_path, load_session, sha256
 from handcal.session.state import Kind, SessionEvent, clean_wearer
 from handcal.session.trial import Trial, trial_json
-from handcal.types import Alignment, Eye
 
 
 class Session(Closable):

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
-from handcal.display import as_shifts
+from handcal.core.display import as_shifts
+from handcal.core.types import Eye, Float64
 from handcal.session.comparison import COMPARED
 from handcal.session.facts import AlignmentFacts, SessionFacts, read_facts, with_facts
 from handcal.session.journal import Event
 from handcal.session.trial import Trial, read_trial
-from handcal.types import Eye, Float64
 
 MAX_ALIGNMENTS = 100
 MAX_TRIALS = 1000

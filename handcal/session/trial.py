@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal import statistics
-from handcal.display import arcmin_from_px, eye_projection, target_corners_m
-from handcal.frozen import freeze
-from handcal.geometry import project
-from handcal.rig_types import EyeDisplay
-from handcal.statistics import Summary
-from handcal.types import EYES, Eye, Float64
+from handcal.core.display import arcmin_from_px, eye_projection, target_corners_m
+from handcal.core.frozen import freeze
+from handcal.core.geometry import project
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import EYES, Eye, Float64
+from handcal.report import statistics
+from handcal.report.statistics import Summary
 
 _SHAPES: dict[str, tuple[int, ...]] = {
     "corners_E_m": (4, 3),

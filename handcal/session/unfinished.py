@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.lock import FileLock
 from handcal.session.journal import find_journals, read_journal
 from handcal.session.record import SessionRecord

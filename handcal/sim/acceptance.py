@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.display import view_of_eye
-from handcal.geometry import invert, rigid
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import invert, rigid
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
 from handcal.rig.tracked_file import write_tracked
-from handcal.rig_types import Rig
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import EYES
 
 _TURN_RAD, _PLACE_M = 0.02, 0.002
 _CANDIDATES = 40

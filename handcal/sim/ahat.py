@@ -15,7 +15,7 @@ from functools import cache
 import cv2
 import numpy as np
 
-from handcal.types import Float32, Float64, Intrinsics, UInt16
+from handcal.core.types import Float32, Float64, Intrinsics, UInt16
 
 SIDE_PX = 512
 _MIDDLE_PX = 257.0

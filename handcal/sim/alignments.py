@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.geometry import invert, rigid, transform
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import Bool, Float64, Intrinsics
 from handcal.register.model import predict
 from handcal.sim.hand import HandModel
 from handcal.sim.raster import D415, visible_points
-from handcal.types import Bool, Float64, Intrinsics
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import invert, rigid
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import invert, rigid
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.io.closable import Closable
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import D415
@@ -18,7 +19,6 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import CameraIdentity, Frame, Intrinsics
 
 _POLL_S = 0.002
 # What rendering takes longer is the computer's doing, of which a camera knows nothing: if it

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.display import eye_projection
-from handcal.geometry import rigid
+from handcal.core.display import eye_projection
+from handcal.core.geometry import rigid
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float32, Float64, Intrinsics, UInt8
 from handcal.rig.cube import Cube, face_pose
-from handcal.rig_types import EyeDisplay
 from handcal.sim.boards import BLACK, WALL, WHITE, PictureSettings, expose, pixel_rays
-from handcal.types import Float32, Float64, Intrinsics, UInt8
 
 _CELL_PX = 24  # of the texture
 _SHOWN_SAMPLES = 2

@@ -10,22 +10,22 @@ from contextlib import contextmanager
 import numpy as np
 from scipy.spatial import KDTree
 
-from handcal.display import arcmin_from_px, eye_projection, view_of_eye
-from handcal.errors import CameraTimeoutError, LinkError
-from handcal.geometry import invert, project, rigid, transform
+from handcal.core.display import arcmin_from_px, eye_projection, view_of_eye
+from handcal.core.errors import CameraTimeoutError, LinkError
+from handcal.core.geometry import invert, project, rigid, transform
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import CameraIdentity, Eye, Float64, Frame, HeadsetIdentity
 from handcal.io.closable import Closable
 from handcal.link.client import HeadsetClient
 from handcal.link.pairing import new_device_id, new_pairing_key
 from handcal.link.server import HeadsetServer
 from handcal.rig.cube import Cube
 from handcal.rig.cube_track import cube_corners_m
-from handcal.rig_types import EyeDisplay, Rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.sim.cube_captures import some_cube_pose
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import CameraIdentity, Eye, Float64, Frame, HeadsetIdentity
 
 _RATE_HZ = 30.0
 _POSE_PERIOD_S = 1.0 / 90.0

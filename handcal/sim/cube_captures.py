@@ -18,12 +18,14 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.errors import FileError
-from handcal.geometry import image_points, invert, project, rigid, transform
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.errors import FileError
+from handcal.core.geometry import image_points, invert, project, rigid, transform
+from handcal.core.progress import Progress
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import Eye, Float64, Intrinsics, UInt8
 from handcal.io.files import make_folder, sync_folder, write_json
 from handcal.io.images import write_png
-from handcal.progress import Progress
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.register.results import SolveSettings, solve_session
@@ -31,7 +33,6 @@ from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_file import write_cube
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
-from handcal.rig_types import EyeDisplay, Rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter, draw_cube
 from handcal.sim.hand import make_hand
@@ -39,7 +40,6 @@ from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 from handcal.sim.wearer import draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import Eye, Float64, Intrinsics, UInt8
 
 POSITIONS = {
     "centre": (0.0, 0.0),

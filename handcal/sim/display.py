@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.display import projection_matrix
-from handcal.geometry import project, rigid
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import project, rigid
+from handcal.core.rig_types import Rig
+from handcal.core.types import Eye, Float64, Projection, UInt8
 from handcal.link.client import HeadsetClient
-from handcal.rig_types import Rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.photographs import VIEWPOINT_CAMERA
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import Eye, Float64, Projection, UInt8
 
 DisplayMode: TypeAlias = Literal[
     "obeys", "no-override", "one-for-both", "depth", "infinity", "image-plane"

@@ -13,9 +13,9 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.frozen import freeze
+from handcal.core.frozen import freeze
+from handcal.core.types import Float32, Float64, UInt8
 from handcal.sim.isosurface import isosurface
-from handcal.types import Float32, Float64, UInt8
 
 Side: TypeAlias = Literal["left", "right"]
 

@@ -20,20 +20,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from handcal.display import projection_matrix
-from handcal.errors import LinkError
-from handcal.geometry import rigid
+from handcal.core.display import projection_matrix
+from handcal.core.errors import LinkError
+from handcal.core.geometry import rigid
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.endpoint import Channel
 from handcal.link.impair import UNIMPAIRED, Impairment
 from handcal.link.wire import VERSION, Packet, Slot, hkdf
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import EyeDisplay, Rig
 from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.scene import ScenePublisher, SceneState
 from handcal.sim.wearer import DisplayView, Wearer, WearerAction
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView
 
 _FORMER_SHIFT_M = (0.006, 0.0, 0.0)
 

@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handcal.types import Float32, Float64
+from handcal.core.types import Float32, Float64
 
 Indices: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from handcal.display import projection_matrix, view_of_eye
-from handcal.errors import HandcalError
-from handcal.geometry import invert, rigid, transform
-from handcal.rig_types import Rig
+from handcal.core.display import projection_matrix, view_of_eye
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Alignment, Bool, Eye, Float64
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import PlacementError, apply_placement_error, overlay_hand, view_through
 from handcal.sim.raster import visible_points
-from handcal.types import EYES, Alignment, Bool, Eye, Float64
 
 _FOREARM_M = 0.04
 # Position of the raised palm and its spread, so that it is on both displays.

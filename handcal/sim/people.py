@@ -13,11 +13,11 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from handcal.core.types import Bool, Float64
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import PlacementError
 from handcal.sim.wearer import draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import Bool, Float64
 
 Variant: TypeAlias = Literal[
     "plain", "fingers-only", "palm-only", "by-distance", "heavy-tails", "drift", "late-presses"

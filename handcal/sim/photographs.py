@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.display import view_of_eye
-from handcal.geometry import invert, rigid
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import invert, rigid
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Intrinsics, UInt8
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.rig.board import Board
 from handcal.rig.grid import Grid, draw_grid
 from handcal.rig.tracked_file import write_tracked
-from handcal.rig_types import Rig
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import EYES, Intrinsics, UInt8
 
 BOARD = Board(squares=(8, 6))
 # Small, to save time.

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import invert, project, rigid, transform
-from handcal.rig_types import EyeDisplay
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.geometry import invert, project, rigid, transform
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64
 from handcal.sim.hand import HandModel
-from handcal.types import Float64
 
 _MATCH_ITERATIONS = 30
 _OVERLAY_ITERATIONS = 8

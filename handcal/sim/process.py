@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.io.closable import Closable
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.sim.hand import Side

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.geometry import camera_matrix, invert, project, rigid, transform
+from handcal.core.geometry import camera_matrix, invert, project, rigid, transform
+from handcal.core.types import Bool, Float32, Float64, Intrinsics
 from handcal.sim.hand import HandModel
-from handcal.types import Bool, Float32, Float64, Intrinsics
 
 _NEAR_M, _FAR_M = 0.02, 10.0
 _CUT_BAND_M = 0.003

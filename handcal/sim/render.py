@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.geometry import invert
+from handcal.core.geometry import invert
+from handcal.core.types import Float32, Float64, Intrinsics, UInt8
 from handcal.sim.hand import HandModel
 from handcal.sim.raster import HandImage, draw_hand
 from handcal.sim.room import Room, draw_room
-from handcal.types import Float32, Float64, Intrinsics, UInt8
 
 _AMBIENT, _DIFFUSE = 0.45, 0.65
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from handcal.frozen import freeze
-from handcal.types import Float32, Float64, Intrinsics, UInt8
+from handcal.core.frozen import freeze
+from handcal.core.types import Float32, Float64, Intrinsics, UInt8
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.frozen import freeze
-from handcal.geometry import is_rigid
+from handcal.core.frozen import freeze
+from handcal.core.geometry import is_rigid
+from handcal.core.types import Float64
 from handcal.io.closable import Closable
-from handcal.types import Float64
 
 _MAGIC = b"hcS1"
 # Magic, host time in ns, whether there is a hand, and the upper 3x4 of both poses by rows.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.types import Bool, Float32, UInt16
+from handcal.core.types import Bool, Float32, UInt16
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
 from handcal.sim.scene import SceneState
 
 _SWAY_M = 0.03

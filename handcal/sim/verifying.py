@@ -14,12 +14,12 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import KDTree
 
-from handcal.display import arcmin_from_px, eye_projection, view_of_eye
-from handcal.geometry import invert, project, transform
+from handcal.core.display import arcmin_from_px, eye_projection, view_of_eye
+from handcal.core.geometry import invert, project, transform
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64
 from handcal.link.nudges import NudgeSum, VerifyRequest
-from handcal.rig_types import EyeDisplay
 from handcal.sim.hand import HandModel
-from handcal.types import Float64
 
 _POINTS = 300
 _FEWEST_POINTS = 20

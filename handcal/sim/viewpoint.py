@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.display import eye_projection
-from handcal.rig_types import EyeDisplay
+from handcal.core.display import eye_projection
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.sim.boards import PictureSettings, pixel_rays
-from handcal.types import Float64, Intrinsics, UInt8
 
 _BLACK, _WHITE = 12.0, 190.0  # a display only adds light, and black is not quite dark
 

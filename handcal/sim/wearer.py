@@ -12,10 +12,11 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.display import view_of_eye
-from handcal.geometry import interpolate_pose, invert, rigid, transform
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import interpolate_pose, invert, rigid, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, LOOK_AROUND, Eye, Float64
 from handcal.link.nudges import NudgeSum, VerifyRequest
-from handcal.rig_types import Rig
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import (
     CursorMatch,
@@ -27,7 +28,6 @@ from handcal.sim.placement import (
 )
 from handcal.sim.verifying import SeenDifference, SimulatedVerification, see_difference
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, LOOK_AROUND, Eye, Float64
 
 _Phase: TypeAlias = Literal["raised", "reaching", "awaiting", "verifying"]
 

@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handcal.camera.clock import INFORM_NS
-from handcal.display import view_of_eye
-from handcal.errors import HandError, PoseError, PosePendingError
-from handcal.geometry import invert
+from handcal.core.display import view_of_eye
+from handcal.core.errors import HandError, PoseError, PosePendingError
+from handcal.core.geometry import invert
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Alignment, Eye, Float64
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.shape import ShapeChange, change_text
-from handcal.rig_types import Rig
 from handcal.session.facts import AlignmentFacts
 from handcal.station.delay import DelayMeter
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.station.hold import merge_hold
 from handcal.station.states import CalibrationSettings, Observation
-from handcal.types import EYES, Alignment, Eye, Float64
 
 KEEP_PROMPT = "Keep your hand up."
 """Shown if the next cursor or verification follows at once."""

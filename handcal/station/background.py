@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.geometry import transform
-from handcal.types import Float32, Float64, Frame, UInt8
+from handcal.core.geometry import transform
+from handcal.core.types import Float32, Float64, Frame, UInt8
 
 _WIDTH_PX = 320
 """Width of the pictures in which points are followed."""

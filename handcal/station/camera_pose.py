@@ -14,12 +14,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.camera.camera import Camera
-from handcal.errors import CameraError, CameraTimeoutError, HandcalError, PoseError
-from handcal.frozen import freeze
-from handcal.geometry import invert, rigid
+from handcal.core.errors import CameraError, CameraTimeoutError, HandcalError, PoseError
+from handcal.core.frozen import freeze
+from handcal.core.geometry import invert, rigid
+from handcal.core.progress import Progress
+from handcal.core.types import LOOK_AROUND, Float64
 from handcal.link.server import HeadsetServer
-from handcal.progress import Progress
-from handcal.types import LOOK_AROUND, Float64
 
 _MOST_S, _STEP_S = 0.3, 0.01
 _LEAST_SEEN = 30

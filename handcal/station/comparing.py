@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from handcal.core.types import Eye, Float64
 from handcal.session.comparison import Answer, Comparison, Drawing, Place
 from handcal.session.session import Session
 from handcal.station.states import ProcedureError
-from handcal.types import Eye, Float64
 
 _SAME_M = 1e-6
 _ORDERS: tuple[Drawing, ...] = ("offline", "applied")

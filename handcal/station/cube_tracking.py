@@ -15,17 +15,18 @@ import numpy as np
 
 from handcal.camera.camera import Camera
 from handcal.camera.clock import FrameClock
-from handcal.errors import (
+from handcal.core.errors import (
     CameraEndError,
     CameraError,
     CameraTimeoutError,
     PoseError,
     PosePendingError,
 )
-from handcal.geometry import image_points, invert, transform
+from handcal.core.geometry import image_points, invert, transform
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Float64, Frame, UInt8
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
-from handcal.progress import Progress
 from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube
 from handcal.rig.cube_file import read_cube
 from handcal.rig.cube_track import CubeFilter, TrackedCube, cube_corners_m
@@ -34,7 +35,6 @@ from handcal.rig.rig_file import read_rig
 from handcal.sim.cube_bench import simulated_wearer
 from handcal.station.drawing import Drawing
 from handcal.station.states import CalibrationSettings
-from handcal.types import EYES, Float64, Frame, UInt8
 
 _WAITING = 30  # frames whose head pose has not arrived
 _RESEND_M = 0.0003

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from handcal.camera.clock import INFORM_NS, FrameClock
-from handcal.errors import PoseError, PosePendingError
-from handcal.geometry import invert
+from handcal.core.errors import PoseError, PosePendingError
+from handcal.core.geometry import invert
+from handcal.core.types import Float64, Frame
 from handcal.station.background import Background, follow, make_background
 from handcal.station.hands import PlacedHand
 from handcal.station.offset import (
@@ -26,7 +27,6 @@ from handcal.station.offset import (
     is_still,
     measure_offset,
 )
-from handcal.types import Float64, Frame
 
 _KEY_NS = 5_000_000_000
 """A key frame serves for this time, or longer on a busy computer, until it has enough frames."""

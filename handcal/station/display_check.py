@@ -11,9 +11,11 @@ import cv2
 import numpy as np
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraError, HandcalError
+from handcal.core.errors import CameraError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import DisplayCheck, Rig
+from handcal.core.types import EYES, Eye, HeadsetIdentity, UInt8
 from handcal.link.server import HeadsetServer
-from handcal.progress import Progress
 from handcal.rig.display_check import (
     PROBES,
     Probe,
@@ -24,9 +26,7 @@ from handcal.rig.display_check import (
     judge_display,
     shares_seen,
 )
-from handcal.rig_types import DisplayCheck, Rig
 from handcal.station.drawing import rig_name
-from handcal.types import EYES, Eye, HeadsetIdentity, UInt8
 
 Show: TypeAlias = Callable[[Shown], None]
 """Has the headset show a probe, and waits until it does."""

@@ -18,7 +18,10 @@ from pathlib import Path
 from handcal.camera.camera import Camera
 from handcal.camera.sdk_devices import Device, devices_by_child
 from handcal.camera.usb import explain_absence
-from handcal.errors import CancelledError, HandcalError
+from handcal.core.errors import CancelledError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import CameraIdentity, Intrinsics
 from handcal.hand.shipped import load_detector
 from handcal.io.resources import resource_path
 from handcal.io.x_display import x_server_answers
@@ -26,10 +29,8 @@ from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
-from handcal.progress import Progress
 from handcal.rig.compare import compare_camera
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import Rig
 from handcal.station.headset import (
     STAMP_ADVICE,
     headset_problem,
@@ -37,7 +38,6 @@ from handcal.station.headset import (
     run_pose_delay,
 )
 from handcal.station.states import CalibrationSettings
-from handcal.types import CameraIdentity, Intrinsics
 
 _PACKAGES = (
     "numpy",

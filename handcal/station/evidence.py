@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import invert
+from handcal.core.geometry import invert
+from handcal.core.rig_types import Rig
+from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt16
 from handcal.rig.compare import compare_camera
 from handcal.rig.report import depth_finding, display_finding
-from handcal.rig_types import Rig
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, UInt16
 
 FROZEN_FRAMES = 4
 """Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""

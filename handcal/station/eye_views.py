@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.display import view_of_eye
-from handcal.geometry import invert, transform
-from handcal.rig_types import Rig
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import invert, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, Float64
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.scene import SceneState
 from handcal.sim.simulation import Simulation
@@ -19,7 +20,6 @@ from handcal.station.hands import PlacedHand
 from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import EYES, Eye, Float64
 
 _PERIOD_S = 0.2
 _STALE_NS = 2_000_000_000

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from handcal.errors import CancelledError, HandcalError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.types import Eye
 from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import Eye
 
 _DELIVERY_S = 5.0
 # Steps that the station takes automatically, within a few frames.

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, Float64
 from handcal.register.prior import LearnedPrior, posterior, widened
-from handcal.rig_types import Rig
 from handcal.session.session import Session
 from handcal.station.lab_prior import rig_numbers
 from handcal.station.solve_again import solve_again, stored_solve_settings
-from handcal.types import EYES, Eye, Float64
 
 SLIP_M = (0.002, 0.0015, 0.003)
 """Change of a headset's fit when the same wearer puts it on again, standard deviation along

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.errors import HandError, PoseError, PosePendingError
-from handcal.geometry import transform
-from handcal.types import Float64, HandCloud
+from handcal.core.errors import HandError, PoseError, PosePendingError
+from handcal.core.geometry import transform
+from handcal.core.types import Float64, HandCloud
 
 _KEEP_S = 1.0
 """Placed hands are kept this long, so that a retransmitted confirmation still finds its frame."""

@@ -9,16 +9,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from handcal.camera.camera import Camera
-from handcal.errors import CameraTimeoutError, HandcalError, HandError, PoseError, PosePendingError
-from handcal.geometry import transform
+from handcal.core.errors import (
+    CameraTimeoutError,
+    HandcalError,
+    HandError,
+    PoseError,
+    PosePendingError,
+)
+from handcal.core.geometry import transform
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Float64, HeadsetIdentity
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
 from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION, Rejection
-from handcal.progress import Progress
-from handcal.rig_types import Rig
-from handcal.types import EYES, Float64, HeadsetIdentity
 
 _LEAST_RATE_HZ = 55.0
 _MOST_LOST = 0.1

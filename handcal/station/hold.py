@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from handcal.errors import HandError
-from handcal.geometry import invert, rotation_vector, transform
+from handcal.core.errors import HandError
+from handcal.core.geometry import invert, rotation_vector, transform
 from handcal.register.rigid import RigidSettings, motion_covariance, register_rigid
 from handcal.register.surface import Surface, describe_surface, mean_point
 from handcal.station.hands import PlacedHand

@@ -10,9 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, EyeDistance, Float64
 from handcal.io.files import modified_s
-from handcal.progress import Progress
 from handcal.register.prior import (
     LearnedPrior,
     Observed,
@@ -22,11 +24,9 @@ from handcal.register.prior import (
 )
 from handcal.register.results import RESULTS_VERSION
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import Rig
 from handcal.session.facts import read_facts
 from handcal.session.journal import find_journals
 from handcal.session.record import replay
-from handcal.types import EYES, EyeDistance, Float64
 
 MAX_SESSIONS = 300
 """Only the newest sessions count: a headset's fit and a lab's wearers change."""

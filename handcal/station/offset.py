@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import invert
+from handcal.core.geometry import invert
+from handcal.core.types import Float64
 from handcal.station.background import Background
-from handcal.types import Float64
 
 _USED_FRAMES = 60
 """Most frames of one key frame that are used for a measurement, evenly spread."""

@@ -11,11 +11,12 @@ from handcal.camera.camera import Camera
 from handcal.camera.live import open_hololens2, open_live
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording
-from handcal.errors import CameraError, FileError
+from handcal.core.errors import CameraError, FileError
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, PlanName
 from handcal.io.settings import settings_json
 from handcal.register.prior import PriorSettings
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import Rig
 from handcal.session.journal import JOURNAL, JOURNAL_END
 from handcal.session.record import replay
 from handcal.session.session import Session
@@ -28,7 +29,6 @@ from handcal.station.lab_prior import run_learn_prior
 from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.station.solve_again import stored_solve_settings
-from handcal.types import EYES, PlanName
 
 _FIRST_FILES = {"alignments", "rig.yaml", "settings.json", JOURNAL, JOURNAL_END, "lock"}
 _FIRST_EVENTS = {SessionEvent.CREATED, SessionEvent.FACTS_SAVED, SessionEvent.FINE_TUNED}

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from handcal.display import projection_matrix, target_corners_m
+from handcal.core.display import projection_matrix, target_corners_m
+from handcal.core.rig_types import Rig
+from handcal.core.types import Eye, Projection
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target
-from handcal.rig_types import Rig
-from handcal.types import Eye, Projection
 
 PATTERN_DEPTH_M = 0.5
 

@@ -13,12 +13,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from handcal.errors import HandError
+from handcal.core.errors import HandError
+from handcal.core.types import EYES, Eye, EyePlan, PlanName
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.verdict import Advice, planned_eyes
 from handcal.station.procedure import Calibration
 from handcal.station.states import Observation, ProcedureError, State
-from handcal.types import EYES, Eye, EyePlan, PlanName
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,14 +14,14 @@ from handcal.camera.recording import check_recording
 from handcal.camera.recordings import RECORDING_SUFFIXES, open_recording
 from handcal.camera.ros import ros_recording
 from handcal.camera.sdk_devices import choose_device, devices_by_child, librealsense
-from handcal.errors import HandcalError, LinkError
+from handcal.core.errors import HandcalError, LinkError
+from handcal.core.progress import Progress
 from handcal.hand.settings import REACH_M
 from handcal.io.files import folder_problem
 from handcal.link.server import LOOPBACK
 from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
-from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
 from handcal.station.doctor import (
     CAMERA_EXTRAS,

@@ -32,9 +32,22 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.display import as_shifts
-from handcal.errors import FileError, HandcalError
-from handcal.geometry import invert, rigid, transform
+from handcal.core.display import as_shifts
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import (
+    EYES,
+    LOOK_AROUND,
+    Alignment,
+    CameraIdentity,
+    Eye,
+    EyeDistance,
+    EyePlan,
+    Float64,
+    Frame,
+    HeadsetIdentity,
+    Verification,
+)
 from handcal.hand.marks import outline_marks
 from handcal.link.nudges import VerifyRequest
 from handcal.link.reliable import Delivery, Outgoing
@@ -65,19 +78,6 @@ from handcal.station.verifying import (
     new_id,
     resumed,
     verify_prompt,
-)
-from handcal.types import (
-    EYES,
-    LOOK_AROUND,
-    Alignment,
-    CameraIdentity,
-    Eye,
-    EyeDistance,
-    EyePlan,
-    Float64,
-    Frame,
-    HeadsetIdentity,
-    Verification,
 )
 
 

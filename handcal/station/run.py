@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.progress import Progress
+from handcal.core.types import EyePlan, PlanName
 from handcal.link.pairing import Pairings
-from handcal.progress import Progress
 from handcal.station.doctor import Health
 from handcal.station.follow import Patience, deliver, follow_plan
 from handcal.station.plan import PlanSettings, with_eyes
@@ -18,7 +19,6 @@ from handcal.station.preflight import check_station
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal.types import EyePlan, PlanName
 
 
 @dataclass(frozen=True, slots=True)

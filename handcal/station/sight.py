@@ -6,15 +6,15 @@ import time
 from contextlib import suppress
 
 from handcal.camera.clock import FrameClock
-from handcal.errors import HandError, PoseError
+from handcal.core.errors import HandError, PoseError
+from handcal.core.rig_types import Rig
+from handcal.core.types import CameraIdentity, Frame, HandCloud
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
-from handcal.rig_types import Rig
 from handcal.station.delay import DelayMeter
 from handcal.station.evidence import Contradiction, Evidence
 from handcal.station.hands import PlacedHand, RecentHands
 from handcal.station.states import CalibrationSettings, Observation, State
-from handcal.types import CameraIdentity, Frame, HandCloud
 
 
 class Sight:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from handcal.camera.feed import CameraStatus
+from handcal.core.types import Eye, Frame
 from handcal.link.statistics import LinkStatistics
 from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
@@ -14,7 +15,6 @@ from handcal.station.plan import NextStep, PlanSettings
 from handcal.station.procedure import Procedure
 from handcal.station.states import CalibrationSettings, Observation
 from handcal.station.wearer_view import EyeView
-from handcal.types import Eye, Frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.types import METHODS, EyeDistance, Method
 from handcal.io.settings import read_settings
-from handcal.progress import Progress
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.session import SessionRecord
 from handcal.station.states import CalibrationSettings
-from handcal.types import METHODS, EyeDistance, Method
 
 
 def solve(

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.types import Float64, HandCloud
 from handcal.hand.settings import SegmentSettings
 from handcal.register.guard import GuardSettings
 from handcal.register.results import SolveSettings
 from handcal.station.delay import DelaySettings
 from handcal.station.evidence import Contradiction
 from handcal.station.hands import PlacedHand
-from handcal.types import Float64, HandCloud
 
 MAX_HAND_SET_SHIFT_M = 0.030
 """Limit of each component of a φ set by hand, beyond the eye box."""

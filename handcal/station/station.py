@@ -13,8 +13,9 @@ from pathlib import Path
 
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
-from handcal.errors import FileError, LinkError
-from handcal.geometry import transform
+from handcal.core.errors import FileError, LinkError
+from handcal.core.geometry import transform
+from handcal.core.types import Frame, HeadsetIdentity
 from handcal.io.closable import Closable
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
@@ -42,7 +43,6 @@ from handcal.station.states import Observation, ProcedureError, State
 from handcal.station.trials import Trials
 from handcal.station.verifying import skipped_eyes
 from handcal.station.weak import weakly
-from handcal.types import Frame, HeadsetIdentity
 
 _STORE_PERIOD_S = 1.0
 

@@ -12,10 +12,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
 from handcal.io.configuration import configuration_folder
 from handcal.io.files import make_folder, read_json, read_limited, sync_folder
-from handcal.progress import Progress
 from handcal.session.library import DELETED, read_library
 from handcal.station.doctor import Finding, examine
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from handcal.display import target_corners_m
+from handcal.core.display import target_corners_m
+from handcal.core.rig_types import Rig
+from handcal.core.types import Eye, Float64
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target
-from handcal.rig_types import Rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.station.comparing import Comparing
 from handcal.station.procedure import Calibration
 from handcal.station.states import ProcedureError, State
 from handcal.station.weak import weakly
-from handcal.types import Eye, Float64
 
 
 class Trials:

@@ -16,23 +16,23 @@ from typing import TypeAlias
 import numpy as np
 
 from handcal.camera.camera import Camera
-from handcal.display import TARGET_DEPTHS_M, view_of_eye
-from handcal.errors import FileError, HandcalError, PoseError
-from handcal.geometry import transform
+from handcal.core.display import TARGET_DEPTHS_M, view_of_eye
+from handcal.core.errors import FileError, HandcalError, PoseError
+from handcal.core.geometry import transform
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, Float64
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
-from handcal.progress import Progress
 from handcal.register.results import read_rendered_shift_m
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import read_cube
 from handcal.rig.cube_track import TrackedCube, facing_corners_m
-from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial
 from handcal.sim.cube_bench import simulated_wearer
 from handcal.station.cube_tracking import CubeTracker
 from handcal.station.drawing import Drawing
-from handcal.types import EYES, Eye, Float64
 
 Adjust: TypeAlias = Callable[[Eye, Float64, Callable[[Float64], None]], Float64]
 """Given an eye, its φ, and a function that draws with another φ: returns φ as adjusted by hand."""

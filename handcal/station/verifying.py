@@ -14,17 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from handcal.display import view_of_eye
-from handcal.errors import HandError
-from handcal.geometry import invert, transform
+from handcal.core.display import view_of_eye
+from handcal.core.errors import HandError
+from handcal.core.geometry import invert, transform
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import EYES, Eye, Float64, Verification
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.server import Nudge
 from handcal.register.nudge import nudged_shift_m
-from handcal.rig_types import EyeDisplay, Rig
 from handcal.session.journal import Event
 from handcal.session.state import VERIFYING, SessionEvent
 from handcal.station.hands import PlacedHand, RecentHands
-from handcal.types import EYES, Eye, Float64, Verification
 
 SKIPPED = "verification_skipped"
 _ENDS = (

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.display import arcmin_from_px, eye_projection
-from handcal.frozen import freeze
-from handcal.geometry import project
-from handcal.rig_types import EyeDisplay
-from handcal.types import Eye, Float64, UInt8
+from handcal.core.display import arcmin_from_px, eye_projection
+from handcal.core.frozen import freeze
+from handcal.core.geometry import project
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Eye, Float64, UInt8
 
 _NEAREST_M = 0.05
 _NO_TARGET_M = np.empty((0, 3))

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from handcal.types import Float32, Float64
+from handcal.core.types import Float32, Float64
 
 
 def transform_corners(warp: Float64, corners: Float64) -> Float64:

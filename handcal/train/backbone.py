@@ -14,11 +14,11 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Float32
 from handcal.io.files import read_limited
 from handcal.train.model import HandNet
 from handcal.train.moments import fold_in
-from handcal.types import Float32
 
 _Tensors = dict[str, Float32]
 

@@ -12,7 +12,7 @@ import torch
 from google.protobuf.message import DecodeError
 from onnx import numpy_helper
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import read_limited
 from handcal.train.model import HandNet
 from handcal.train.moments import fold_in

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.utils.data import DataLoader
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.hand.detect import decode, letterbox, points
 from handcal.lab.evaluate.annotations import Photo
 from handcal.lab.evaluate.detector import EVALUATED, summary

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from handcal.cli.terminal import Parser, errors_in_one_line, number
+from handcal.core.types import UInt8
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.shipped import FLOAT_MODEL, INTEGER_MODEL
 from handcal.io.resources import resource_path
@@ -22,7 +23,6 @@ from handcal.sim.hand import HandSettings
 from handcal.sim.raster import D415
 from handcal.sim.room import make_room
 from handcal.train.simulated import Picture, picture
-from handcal.types import UInt8
 
 # Luminance of the skin in even light at the limits of three groups of similar size.
 _TONES = {"dark": 0.0, "medium": 136.0, "light": 180.0}

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
+from handcal.core.types import Float32, Float64, UInt8
 from handcal.io.files import read_json
 from handcal.io.images import read_image
 from handcal.lab.evaluate.annotations import Photo
@@ -23,7 +24,6 @@ from handcal.train.augment import (
     relight,
     transform_corners,
 )
-from handcal.types import Float32, Float64, UInt8
 
 _SHOWN_MIN = 0.35
 _SMALLEST_PX = 9.0

@@ -8,13 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.geometry import rigid, transform
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Bool, Float64, Intrinsics, UInt8
 from handcal.io.files import make_folder, read_json, write_json
 from handcal.sim.hand import HandModel, HandSettings, make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import Room, make_room
-from handcal.types import Bool, Float64, Intrinsics, UInt8
 
 # A third of the colour image of an Intel RealSense D415, 69° across.
 CAMERA = Intrinsics(width=424, height=240, fx=306.0, fy=306.0, cx=211.5, cy=119.5)

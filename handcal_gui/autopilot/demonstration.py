@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QApplication
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.station.settings import StationSettings
 from handcal_gui.autopilot.autopilot import Autopilot
 from handcal_gui.autopilot.screenshots import Screenshots

@@ -7,7 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import make_folder
 from handcal_gui.pages.wizard.view import STEPS, Step, WizardView
 

@@ -9,7 +9,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QPushButton, QTabWidget, QWidget
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal_gui.autopilot.screenshots import Screenshots
 from handcal_gui.dialogs.camera_settings import CameraSettingsDialog
 from handcal_gui.dialogs.export import ExportDialog

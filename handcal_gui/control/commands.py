@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.station.procedure import Calibration
 from handcal.station.states import State
 from handcal.station.station import Station

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
 
+from handcal.core.progress import Progress
 from handcal.export.outcome import load_outcome
 from handcal.export.window_3d import inspect_session
-from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.engine.jobs import Job
 

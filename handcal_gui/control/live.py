@@ -14,7 +14,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.bridge.bridges import BridgeSettings
 from handcal.camera.clock import INFORM_NS
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings
 from handcal.session.session import Session

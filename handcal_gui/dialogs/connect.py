@@ -8,18 +8,18 @@ from contextlib import suppress
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye
 from handcal.link.discovery import Announcement
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import OFFER_S
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
-from handcal.progress import Progress
-from handcal.rig_types import Rig
 from handcal.station.doctor import Finding, Health
 from handcal.station.headset import headset_problem, headset_state
 from handcal.station.pattern import pattern_state, send_pattern
-from handcal.types import EYES, Eye
 from handcal_gui.dialogs.paired_devices import PairedDevices
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX, number_font, scale_font

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.link.pairing import Pairing, Pairings
 from handcal_gui.theme import SPACING_PX, flat_header, number_font
 from handcal_gui.translation import tr

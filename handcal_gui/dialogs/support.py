@@ -9,8 +9,8 @@ from pathlib import Path
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QDialog, QFormLayout, QWidget
 
+from handcal.core.progress import Progress
 from handcal.io.files import require_writable, user_path
-from handcal.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal.station.support import SupportSettings, run_support
 from handcal_gui.engine.jobs import Job

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from PySide6.QtCore import QObject, Signal
 
 from handcal.bridge.bridges import BridgeSettings, open_bridges
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.session.unfinished import summarize
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station

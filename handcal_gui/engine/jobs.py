@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Signal
 
-from handcal.errors import CancelledError, HandcalError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError, HandcalError
+from handcal.core.progress import Progress
 from handcal_gui.engine.worker import Worker
 from handcal_gui.translation import tr
 

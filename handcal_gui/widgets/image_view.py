@@ -11,7 +11,7 @@ from PySide6.QtCore import QPointF, QRect, QRectF, QSizeF, Qt
 from PySide6.QtGui import QImage, QPainter, QPaintEvent, QTransform
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from handcal.types import UInt8, UInt16
+from handcal.core.types import UInt8, UInt16
 from handcal_gui.theme import SPACING_PX
 
 Image: TypeAlias = UInt8 | UInt16

@@ -13,7 +13,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.view_source import REALSENSE, open_view_source
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.types import CameraIdentity, Frame, UInt8
+from handcal.core.types import CameraIdentity, Frame, UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, label_for

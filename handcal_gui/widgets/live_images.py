@@ -10,8 +10,8 @@ from contextlib import ExitStack
 from PySide6.QtCore import QObject, Signal
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraTimeoutError, HandcalError
-from handcal.types import UInt8
+from handcal.core.errors import CameraTimeoutError, HandcalError
+from handcal.core.types import UInt8
 from handcal_gui.engine.worker import Worker
 from handcal_gui.translation import tr
 

@@ -10,7 +10,7 @@ from PySide6.QtGui import QPagedPaintDevice, QPdfWriter
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter
 from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import write_atomic
 from handcal_gui.translation import tr
 from handcal_gui.widgets.brief import show_briefly

@@ -7,8 +7,8 @@ from PySide6.QtCore import QLineF, QRectF, Qt
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from handcal.core.types import Float64, UInt8
 from handcal.register.verdict import VerdictSettings
-from handcal.types import Float64, UInt8
 from handcal_gui.theme import SPACING_PX, is_dark
 from handcal_gui.translation import tr
 from handcal_gui.widgets.splat import rgb

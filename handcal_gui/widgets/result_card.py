@@ -9,9 +9,9 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
+from handcal.core.types import EYES, Eye, phi_text
 from handcal.register.results import USED, Results
 from handcal.session.judged_trials import EyeTrials
-from handcal.types import EYES, Eye, phi_text
 from handcal_gui.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import paragraph

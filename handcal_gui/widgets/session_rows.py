@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from handcal.core.types import EYES
 from handcal.register.results import Results
 from handcal.report.cells import signed
 from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
-from handcal.types import EYES
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtGui import QColor, QImage
 
-from handcal.types import Float64, UInt8, UInt16
+from handcal.core.types import Float64, UInt8, UInt16
 
 _FARTHEST = 65535
 """Depth level of the farthest point; the nearest has 0."""

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from handcal.camera.feed import CameraStatus
-from handcal.geometry import rigid, transform
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Eye, Float64, HandCloud
 from handcal.link.statistics import LinkStatistics
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
@@ -19,7 +20,6 @@ from handcal.station.hands import PlacedHand
 from handcal.station.procedure import Procedure
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import Observation, State
-from handcal.types import Eye, Float64, HandCloud
 
 POINTS_D_M = (
     np.random.default_rng(0)

@@ -15,12 +15,12 @@ import pytest
 from handcal.bridge.bridge import Bridge
 from handcal.bridge.slicer import MAX_POINTS, SlicerOutput
 from handcal.cli.main import main
-from handcal.conventions import slicer_points_mm, slicer_transform
-from handcal.display import projection_matrix
-from handcal.errors import LinkError
-from handcal.geometry import invert
+from handcal.core.conventions import slicer_points_mm, slicer_transform
+from handcal.core.display import projection_matrix
+from handcal.core.errors import LinkError
+from handcal.core.geometry import invert
+from handcal.core.types import Float64
 from handcal.station.snapshot import Snapshot
-from handcal.types import Float64
 from tests.bridge.conftest import SHIFT_M, T_W_D, placed_hand
 from tests.helpers import eventually
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from handcal.camera import sdk_devices
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, Frame, Intrinsics
 from handcal.io.closable import Closable
-from handcal.types import Float64, Frame, Intrinsics
 
 _SCALE_M = 0.000125
 _T_C_D: Float64 = rigid([0.01, -0.02, 0.03], [0.015, 0.001, -0.002])

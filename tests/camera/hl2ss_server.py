@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.camera.settings import HoloLens2Settings
-from handcal.geometry import invert
+from handcal.core.geometry import invert
+from handcal.core.types import Float32, Float64, Intrinsics
 from handcal.io.closable import Closable
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
-from handcal.types import Float32, Float64, Intrinsics
 
 AHAT_REQUEST = b"\x01\x03\x00\xff\xff\x00\x00\x00\x00\x00"
 LONG_THROW_REQUEST = b"\x01\x03\x00\x00\x00\x00"

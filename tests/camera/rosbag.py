@@ -11,8 +11,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import invert
-from handcal.types import Float64, Frame, Intrinsics
+from handcal.core.geometry import invert
+from handcal.core.types import Float64, Frame, Intrinsics
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 TYPES = STORE.types

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
 
 T_C_D = rigid([0.01, -0.02, 0.03], [0.015, 0.001, -0.002])
 PERIOD_US = 33_000

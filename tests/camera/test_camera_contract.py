@@ -22,14 +22,14 @@ from handcal.camera.orbbec import OrbbecCamera
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording, record_frames
 from handcal.camera.settings import HoloLens2Settings
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.sim.ahat import ahat_rays
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import RoomSettings, make_room
 from handcal.sim.sway import swaying_hand
-from handcal.types import CameraIdentity, Frame, Intrinsics
 from tests.camera.hl2ss_server import (
     GROUPS,
     NAME,

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.camera.clock import FrameClock
-from handcal.types import Frame, Intrinsics
+from handcal.core.types import Frame, Intrinsics
 
 TINY = Intrinsics(2, 2, 1.0, 1.0, 0.5, 0.5)
 PERIOD_NS = 33_333_333

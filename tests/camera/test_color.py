@@ -15,8 +15,8 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.recordings import open_recording, record_frames
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.view_source import REALSENSE, open_view_source
-from handcal.errors import CameraEndError, CameraError
-from handcal.types import CameraIdentity, Frame
+from handcal.core.errors import CameraEndError, CameraError
+from handcal.core.types import CameraIdentity, Frame
 
 D415 = CameraIdentity("Intel RealSense D415", "123", "5.16.0.1")
 MakeFrames = Callable[..., Iterator[Frame]]

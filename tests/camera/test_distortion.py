@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from handcal.camera.distortion import opencv_distortion
-from handcal.errors import CameraError
-from handcal.geometry import image_points
-from handcal.types import Intrinsics
+from handcal.core.errors import CameraError
+from handcal.core.geometry import image_points
+from handcal.core.types import Intrinsics
 
 rs = pytest.importorskip("pyrealsense2")
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from handcal.camera.feed import CameraFeed, FeedSettings
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
+from handcal.core.types import CameraIdentity, Float32, Frame, Intrinsics
 from handcal.io.closable import Closable
-from handcal.types import CameraIdentity, Float32, Frame, Intrinsics
 
 CAMERA = Intrinsics(8, 6, 10.0, 10.0, 3.5, 2.5)
 SETTINGS = FeedSettings(read_s=0.01, silent_s=0.03, reopen_s=0.05)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from handcal.camera.folder import DESCRIPTION, LIST, FolderCamera, record_folder
-from handcal.errors import CameraEndError, CameraError, FileError
-from handcal.geometry import rigid
-from handcal.types import Frame
+from handcal.core.errors import CameraEndError, CameraError, FileError
+from handcal.core.geometry import rigid
+from handcal.core.types import Frame
 
 MakeFrames = Callable[..., Iterator[Frame]]
 

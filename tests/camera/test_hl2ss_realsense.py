@@ -16,8 +16,8 @@ from handcal.camera.hl2ss_realsense import DepthFormat, HoloLens2RealSense, find
 from handcal.camera.hololens2 import hololens2_settings
 from handcal.camera.live import is_live, open_hololens2
 from handcal.camera.settings import HoloLens2Settings
-from handcal.errors import CameraError
-from handcal.types import CameraIdentity
+from handcal.core.errors import CameraError
+from handcal.core.types import CameraIdentity
 from tests.camera.hl2ss_server import (
     FORMATS,
     GROUPS,

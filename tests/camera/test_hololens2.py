@@ -18,13 +18,13 @@ from handcal.camera.hl2ss import STREAMS, parse_calibration
 from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
 from handcal.camera.radial import is_not_wrapped, white_brightness
 from handcal.camera.settings import HoloLens2Settings
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import rigid
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import rigid
+from handcal.core.types import Float32, Float64, Frame, Intrinsics, UInt16
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
-from handcal.types import Float32, Float64, Frame, Intrinsics, UInt16
 from tests.camera.hl2ss_server import (
     AHAT_REQUEST,
     LONG_THROW_REQUEST,

@@ -11,8 +11,9 @@ import pytest
 from handcal.camera.hololens2 import HoloLens2Camera
 from handcal.camera.measure_depth import STILLS, run_depth_check
 from handcal.camera.settings import HoloLens2Settings
-from handcal.errors import CameraEndError
-from handcal.geometry import rigid
+from handcal.core.errors import CameraEndError
+from handcal.core.geometry import rigid
+from handcal.core.types import CameraIdentity, Float32, Float64, Frame, Intrinsics
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 from handcal.lab.evaluate.masked_frames import read_masked_frames, read_masked_names
@@ -20,7 +21,6 @@ from handcal.rig.board import Board, corners_m
 from handcal.rig.report import depth_finding
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
 from handcal.sim.boards import BoardPainter, PictureSettings, pixel_rays
-from handcal.types import CameraIdentity, Float32, Float64, Frame, Intrinsics
 from tests.camera.hl2ss_server import Hl2ssServer, ahat_payload, calibration_of, packet_of
 
 # Markers of fewer than 4 px a bit are not found in its 512 px.

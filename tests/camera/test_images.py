@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from handcal.camera.images import read_frame
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 
 INTRINSICS = {
     "width": 40,

@@ -11,12 +11,12 @@ import pytest
 
 from handcal.camera.folder import FolderCamera, record_folder
 from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
-from handcal.progress import Progress
+from handcal.core.progress import Progress
+from handcal.core.rig_types import DepthCheck
+from handcal.core.types import Frame
 from handcal.rig.board import Board
 from handcal.rig.views import ViewsError
-from handcal.rig_types import DepthCheck
 from handcal.sim.boards import BoardPainter, PictureSettings
-from handcal.types import Frame
 from tests.board_frames import BOARD, COLOR, frames, poses
 
 COUNT = 6

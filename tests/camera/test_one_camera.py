@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handcal.camera.one_camera import of_one_camera
-from handcal.types import Frame
+from handcal.core.types import Frame
 
 MakeFrames = Callable[..., Iterator[Frame]]
 

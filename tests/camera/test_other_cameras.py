@@ -10,8 +10,8 @@ import pytest
 from handcal.camera.live import is_live, open_live
 from handcal.camera.oak import OakCamera
 from handcal.camera.orbbec import OrbbecCamera
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.types import Intrinsics
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.types import Intrinsics
 from tests.camera.stand_ins import T_C_D, OakStandIn, OrbbecStandIn
 
 

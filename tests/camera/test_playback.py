@@ -12,8 +12,8 @@ import pytest
 
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.recordings import open_recording, record_frames
-from handcal.errors import CameraEndError, CameraTimeoutError
-from handcal.types import Frame
+from handcal.core.errors import CameraEndError, CameraTimeoutError
+from handcal.core.types import Frame
 
 COUNT = 20
 PERIOD_S = 0.033

@@ -13,9 +13,9 @@ import pytest
 from handcal.camera.feed import CameraFeed, FeedSettings
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.settings import RealSenseSettings
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import image_points, rigid, transform
-from handcal.types import Float64, Frame
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import image_points, rigid, transform
+from handcal.core.types import Float64, Frame
 
 PlugIn = Callable[..., Any]
 

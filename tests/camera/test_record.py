@@ -13,10 +13,10 @@ import pytest
 
 from handcal.camera.record import Recorded, RecordSettings, record
 from handcal.camera.recordings import open_recording
-from handcal.errors import CameraEndError, CameraError, CameraTimeoutError, FileError
+from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError, FileError
+from handcal.core.progress import Progress
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.io.closable import Closable
-from handcal.progress import Progress
-from handcal.types import CameraIdentity, Frame, Intrinsics
 
 CAMERA = Intrinsics(16, 12, 20.0, 20.0, 7.5, 5.5)
 SETTINGS = RecordSettings(silent_s=0.1, free_bytes=0)

@@ -13,8 +13,8 @@ import pytest
 
 from handcal.camera.recording import RecordingCamera
 from handcal.camera.sdk_recorder import record_db3
-from handcal.errors import CameraEndError, CameraError
-from handcal.types import Frame, Intrinsics
+from handcal.core.errors import CameraEndError, CameraError
+from handcal.core.types import Frame, Intrinsics
 
 if sys.platform == "darwin":
     pytest.skip("pyrealsense2 has no package for macOS", allow_module_level=True)

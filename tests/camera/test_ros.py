@@ -12,9 +12,9 @@ import pytest
 
 from handcal.camera.recordings import open_recording
 from handcal.camera.ros import RosCamera
-from handcal.errors import CameraEndError, CameraError
-from handcal.geometry import rigid
-from handcal.types import Frame, Intrinsics
+from handcal.core.errors import CameraEndError, CameraError
+from handcal.core.geometry import rigid
+from handcal.core.types import Frame, Intrinsics
 from tests.camera.rosbag import (
     COLOR,
     DEPTH,

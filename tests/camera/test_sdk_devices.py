@@ -20,9 +20,9 @@ from handcal.camera.sdk_devices import (
     devices_by_child,
     librealsense,
 )
-from handcal.errors import CameraError, CancelledError
-from handcal.progress import Progress
-from handcal.types import CameraIdentity
+from handcal.core.errors import CameraError, CancelledError
+from handcal.core.progress import Progress
+from handcal.core.types import CameraIdentity
 
 D415 = Device("Intel RealSense D415", "123", "5.16.0.1", "3.2", temperature_c=41.0)
 

@@ -10,7 +10,7 @@ import pytest
 
 from handcal.camera.sdk_options import HandExposure, apply_options
 from handcal.camera.settings import RealSenseSettings
-from handcal.errors import CameraError
+from handcal.core.errors import CameraError
 
 rs = pytest.importorskip("pyrealsense2")
 

@@ -11,7 +11,7 @@ import pytest
 
 from handcal.camera.recording import RecordingCamera
 from handcal.camera.sdk_recorder import record_db3
-from handcal.types import Frame
+from handcal.core.types import Frame
 
 pytest.importorskip("pyrealsense2")
 

@@ -20,17 +20,17 @@ from handcal.camera.take_board import (
 )
 from handcal.camera.viewpoint import open_viewpoint
 from handcal.cli.main import main
-from handcal.errors import CameraEndError, CameraTimeoutError
-from handcal.geometry import interpolate_pose, rigid
+from handcal.core.errors import CameraEndError, CameraTimeoutError
+from handcal.core.geometry import interpolate_pose, rigid
+from handcal.core.progress import Progress
+from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8
 from handcal.io.closable import Closable
 from handcal.io.images import read_image
-from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.choose import ChooseSettings
 from handcal.rig.formats import read_identity, read_intrinsics, read_pose
 from handcal.rig.views import image_files, pair_views, read_views
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8
 
 BOARD = Board(squares=(7, 5), square_m=0.035, marker_m=0.025)
 CAMERA = Intrinsics(480, 360, 400.0, 401.0, 238.0, 181.0)

@@ -14,7 +14,7 @@ import pytest
 from handcal.camera import viewpoint
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.viewpoint import list_viewpoints, open_viewpoint
-from handcal.errors import CameraEndError, CameraError
+from handcal.core.errors import CameraEndError, CameraError
 
 RGB = (200, 120, 30)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.io.resources import resource_path
 from handcal.session.session import Session
 from tests.campaigns.campaign import Tally, campaign

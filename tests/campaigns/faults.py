@@ -16,7 +16,7 @@ import traceback
 from enum import IntEnum
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.session.session import Session
 from tests.campaigns import life
 from tests.campaigns.campaign import Tally, campaign

@@ -29,9 +29,10 @@ import numpy as np
 from handcal.camera.images import write_frame
 from handcal.camera.recordings import record_frames
 from handcal.cli.main import main
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.types import Intrinsics
 from handcal.export.clouds import read_cloud
-from handcal.geometry import rigid
 from handcal.io.resources import resource_path
 from handcal.io.settings import settings_json
 from handcal.rig.formats import write_intrinsics
@@ -41,7 +42,6 @@ from handcal.sim.raster import D415
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
-from handcal.types import Intrinsics
 from tests.campaigns.campaign import Tally, campaign
 from tests.campaigns.mutate import mutated
 

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.session.session import Session
 from tests.campaigns import life
 from tests.campaigns.campaign import Tally, campaign

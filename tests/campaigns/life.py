@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.resources import resource_path
 from handcal.session.session import Session, SessionRecord
 

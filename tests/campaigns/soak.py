@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from statistics import fmean
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.types import EYES
 from handcal.station.settings import StationSettings
 from handcal.station.states import State
 from handcal.station.station import Station
-from handcal.types import EYES
 from tests.campaigns.campaign import Tally, campaign
 from tests.helpers import write_small_rig
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import parse
-from handcal.errors import FileError, HandcalError
-from handcal.geometry import rigid
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.sim.acceptance import write_acceptance

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import main
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Intrinsics
 from handcal.io.images import write_png
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import read_cube, write_cube
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from handcal.types import Intrinsics
 
 CAMERA = Intrinsics(640, 360, 900.0, 900.0, 320.0, 180.0)
 

@@ -7,13 +7,13 @@ import pytest
 
 from handcal.camera.folder import record_folder
 from handcal.cli.main import parse
-from handcal.errors import HandcalError
-from handcal.geometry import rigid
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.types import Frame, Intrinsics
 from handcal.rig.cube import Cube
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from handcal.types import Frame, Intrinsics
 from tests.helpers import ROOT
 
 CAMERA = Intrinsics(640, 360, 502.0, 502.0, 319.5, 179.5)

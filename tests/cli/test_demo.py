@@ -16,8 +16,9 @@ import pytest
 
 from handcal.cli.main import main, parse
 from handcal.cli.simulate import meanings
-from handcal.display import reprojection_arcmin
-from handcal.geometry import rigid
+from handcal.core.display import reprojection_arcmin
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Eye, EyeDistance, VerdictName
 from handcal.lab.demo import DemoSettings, measure_eye_distance
 from handcal.register.prior import eye_position_m
 from handcal.register.results import USED
@@ -25,7 +26,6 @@ from handcal.rig.example import Z_E_S_M, example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Eye, EyeDistance, VerdictName
 from tests.helpers import slow_simulator, write_small_rig
 
 SEED = 3

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from handcal.camera.folder import record_folder
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Frame, Intrinsics
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import Frame, Intrinsics
 
 CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 SENSOR = SensorSettings()

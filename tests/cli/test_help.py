@@ -17,7 +17,7 @@ from handcal.cli.terminal import Command
 
 pytestmark = pytest.mark.process
 
-HEAVY = {"numpy", "scipy", "cv2", "rich", "matplotlib", "onnxruntime", "handcal.types"}
+HEAVY = {"numpy", "scipy", "cv2", "rich", "matplotlib", "onnxruntime", "handcal.core.types"}
 HELP = f"""
 import sys
 from handcal.cli.main import main

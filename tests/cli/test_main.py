@@ -15,15 +15,15 @@ from typing import Any
 
 import pytest
 
+from handcal.core.progress import Progress
+from handcal.core.types import Alignment
 from handcal.io.resources import resource_path
 from handcal.lab import bench
 from handcal.link.pairing import KEY_VARIABLE
-from handcal.progress import Progress
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.station import doctor
 from handcal.station.doctor import Finding, Health
-from handcal.types import Alignment
 from tests.helpers import write_small_rig
 
 # A shell that starts tests in the background has SIGINT ignored, and so would the program.

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from handcal.core.types import HeadsetIdentity
 from handcal.link import inviting
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer
-from handcal.types import HeadsetIdentity
 from tests.helpers import eventually
 
 DEVICE, OTHER = "00000000000000aa", "00000000000000bb"

@@ -10,13 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handcal.cli.replay import replay
-from handcal.errors import CameraEndError, CameraTimeoutError
-from handcal.geometry import rigid
+from handcal.core.errors import CameraEndError, CameraTimeoutError
+from handcal.core.geometry import rigid
+from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics
 from handcal.hand.segment import SegmentSettings
 from handcal.io.closable import Closable
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import draw_hand
-from handcal.types import CameraIdentity, Float64, Frame, Intrinsics
 
 CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 T_0 = rigid([0.1, 0.1, 0.1], [0.0, 0.02, 0.52])

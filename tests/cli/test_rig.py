@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import main
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, Intrinsics
 from handcal.io.images import read_image
 from handcal.rig.board import Board
 from handcal.rig.board_finder import find_board
 from handcal.rig.formats import read_intrinsics, read_pose, write_intrinsics, write_pose
 from handcal.sim.boards import BoardPainter, board_poses
-from handcal.types import Float64, Intrinsics
 
 BOARD = Board(kind="checkerboard")
 CAMERA = Intrinsics(480, 360, 400.0, 401.0, 238.0, 181.0, (-0.1, 0.05, 0.0, 0.0, 0.0))

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import parse
-from handcal.display import eye_projection, view_of_eye
-from handcal.errors import FileError, HandcalError
-from handcal.geometry import invert, rigid
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.geometry import invert, rigid
+from handcal.core.types import Intrinsics
 from handcal.rig.board import Board
 from handcal.rig.compare import compare_rigs
 from handcal.rig.example import FOCAL_PX, example_rig
@@ -22,7 +23,6 @@ from handcal.rig.tracked_file import write_tracked
 from handcal.rig.views import ViewsError
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses, pixel_rays
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import Intrinsics
 
 RIG = example_rig()
 CAMERA = Intrinsics(960, 540, 1350.0, 1348.0, 482.0, 267.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0))

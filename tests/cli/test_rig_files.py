@@ -12,13 +12,13 @@ import pytest
 from handcal.camera.folder import record_folder
 from handcal.camera.hl2ss import STREAMS
 from handcal.cli.main import parse
-from handcal.errors import HandcalError
-from handcal.geometry import rigid
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.sim.ahat import ahat_rays
 from handcal.sim.boards import BoardPainter, PictureSettings
-from handcal.types import CameraIdentity, Frame, Intrinsics
 from tests import board_frames
 from tests.camera.hl2ss_server import Hl2ssServer, calibration_of
 from tests.helpers import DATA

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from handcal.cli.segmentation_file import draw_overlay, write_segmentation
-from handcal.errors import FileError
-from handcal.geometry import rigid
-from handcal.types import Frame, HandCloud, Intrinsics
+from handcal.core.errors import FileError
+from handcal.core.geometry import rigid
+from handcal.core.types import Frame, HandCloud, Intrinsics
 
 CAMERA = Intrinsics(40, 30, 50.0, 50.0, 20.0, 15.0)
 

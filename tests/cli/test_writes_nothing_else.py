@@ -16,7 +16,7 @@ import pytest
 
 from handcal.cli import main
 from handcal.cli.main import Entry
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
 from handcal.io.configuration import configuration_folder
 from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE, new_pairing_key

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import handcal
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Intrinsics
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
-from handcal.types import Intrinsics
 from tests.camera.hl2ss_server import Hl2ssServer, ahat_payload, calibration_of, packet_of
 from tests.helpers import ROOT, write_small_rig, write_thin_session
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import CancelledError, FileError
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.progress import Progress
 from handcal.export import archive
 from handcal.export.archive import write_archive
-from handcal.progress import Progress
 from handcal.session.session import Session, SessionRecord
 
 

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.conventions import opengl_projection, openxr_view, unity_world_to_camera
+from handcal.core.conventions import opengl_projection, openxr_view, unity_world_to_camera
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
-from handcal.rig_types import Rig
 from handcal.session.session import SessionRecord
-from handcal.types import EYES, Eye
 
 
 def test_filestorage_gives_every_double_back(tmp_path: Path, outcome: SessionOutcome) -> None:

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.progress import Progress
 from handcal.export.clouds import read_cloud, write_clouds
 from handcal.export.outcome import SessionOutcome
-from handcal.progress import Progress
 
 KINDS = {"double": "<f8", "uchar": "u1"}
 

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import CancelledError, FileError
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.progress import Progress
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.io.settings import read_settings, settings_json
-from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 
 resource = pytest.importorskip("resource")
@@ -55,7 +55,7 @@ ALL_FILES = {
 LIGHT: tuple[Format, ...] = ("csv", "yaml", "json", "ply", "zip")
 PREPARED = """
 from handcal.export.export import _import_drawing
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 _import_drawing(Progress(report=lambda what, _share: print(what)))
 """
 # Exports a session, and is killed when half of it is done.
@@ -63,7 +63,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from handcal.export.export import ExportSettings, export_session
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 from handcal.session.session import Session
 
 def report(what, share):

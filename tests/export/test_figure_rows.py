@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from handcal.core.geometry import transform
 from handcal.export.figure_rows import (
     convergence_rows,
     overlay_rows,
@@ -14,7 +15,6 @@ from handcal.export.figure_rows import (
 from handcal.export.figures import CELL_MM, overlay_outlines, residual_cells
 from handcal.export.outcome import SessionOutcome
 from handcal.export.report import session_report
-from handcal.geometry import transform
 
 
 def test_convergence_ends_at_what_was_solved(outcome: SessionOutcome) -> None:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import CancelledError
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
 from handcal.export.export import ExportSettings
 from handcal.export.many import export_sessions
 from handcal.io.resources import resource_path
-from handcal.progress import Progress
 
 SETTINGS = ExportSettings(("csv", "yaml"))
 

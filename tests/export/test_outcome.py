@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix
-from handcal.errors import FileError
+from handcal.core.display import projection_matrix
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Verdict
 from handcal.export.outcome import SessionOutcome, load_outcome
-from handcal.progress import Progress
 from handcal.register.results import results_json
 from handcal.session.session import SessionRecord
-from handcal.types import EYES, Verdict
 
 
 def test_the_session_is_solved_to_what_it_was(outcome: SessionOutcome) -> None:

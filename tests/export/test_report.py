@@ -14,10 +14,11 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from handcal.errors import CancelledError
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Eye, Float64, Verdict
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import session_report
-from handcal.progress import Progress
 from handcal.register.benefit import expected_error_arcmin
 from handcal.report.document import Table
 from handcal.report.pdf import compose, write_pdf
@@ -25,7 +26,6 @@ from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, co
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
 from handcal.session.trial import Trial
-from handcal.types import EYES, Eye, Float64, Verdict
 
 COMPARED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0])}
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from handcal.core.geometry import invert, project, transform
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.scene_3d import make_scenes
 from handcal.export.window_3d import residual_colors
-from handcal.geometry import invert, project, transform
 from handcal.io.resources import resource_path
 from handcal.session.session import Session, SessionRecord
 

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from handcal.cli.main import main
-from handcal.conventions import opengl_transform, slicer_points_mm
-from handcal.errors import FileError
+from handcal.core.conventions import opengl_transform, slicer_points_mm
+from handcal.core.errors import FileError
+from handcal.core.geometry import invert, project, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, Float64
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.tools import write_northstar, write_openxr, write_slicer, write_unity
-from handcal.geometry import invert, project, transform
-from handcal.rig_types import Rig
 from handcal.session.session import SessionRecord
-from handcal.types import EYES, Eye, Float64
 
 POINTS_H_M = np.array([[0.02, 0.06, 0.4], [-0.05, 0.12, 0.6], [0.06, 0.25, 2.0]])
 UP = np.diag([1.0, -1.0, -1.0])  # OpenGL's axes from OpenCV's

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import CancelledError, FileError, HandcalError
+from handcal.core.errors import CancelledError, FileError, HandcalError
+from handcal.core.progress import Progress
 from handcal.export import window_3d
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.window_3d import inspect_session
 from handcal.io.images import read_image
-from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 
 needs_open3d = pytest.mark.skipif(find_spec("open3d") is None, reason="Open3D is not installed")

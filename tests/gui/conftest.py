@@ -19,9 +19,21 @@ from scipy.spatial.transform import Rotation
 
 from handcal.camera.feed import CameraStatus
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.display import view_of_eye
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import rigid, transform
+from handcal.core.display import view_of_eye
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import rigid, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import (
+    EYES,
+    Alignment,
+    CameraIdentity,
+    Eye,
+    Float64,
+    Frame,
+    HeadsetIdentity,
+    UInt8,
+    Verification,
+)
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.io.closable import Closable
 from handcal.io.settings import settings_json
@@ -31,7 +43,6 @@ from handcal.link.wire import Rejection
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
@@ -44,17 +55,6 @@ from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import CalibrationSettings, Observation, State
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import (
-    EYES,
-    Alignment,
-    CameraIdentity,
-    Eye,
-    Float64,
-    Frame,
-    HeadsetIdentity,
-    UInt8,
-    Verification,
-)
 from tests.helpers import write_small_rig
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")

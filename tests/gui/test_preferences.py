@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QStandardPaths
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.register.guard import GuardSettings

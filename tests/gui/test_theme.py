@@ -15,7 +15,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QSlider, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 from handcal_gui.theme import colors, follow_theme, icon, is_dark, use_theme
 from handcal_gui.widgets.fields import tool_button
 from handcal_gui.widgets.residual_scale import OUTLIER, residual_ramp

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import product
 from typing import Any
 
+from handcal.core.types import EYES, Eye, Float64, Verdict, VerdictName, Verification
 from handcal.link.nudges import NudgeSum
 from handcal.register.results import SolveSettings
 from handcal.register.verdict import VerdictSettings
@@ -17,7 +18,6 @@ from handcal.station.plan import NextStep, PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import CalibrationSettings, State
 from handcal.station.verifying import VerifyingView
-from handcal.types import EYES, Eye, Float64, Verdict, VerdictName, Verification
 from handcal_gui.pages.wizard.step_views import save_view
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step, WizardView

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from handcal.geometry import invert, rigid, transform
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import Bool, Float32, Float64, Frame, Intrinsics
 from handcal.sim.hand import HandModel, HandSettings, make_hand
 from handcal.sim.raster import draw_hand
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import Bool, Float32, Float64, Frame, Intrinsics
 
 CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
 SENSOR = SensorSettings()

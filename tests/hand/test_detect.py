@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Float32, Float64, UInt8
 from handcal.hand.detect import (
     STRIDES,
     Detections,
@@ -20,7 +21,6 @@ from handcal.hand.detect import (
 )
 from handcal.io.images import read_image
 from handcal.io.resources import resource_path
-from handcal.types import Float32, Float64, UInt8
 
 SHAPE = (64, 96)
 

@@ -3,12 +3,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from handcal.errors import HandError
+from handcal.core.errors import HandError
+from handcal.core.types import Frame, HandCloud, UInt8
 from handcal.hand.detect import Detections
 from handcal.hand.finder import HandFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.hand.view import Box
-from handcal.types import Frame, HandCloud, UInt8
 
 from .conftest import CAMERA, shoot
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handcal.core.types import Float64
 from handcal.hand import marks
 from handcal.hand.marks import outline_marks
 from handcal.hand.segment import SegmentSettings, segment_hand
-from handcal.types import Float64
 
 from .conftest import Shot
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Frame, Intrinsics, UInt8
 from handcal.hand.overlay import contour_px
 from handcal.hand.segment import SegmentSettings, segment_hand
-from handcal.types import Frame, Intrinsics, UInt8
 
 from .conftest import CAMERA, Shot
 

@@ -3,12 +3,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Frame, Intrinsics, UInt8
 from handcal.hand.detect import Detections, overlaps
 from handcal.hand.roi import RoiFinder
 from handcal.hand.settings import Roi, SegmentSettings
 from handcal.hand.view import Box
-from handcal.types import Frame, Intrinsics, UInt8
 
 CAMERA = Intrinsics(width=640, height=360, fx=500.0, fy=500.0, cx=319.5, cy=179.5)
 FRAME_NS = 33_000_000

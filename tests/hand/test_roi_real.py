@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from handcal.camera.images import read_depth
+from handcal.core.types import Bool, Float64, Frame, Intrinsics, UInt8
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.finder import HandFinder
 from handcal.hand.roi import RoiFinder
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import load_detector
 from handcal.io.images import read_image
-from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 
 SETTINGS = SegmentSettings()
 

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.errors import HandError
-from handcal.geometry import camera_matrix, project, rigid
+from handcal.core.errors import HandError
+from handcal.core.geometry import camera_matrix, project, rigid
+from handcal.core.types import Frame, HandCloud, Intrinsics, UInt16
 from handcal.hand.segment import SegmentSettings, segment_hand
-from handcal.types import Frame, HandCloud, Intrinsics, UInt16
 
 from .conftest import CAMERA, Shot, shoot
 

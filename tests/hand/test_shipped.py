@@ -5,13 +5,13 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.errors import FileError, HandError
+from handcal.core.errors import FileError, HandError
+from handcal.core.types import Frame, Intrinsics, UInt8
 from handcal.hand import shipped as detector
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.settings import Roi, SegmentSettings
 from handcal.hand.shipped import load_detector, make_finder
 from handcal.io.images import read_image
-from handcal.types import Frame, Intrinsics, UInt8
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from handcal.core.types import Frame, HandCloud
 from handcal.hand.finder import HandFinder
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
@@ -23,7 +24,6 @@ from handcal.lab.evaluate.masked_frames import (
     scaled,
     subsampled,
 )
-from handcal.types import Frame, HandCloud
 
 from .conftest import shoot
 

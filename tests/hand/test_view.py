@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from handcal.geometry import camera_matrix
+from handcal.core.geometry import camera_matrix
+from handcal.core.types import Frame, Intrinsics
 from handcal.hand.view import between, crop_view, deproject, pixels_of, view_depth
-from handcal.types import Frame, Intrinsics
 
 CAMERA = Intrinsics(64, 48, 60.0, 61.0, 30.0, 25.0, (0.1, -0.05, 0.001, 0.002, 0.01))
 

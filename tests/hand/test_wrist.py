@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from handcal.errors import HandError
-from handcal.geometry import rotation_matrix, rotation_vector
+from handcal.core.errors import HandError
+from handcal.core.geometry import rotation_matrix, rotation_vector
+from handcal.core.types import Float32
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
 from handcal.hand.wrist import find_wrist_m
-from handcal.types import Float32
 
 from .conftest import Shot, shoot
 

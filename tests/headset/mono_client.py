@@ -20,13 +20,13 @@ import numpy as np
 
 import handcal.cli.main
 import handcal.sim.headset
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 from handcal.io.closable import Closable
 from handcal.link.client import HeadsetState
 from handcal.link.impair import UNIMPAIRED, Impairment
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 from tests.headset.relay import Relay
 from tests.helpers import ROOT
 

@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
+from handcal.core.progress import Progress
+from handcal.core.types import EYES
 from handcal.io.resources import resource_path
 from handcal.lab.demo import DemoSettings, run_demo
-from handcal.progress import Progress
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import CalibrationSettings, State
 from handcal.station.station import Station
-from handcal.types import EYES
 from tests.headset.mono_client import command
 from tests.helpers import Patience
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.conventions import unity_transform
-from handcal.display import projection_matrix
-from handcal.geometry import project, rigid, transform
+from handcal.core.conventions import unity_transform
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import project, rigid, transform
+from handcal.core.types import EYES, Float64, Projection
 from handcal.link.nudges import VerifyRequest
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
 from handcal.link.shapes import Shape
 from handcal.rig.example import example_rig
-from handcal.types import EYES, Float64, Projection
 from tests.headset.conftest import PACKAGE
 from tests.headset.unity_player import PATIENCE_S, UnityPlayer, numbers
 from tests.helpers import ROOT, eventually

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from handcal.core.types import HeadsetIdentity
 from handcal.link.exchange import MAX_ATTEMPTS
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer
-from handcal.types import HeadsetIdentity
 from tests.headset.conftest import Ask
 from tests.headset.mono_client import MonoClient
 from tests.link import vectors

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import target_corners_m
-from handcal.errors import PoseError
-from handcal.geometry import rigid
+from handcal.core.display import target_corners_m
+from handcal.core.errors import PoseError
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 from handcal.link.client import HeadsetState
 from handcal.link.impair import UNIMPAIRED, Impairment
 from handcal.link.nudges import NudgeSum, VerifyRequest
@@ -19,7 +20,6 @@ from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
 from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 from tests.headset.mono_client import MonoClient
 from tests.headset.relay import Relay
 from tests.helpers import eventually

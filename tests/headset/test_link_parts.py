@@ -10,13 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import handcal
-from handcal.conventions import unity_transform
-from handcal.display import projection_matrix
-from handcal.geometry import rigid
+from handcal.core.conventions import unity_transform
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Eye, Float64
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages
 from handcal.rig.example import example_rig
-from handcal.types import EYES, Eye, Float64
 from tests.headset.conftest import Ask
 
 pytestmark = pytest.mark.process

@@ -6,10 +6,10 @@ import re
 
 import numpy as np
 
-from handcal.conventions import opengl_projection
-from handcal.display import projection_matrix
+from handcal.core.conventions import opengl_projection
+from handcal.core.display import projection_matrix
+from handcal.core.types import Float64, Projection
 from handcal.rig.example import example_rig
-from handcal.types import Float64, Projection
 from tests.headset.conftest import PACKAGE
 from tests.helpers import ROOT
 

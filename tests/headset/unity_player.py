@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from handcal.core.types import Float64
 from handcal.io.closable import Closable
-from handcal.types import Float64
 from tests.helpers import Patience
 
 PATIENCE_S = 30.0

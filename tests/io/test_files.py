@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import (
     make_folder,
     read_json,

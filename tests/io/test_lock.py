@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.lock import FileLock
 
 HOLDER = """

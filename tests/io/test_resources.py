@@ -1,6 +1,6 @@
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.resources import resource_path
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.display import target_corners_m
+from handcal.core.display import target_corners_m
+from handcal.core.types import Float64, HeadsetIdentity, Projection
 from handcal.link import greetings, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.pairing import Pairing, Pairings
@@ -17,7 +18,6 @@ from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target
 from handcal.link.transport import Address
 from handcal.link.wire import Keys, Packet, Welcome
-from handcal.types import Float64, HeadsetIdentity, Projection
 
 KEY = b"a pairing key of the tests"
 DEVICE = 0x1234

@@ -12,7 +12,8 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from handcal.errors import LinkError, PosePendingError
+from handcal.core.errors import LinkError, PosePendingError
+from handcal.core.types import EYES, HeadsetIdentity, Projection
 from handcal.link import wire
 from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
@@ -21,7 +22,6 @@ from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.link.transport import Address
 from handcal.link.wire import Packet
-from handcal.types import EYES, HeadsetIdentity, Projection
 from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Eye, HeadsetIdentity, HeadsetView, Projection
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.impair import Impairment
 from handcal.link.messages import Owner
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.shapes import Shape
-from handcal.types import EYES, Eye, HeadsetIdentity, HeadsetView, Projection
 from tests.helpers import eventually
 from tests.link.conftest import IDENTITY, TARGET, hand, projection
 

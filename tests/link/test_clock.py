@@ -2,7 +2,7 @@ import random
 
 import pytest
 
-from handcal.errors import PosePendingError
+from handcal.core.errors import PosePendingError
 from handcal.link.clock import MIN_SAMPLES, ClockEstimator
 
 MS = 1_000_000

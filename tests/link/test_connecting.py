@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
+from handcal.core.types import EYES, HeadsetIdentity
 from handcal.link import greetings, messages, wire
 from handcal.link.client import MAX_WEARERS, HeadsetClient
 from handcal.link.pairing import Pairings
@@ -19,7 +20,6 @@ from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
 from handcal.link.shapes import Shape
 from handcal.link.wire import Rejection
-from handcal.types import EYES, HeadsetIdentity
 from tests.helpers import eventually
 from tests.link.conftest import IDENTITY, TARGET, hand, projection
 

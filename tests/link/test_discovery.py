@@ -2,7 +2,7 @@
 
 import pytest
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.link.discovery import Announcement, FoundPC, find_pcs
 
 LOOPBACK = "127.0.0.1"

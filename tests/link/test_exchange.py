@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
+from handcal.core.types import HeadsetIdentity
 from handcal.link import exchange, greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.client import HeadsetClient
@@ -14,7 +15,6 @@ from handcal.link.pair_by_digits import pair_by_digits
 from handcal.link.pairing import OFFER_S, Pairings, new_device_id
 from handcal.link.server import HeadsetServer
 from handcal.link.wire import Packet, Rejection
-from handcal.types import HeadsetIdentity
 from tests.helpers import eventually
 
 DIGITS = "01234567"

@@ -11,7 +11,7 @@ from typing import IO
 import numpy as np
 import pytest
 
-from handcal.display import target_corners_m
+from handcal.core.display import target_corners_m
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.shapes import Target

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.link.invitation import (
     Invitation,
     new_code,

@@ -4,7 +4,9 @@ import threading
 
 import pytest
 
-from handcal.errors import CancelledError, LinkError
+from handcal.core.errors import CancelledError, LinkError
+from handcal.core.progress import Progress
+from handcal.core.types import HeadsetIdentity
 from handcal.link import inviting
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import Invitation
@@ -12,8 +14,6 @@ from handcal.link.inviting import run_pairing
 from handcal.link.pair_by_digits import pair_by_digits
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer
-from handcal.progress import Progress
-from handcal.types import HeadsetIdentity
 
 DEVICE = "00000000000000aa"
 HERE = ("127.0.0.1", 0)

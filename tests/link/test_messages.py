@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Float64, HeadsetIdentity, HeadsetView, Projection
 from handcal.link import greetings, messages
 from handcal.link import handcal_pb2 as pb
 from handcal.link.fields import MalformedError
 from handcal.link.reliable import Receipt
 from handcal.link.shapes import Shape, Target
 from handcal.link.wire import MAX_PAYLOAD_BYTES
-from handcal.types import EYES, Float64, HeadsetIdentity, HeadsetView, Projection
 
 CLOUDS = arrays(np.float64, st.tuples(st.integers(0, 700), st.just(3)), elements=st.floats(-3, 3))
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handcal.core.types import EYES, HeadsetIdentity, Projection
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, nudges
 from handcal.link.client import HeadsetClient
@@ -16,7 +17,6 @@ from handcal.link.fields import MalformedError
 from handcal.link.impair import Impairment
 from handcal.link.nudges import MAX_NUDGE_ARCMIN, MAX_NUDGE_SIZE, NudgeSum, VerifyRequest
 from handcal.link.server import HeadsetServer, Nudge
-from handcal.types import EYES, HeadsetIdentity, Projection
 from tests.helpers import eventually
 
 BAD = Impairment(loss=0.3, reorder=0.2, duplicate=0.2, delay_s=0.003, seed=1)

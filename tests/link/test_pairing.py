@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import FileError, LinkError
+from handcal.core.errors import FileError, LinkError
 from handcal.io.lock import FileLock
 from handcal.link.pairing import (
     KEY_VARIABLE,

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.errors import PoseError, PosePendingError
-from handcal.geometry import rigid
+from handcal.core.errors import PoseError, PosePendingError
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64
 from handcal.link.poses import PoseBuffer
-from handcal.types import Float64
 
 MS = 1_000_000
 

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.errors import LinkError, PosePendingError
-from handcal.geometry import rigid
+from handcal.core.errors import LinkError, PosePendingError
+from handcal.core.geometry import rigid
+from handcal.core.types import HeadsetIdentity, Projection
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire
 from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
-from handcal.types import HeadsetIdentity, Projection
 from tests.helpers import eventually
 
 NewHeadset = Callable[..., Any]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
 from handcal.link import transport
 from handcal.link.transport import reachable_address
 

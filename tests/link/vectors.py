@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Eye, HeadsetIdentity, HeadsetView, Projection
 from handcal.link import exchange, greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
@@ -22,7 +23,6 @@ from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.reliable import Receipt
 from handcal.link.shapes import Shape, Target
 from handcal.link.wire import Keys, Packet, Slot, Welcome
-from handcal.types import Eye, HeadsetIdentity, HeadsetView, Projection
 from tests.helpers import ROOT
 
 PATH = ROOT / "docs/protocol_vectors.json"

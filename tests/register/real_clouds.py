@@ -17,11 +17,11 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from handcal import solve_eye_shift
-from handcal.geometry import rigid, transform
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Bool, EyeShift, Float64, Frame, Intrinsics
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.register.guard import GuardSettings, rotation_between
-from handcal.types import Bool, EyeShift, Float64, Frame, Intrinsics
 
 DISTANCE_M = 2.0
 ALL = SegmentSettings(points=40_000)

@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from handcal.display import eye_projection, reprojection_arcmin, target_corners_m
-from handcal.geometry import project
+from handcal.core.display import eye_projection, reprojection_arcmin, target_corners_m
+from handcal.core.geometry import project
+from handcal.core.types import EYES, Eye, Float64
 from handcal.register import benefit as benefits
 from handcal.register.benefit import (
     WORKING_DISTANCE_M,
@@ -16,7 +17,6 @@ from handcal.register.benefit import (
     percent,
 )
 from handcal.rig.example import example_rig
-from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 DISPLAY = RIG.eyes["left"]

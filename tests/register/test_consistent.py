@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from handcal import solve_eye_shift
+from handcal.core.types import Float64, Method
 from handcal.lab.bench.trials import mean_length_mm, trial_alignment, trial_hand
 from handcal.lab.study.trials import floor_error_m, solve_trial
 from handcal.register import consistent
@@ -11,7 +12,6 @@ from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 from handcal.sim.overlay import overlay_by_eye
-from handcal.types import Float64, Method
 
 # Few hands are made: trial n has hand n % 10.
 HANDS = 3

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.types import Bool, Float64
 from handcal.lab.bench.trials import trial_alignment
 from handcal.lab.study.trials import solve_trial
 from handcal.register.cut import CUT_BAND_M, common_cut
 from handcal.register.surface import clip_surface, describe_surface, nearest
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
-from handcal.types import Bool, Float64
 
 MAKING = AlignmentSettings(
     count=4000, resample=True, depth_sigma_m=0.001, cursor_forearm_m=0.05, hand_forearm_m=0.05

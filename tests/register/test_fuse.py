@@ -4,8 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix, view_of_eye
-from handcal.geometry import invert, rigid, transform
+from handcal.core.display import projection_matrix, view_of_eye
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.rig_types import DepthCheck
+from handcal.core.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verification
 from handcal.lab.bench.trials import trial_hand
 from handcal.register.fuse import (
     Fused,
@@ -16,11 +18,9 @@ from handcal.register.prior import PriorSettings
 from handcal.register.solve import solve_alignment, with_eye_box
 from handcal.register.surface import describe_surface
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
-from handcal.rig_types import DepthCheck
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import overlay_hand, view_through
 from handcal.sim.raster import visible_points
-from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verification
 
 RIG = example_rig()
 SETTINGS = FuseSettings()

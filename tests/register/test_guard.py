@@ -3,8 +3,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handcal import rotation_between
-from handcal.errors import HandError
-from handcal.geometry import rigid, transform
+from handcal.core.errors import HandError
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Float64
 from handcal.lab.bench.trials import trial_alignment
 from handcal.register.guard import (
     AXES,
@@ -16,7 +17,6 @@ from handcal.register.guard import (
 )
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 from handcal.sim.hand import make_hand
-from handcal.types import Float64
 
 CLEAN = AlignmentSettings(count=3000)
 SENSED = AlignmentSettings(

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from handcal.display import update_matrix
-from handcal.geometry import project, transform
+from handcal.core.display import update_matrix
+from handcal.core.geometry import project, transform
 from handcal.register.model import (
     balanced_turn,
     cursor_displacement,

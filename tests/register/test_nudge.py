@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.display import arcmin_from_px, eye_projection
-from handcal.geometry import project
+from handcal.core.display import arcmin_from_px, eye_projection
+from handcal.core.geometry import project
 from handcal.register.nudge import nudged_shift_m
 from handcal.rig.example import example_rig
 

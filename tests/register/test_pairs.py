@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from handcal.geometry import invert, rigid, transform
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import Bool, Float64
 from handcal.register.pairs import matched_pairs
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import visible_points
-from handcal.types import Bool, Float64
 
 T_D_CURSOR = rigid(translation_m=[0.0, 0.05, 0.5])
 ROTATION_RAD = np.array([0.05, -0.08, 0.1])

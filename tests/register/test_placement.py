@@ -4,8 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import invert, project, rigid, transform
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.geometry import invert, project, rigid, transform
+from handcal.core.types import EYES, Alignment, Eye, Float64, PlanName, VerdictName, Verification
 from handcal.lab.study.trials import study_hand
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.results import Results, SolveSettings, solve_session
@@ -13,7 +14,6 @@ from handcal.register.verdict import Advice, planned_eyes
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.raster import visible_points
-from handcal.types import EYES, Alignment, Eye, Float64, PlanName, VerdictName, Verification
 
 RIG = example_rig()
 SOLVE = SolveSettings()

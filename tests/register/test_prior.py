@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from handcal.core.types import Float64
 from handcal.io.settings import read_settings, settings_json
 from handcal.register.prior import (
     MIN_SESSIONS,
@@ -13,7 +14,6 @@ from handcal.register.prior import (
     posterior,
     widened,
 )
-from handcal.types import Float64
 
 MEAN_M = np.array([0.002, -0.003, 0.004, 0.001, -0.003, 0.004])
 _ROOT = np.diag([0.001, 0.0015, 0.003, 0.001, 0.0015, 0.003])

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.errors import HandcalError
-from handcal.geometry import rigid, transform
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Float64
 from handcal.lab.bench.trials import trial_alignment
 from handcal.register.rcicp import (
     MAX_ITERATIONS,
@@ -20,7 +21,6 @@ from handcal.register.rcicp import (
     solve_paper,
 )
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
-from handcal.types import Float64
 
 DISTANCE_M = 2.0
 VECTORS = st.tuples(*[st.floats(-2, 2)] * 3)

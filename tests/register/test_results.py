@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import reprojection_arcmin
-from handcal.errors import CancelledError
+from handcal.core.display import reprojection_arcmin
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, METHODS, Alignment, EyeDistance, Method
 from handcal.io.files import write_json
 from handcal.io.settings import read_settings, settings_json
 from handcal.lab.study.wearers import align_hand, draw_wearer
-from handcal.progress import Progress
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.register.verdict import VerdictSettings
@@ -23,7 +24,6 @@ from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.states import CalibrationSettings
-from handcal.types import EYES, METHODS, Alignment, EyeDistance, Method
 
 RIG = example_rig()
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import invert, rigid, transform
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import Float64
 from handcal.lab.bench.trials import trial_alignment
 from handcal.register.rcicp import best_rigid
 from handcal.register.rigid import RigidSettings, register_rigid
 from handcal.register.surface import Surface, describe_surface
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
-from handcal.types import Float64
 
 COUNT = 1500
 # Between clouds of the same points; a hand turned and moved as hands are.

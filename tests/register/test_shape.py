@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.geometry import invert, rigid, transform
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import Bool, Float64, Frame, Intrinsics
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.register.guard import GuardSettings, RotationGuard
@@ -19,7 +20,6 @@ from handcal.register.rcicp import best_rigid
 from handcal.register.shape import ShapeChange, change_text
 from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.raster import visible_points
-from handcal.types import Bool, Float64, Frame, Intrinsics
 
 T_D_HAND = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
 LIMIT_M = GuardSettings().shape_limit_m

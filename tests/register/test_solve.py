@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from handcal import solve_eye_shift
-from handcal.errors import HandError
-from handcal.geometry import invert, rigid, transform
+from handcal.core.errors import HandError
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import METHODS, Alignment, EyeShift, Float64, Method
 from handcal.lab.bench.trials import trial_alignment
 from handcal.register.model import cursor_displacement
 from handcal.register.solve import MAX_POINTS, check_cloud, solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
-from handcal.types import METHODS, Alignment, EyeShift, Float64, Method
 
 RIG = example_rig()
 QUICK: tuple[Method, ...] = ("consistent", "linear", "icp")

@@ -4,8 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from handcal.errors import HandError
-from handcal.geometry import rigid, transform
+from handcal.core.errors import HandError
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Bool, Float64
 from handcal.register.surface import (
     Surface,
     describe_surface,
@@ -15,7 +16,6 @@ from handcal.register.surface import (
     thin,
     thinnest,
 )
-from handcal.types import Bool, Float64
 
 PITCH_M = 0.003
 SIZE = 40

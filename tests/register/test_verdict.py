@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handcal.core.types import Eye, EyeShift, Verdict, Verification
 from handcal.register.benefit import percent
 from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_prior, eye_slice
@@ -18,7 +19,6 @@ from handcal.register.verdict import (
     measured_arcmin,
 )
 from handcal.rig.example import HALF_EYE_DISTANCE_M, example_rig
-from handcal.types import Eye, EyeShift, Verdict, Verification
 
 RIG = example_rig()
 SETTINGS = VerdictSettings()

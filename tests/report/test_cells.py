@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles, signed
-from handcal.statistics import mean_interval, summarise
+from handcal.report.statistics import mean_interval, summarise
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from handcal.errors import CancelledError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
 from handcal.report.document import Column, Report, Section, Table
 from handcal.report.html import write_html
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from matplotlib.figure import Figure as Page
 
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 from handcal.report.document import Figure, Report, Section
 from handcal.report.pdf import compose
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import cv2
 import pytest
 
-from handcal.errors import CancelledError, FileError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.progress import Progress
 from handcal.report.document import Report
 from handcal.report.html import write_html
 from handcal.report.write import write_report

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from handcal.geometry import rigid
-from handcal.rig_types import RIG_PARTS, DepthCheck, EyeDisplay, Origin, Rig
-from handcal.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
+from handcal.core.geometry import rigid
+from handcal.core.rig_types import RIG_PARTS, DepthCheck, EyeDisplay, Origin, Rig
+from handcal.core.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
 
 FOCAL = st.floats(1.0, 1e5)
 OFFSET = st.floats(-0.05, 0.05)

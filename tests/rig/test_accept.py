@@ -4,8 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import invert, rigid
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.geometry import invert, rigid
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, Float64
 from handcal.rig.accept import (
     CameraMove,
     EyeAcceptance,
@@ -18,10 +20,8 @@ from handcal.rig.display import DisplayHomography
 from handcal.rig.example import example_rig
 from handcal.rig.viewpoint import TrackedView
 from handcal.rig.views import ViewsError
-from handcal.rig_types import Rig
 from handcal.sim.boards import board_poses, board_view
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
-from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 PHI_M = np.array([0.002, -0.001, 0.003])

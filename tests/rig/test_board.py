@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handcal.geometry import image_points, rigid, transform
+from handcal.core.geometry import image_points, rigid, transform
+from handcal.core.types import Intrinsics, UInt8
 from handcal.io.images import read_image
 from handcal.rig.board import Board, BoardError, corners_m
 from handcal.rig.board_finder import find_board
 from handcal.rig.board_print import draw_board
 from handcal.sim.boards import BoardPainter
-from handcal.types import Intrinsics, UInt8
 
 CHARUCO = Board()
 CHECKERBOARD = Board(kind="checkerboard")

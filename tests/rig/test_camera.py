@@ -5,12 +5,12 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.geometry import camera_matrix, rigid
+from handcal.core.geometry import camera_matrix, rigid
+from handcal.core.types import Intrinsics
 from handcal.rig.board import Board
 from handcal.rig.camera import CameraSettings, calibrate_camera
 from handcal.rig.views import BoardImage, ViewsError, board_image, drop, read_views
 from handcal.sim.boards import BoardPainter, board_poses, board_view
-from handcal.types import Intrinsics
 
 BOARD = Board()
 CAMERA = Intrinsics(640, 480, 532.0, 531.0, 325.0, 238.0, (-0.25, 0.08, 0.0008, -0.0005, -0.01))

@@ -4,11 +4,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.rig_types import Rig
+from handcal.core.types import Float64
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
-from handcal.rig_types import Rig
-from handcal.types import Float64
 
 
 def with_display(**changes: object) -> Rig:

@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from handcal.geometry import image_points, rigid, transform
+from handcal.core.geometry import image_points, rigid, transform
+from handcal.core.types import Intrinsics
 from handcal.rig.board import Board, BoardView, corners_m
 from handcal.rig.choose import ChooseSettings, ViewSelector, variety
-from handcal.types import Intrinsics
 
 POINTS_M = corners_m(Board())
 IDS = np.arange(len(POINTS_M))

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from handcal.camera.recordings import open_recording
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.rig_types import Rig
+from handcal.core.types import CameraIdentity
 from handcal.rig.compare import compare_camera, compare_rigs
 from handcal.rig.example import example_rig
-from handcal.rig_types import Rig
-from handcal.types import CameraIdentity
 
 RIG = example_rig()
 

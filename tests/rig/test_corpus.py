@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
 from handcal.rig.board import Board
 from handcal.rig.camera import CameraSettings, calibrate_camera
 from handcal.rig.lens import FisheyeIntrinsics

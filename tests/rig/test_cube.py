@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.geometry import image_points, rigid, transform
+from handcal.core.geometry import image_points, rigid, transform
+from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.rig.cube import Cube, CubeError, cube_pose, face_pose, find_cube, marker_corners_m
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from handcal.types import Float64, Intrinsics, UInt8
 
 CUBE = Cube()
 CAMERA = Intrinsics(640, 360, 900.0, 898.5, 322.0, 177.5, (-0.08, 0.05, 0.0004, -0.0003, 0.0))

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import write_json
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import read_cube, write_cube

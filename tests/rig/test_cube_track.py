@@ -1,6 +1,6 @@
 import numpy as np
 
-from handcal.geometry import rigid, transform
+from handcal.core.geometry import rigid, transform
 from handcal.rig.cube import Cube, face_pose
 from handcal.rig.cube_track import CubeFilter, cube_corners_m, facing_corners_m
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import image_points, invert, project, rigid
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.geometry import image_points, invert, project, rigid
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64
 from handcal.rig.display import (
     DisplayCalibration,
     DisplaySettings,
@@ -23,11 +25,9 @@ from handcal.rig.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.viewpoint import ViewpointPose
 from handcal.rig.views import ViewsError
-from handcal.rig_types import EyeDisplay
 from handcal.sim.boards import PictureSettings
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA as CAMERA
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import Float64
 
 DISPLAY = example_rig().eyes["left"]
 SIZE = DISPLAY.width_px, DISPLAY.height_px

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from handcal.geometry import project
+from handcal.core.geometry import project
+from handcal.core.types import EYES, Eye, Float64, UInt8
 from handcal.rig.display_check import (
     PROBES,
     SHIFT_PX,
@@ -20,7 +21,6 @@ from handcal.rig.display_check import (
     shares_seen,
 )
 from handcal.rig.example import example_rig
-from handcal.types import EYES, Eye, Float64, UInt8
 
 
 @pytest.mark.parametrize("eye", EYES)

@@ -4,14 +4,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix
-from handcal.geometry import camera_matrix, invert, project, transform
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import camera_matrix, invert, project, transform
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import EYES, Float64
 from handcal.io.resources import resource_path
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
-from handcal.rig_types import EyeDisplay
-from handcal.types import EYES, Float64
 
 
 def viewpoint_in_H_m(display: EyeDisplay) -> Float64:

@@ -5,8 +5,9 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
-from handcal.geometry import rigid
+from handcal.core.errors import FileError
+from handcal.core.geometry import rigid
+from handcal.core.types import CameraIdentity, Intrinsics
 from handcal.rig.board import Board
 from handcal.rig.camera import calibrate_camera
 from handcal.rig.formats import (
@@ -25,7 +26,6 @@ from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.storage import MAX_STORAGE_BYTES
 from handcal.rig.views import BoardImage
 from handcal.sim.boards import board_poses, board_view
-from handcal.types import CameraIdentity, Intrinsics
 
 FIVE = (0.1, -0.2, 1 / 3 * 1e-3, 0.002, 0.03)
 CAMERA = Intrinsics(640, 480, 500.1, 501 / 3, 320.5, 239.5, FIVE)

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection
-from handcal.errors import FileError
-from handcal.geometry import camera_matrix, rigid
+from handcal.core.display import eye_projection
+from handcal.core.errors import FileError
+from handcal.core.geometry import camera_matrix, rigid
+from handcal.core.types import UInt8
 from handcal.io.images import write_png
 from handcal.rig.board import BoardError
 from handcal.rig.display import fit_homography
@@ -22,7 +23,6 @@ from handcal.rig.gray_code import (
 from handcal.sim.boards import PictureSettings
 from handcal.sim.photographs import VIEWPOINT_CAMERA
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import UInt8
 
 DISPLAY = example_rig().eyes["left"]
 SIZE = DISPLAY.width_px, DISPLAY.height_px

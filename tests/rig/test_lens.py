@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from handcal.core.types import Intrinsics
 from handcal.rig.lens import Camera, FisheyeIntrinsics, derivatives_at, pixels_of, predict
-from handcal.types import Intrinsics
 
 COEFFICIENTS = (-0.31, 0.12, 1.3e-3, -7e-4, 0.05, 0.21, -0.04, 0.03, 1e-3, 2e-4, -1e-3, 3e-4)
 CAMERAS = [

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import Board
 from handcal.rig.lens import Camera, LensModel, predict, to_plane
 from handcal.rig.lens_fit import _FOCAL_WIDTHS, _first_camera, best_lens, compare_lenses
 from handcal.sim.boards import board_poses, board_view
-from handcal.types import Float64, Intrinsics
 
 BOARD = Board()
 COEFFICIENTS: dict[LensModel, tuple[float, ...]] = {

@@ -2,11 +2,11 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.geometry import image_points, rigid, transform
+from handcal.core.geometry import image_points, rigid, transform
+from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.rig.cube import Cube, marker_corners_m, refine_corners
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from handcal.types import Float64, Intrinsics, UInt8
 
 TRUE_PX = np.array([[60.3, 52.7], [148.2, 61.4], [141.1, 150.9], [49.8, 139.6]])
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.core.types import Float64
 from handcal.rig.gray_code import held_out_arcmin
-from handcal.types import Float64
 
 # fx, fy, cx, cy of the undistorted maps, from cameraCalibration.json.
 CAMERAS = {"left": (285.05, 286.14, 425.86, 409.55), "right": (284.03, 285.05, 423.17, 401.85)}

@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.rig_types import PART_NAMES, RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
+from handcal.core.types import EYES, CameraIdentity, Eye, HeadsetIdentity
 from handcal.rig.example import example_rig
 from handcal.rig.report import RigFinding, display_finding, missing_parts, report_rig
-from handcal.rig_types import PART_NAMES, RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
-from handcal.types import EYES, CameraIdentity, Eye, HeadsetIdentity
 
 RIG = example_rig()
 

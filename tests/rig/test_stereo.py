@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import invert, rigid
+from handcal.core.geometry import invert, rigid
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import Board, BoardView
 from handcal.rig.stereo import StereoCalibration, calibrate_stereo
 from handcal.rig.views import BoardImage, ViewsError, board_image, drop, pair_views, read_views
 from handcal.sim.boards import BoardPainter, board_poses, board_view
-from handcal.types import Float64, Intrinsics
 
 BOARD = Board()
 CHECKERBOARD = Board(kind="checkerboard", squares=(10, 7))

@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
-from handcal.geometry import rigid
+from handcal.core.errors import FileError
+from handcal.core.geometry import rigid
 from handcal.rig.tracked_file import read_tracked, write_tracked
 
 

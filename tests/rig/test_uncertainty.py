@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from handcal.geometry import image_points, rigid
+from handcal.core.geometry import image_points, rigid
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import Board, corners_m
 from handcal.rig.bundle import foreseen
 from handcal.rig.camera import CameraCalibration, calibrate_camera
@@ -10,7 +11,6 @@ from handcal.rig.reprojection import Setup, as_transform, as_vector
 from handcal.rig.uncertainty import candidate_views, next_view
 from handcal.rig.views import BoardImage
 from handcal.sim.boards import board_poses, board_view
-from handcal.types import Float64, Intrinsics
 
 BOARD = Board()
 CAMERA = Intrinsics(640, 480, 532.0, 531.0, 325.0, 238.0, (-0.25, 0.08, 0.0008, -0.0005, -0.01))

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from handcal.geometry import image_points, rigid, transform
+from handcal.core.geometry import image_points, rigid, transform
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import Board, BoardView, corners_m
 from handcal.rig.viewpoint import TrackedView, board_pose, locate_viewpoint
 from handcal.rig.views import ViewsError
-from handcal.types import Float64, Intrinsics
 
 CAMERA = Intrinsics(1280, 720, 1800.0, 1797.0, 644.0, 355.0, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
 BOARD = Board()

@@ -4,9 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
-from handcal.geometry import rigid
-from handcal.progress import Progress
+from handcal.core.errors import FileError
+from handcal.core.geometry import rigid
+from handcal.core.progress import Progress
+from handcal.core.types import Intrinsics
 from handcal.rig.board import Board, BoardView
 from handcal.rig.board_print import draw_board
 from handcal.rig.views import (
@@ -21,7 +22,6 @@ from handcal.rig.views import (
     used,
 )
 from handcal.sim.boards import board_view
-from handcal.types import Intrinsics
 
 BOARD = Board()
 CAMERA = Intrinsics(640, 480, 500.0, 500.0, 319.5, 239.5)

@@ -2,12 +2,12 @@ import dataclasses
 
 import numpy as np
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.board import Board, BoardView
 from handcal.rig.fit import rms
 from handcal.rig.views import worst_view
 from handcal.sim.boards import board_view
-from handcal.types import Float64, Intrinsics
 
 CAMERA = Intrinsics(640, 480, 500.0, 500.0, 319.5, 239.5)
 NAMES = ("a", "b", "c", "d")

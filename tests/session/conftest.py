@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial
-from handcal.types import Alignment
 
 SETTINGS = {"method": "consistent", "gate_m": [0.35, 0.7], "third": 1 / 3}
 SHIFT_M = np.array([0.001, -0.002, 1e-17])

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handcal.core.types import Alignment
 from handcal.session.alignment_file import decode_alignment, encode_alignment
-from handcal.types import Alignment
 
 
 def assert_identical(a: Alignment, b: Alignment) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.core.types import Eye, Float64
 from handcal.rig.example import example_rig
 from handcal.session.comparison import (
     COMPARED,
@@ -20,7 +21,6 @@ from handcal.session.comparison import (
     sign_test,
 )
 from handcal.session.session import Session
-from handcal.types import Eye, Float64
 
 SHIFT_M: dict[Eye, Float64] = {"left": np.array([1e-3, 2e-3, 3e-3])}
 

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
 from handcal.session.repair import check_session, repair_session
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.types import Alignment
 from tests.helpers import ROOT
 
 RESULTS = {"left": {"shift_m": [0.001, 0.0, 0.0]}}

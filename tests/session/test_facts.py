@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.rig.example import example_rig
-from handcal.session.facts import AlignmentFacts, CameraUsed, SessionFacts, facts_json
-from handcal.session.session import Session
-from handcal.types import (
+from handcal.core.types import (
     Alignment,
     CameraIdentity,
     EyeDistance,
@@ -21,6 +18,9 @@ from handcal.types import (
     Intrinsics,
     Verification,
 )
+from handcal.rig.example import example_rig
+from handcal.session.facts import AlignmentFacts, CameraUsed, SessionFacts, facts_json
+from handcal.session.session import Session
 
 CAMERA = CameraUsed(
     CameraIdentity("D415", "816612062327", "5.13"),

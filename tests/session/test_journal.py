@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
 from handcal.session import journal
 from handcal.session.journal import JournalWriter, happens_now, journal_line, read_journal
 from handcal.session.session import Session
-from handcal.types import Alignment
 
 
 def begin(path: Path) -> JournalWriter:

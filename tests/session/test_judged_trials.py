@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.types import EYES, Alignment
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.judged_trials import eye_trials
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.types import EYES, Alignment
 
 RIG = example_rig()
 FORMER_M = np.array([0.01, 0.0, 0.0])

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Alignment, HeadsetIdentity
 from handcal.rig.example import example_rig
 from handcal.session.library import (
     DELETED,
@@ -22,7 +23,6 @@ from handcal.session.library import (
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
-from handcal.types import Alignment, HeadsetIdentity
 
 RESULTS = {
     "version": 2,

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Alignment, Verification
 from handcal.rig.example import example_rig
 from handcal.session.journal import JOURNAL, happens_now, journal_line
 from handcal.session.session import (
@@ -16,7 +17,6 @@ from handcal.session.session import (
 )
 from handcal.session.state import MAX_ALIGNMENTS, MAX_TRIALS, WENT_BACK, SessionEvent
 from handcal.session.trial import Trial, trial_json
-from handcal.types import Alignment, Verification
 from tests.session.conftest import RESULTS, SETTINGS, SHIFT_M
 
 

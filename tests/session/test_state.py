@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handcal.core.types import EyeDistance, Verification
 from handcal.session.facts import facts_json
 from handcal.session.journal import Event
 from handcal.session.state import NumberedItems, SessionEvent, SessionState
-from handcal.types import EyeDistance, Verification
 
 
 @given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))

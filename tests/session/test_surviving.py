@@ -18,7 +18,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
 from handcal.session.alignment_file import decode_alignment
 from handcal.session.journal import happens_now, journal_line
@@ -26,7 +27,6 @@ from handcal.session.library import read_library
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.session.trial import Trial
-from handcal.types import Alignment
 from tests.session.conftest import RESULTS, SETTINGS
 
 # Writes alignments that tell their own number, deletes and restores them, and says when each round
@@ -37,7 +37,7 @@ from pathlib import Path
 import numpy as np
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
-from handcal.types import Alignment
+from handcal.core.types import Alignment
 
 path = Path(sys.argv[1])
 record = Session.open(path)

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, update_matrix
+from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, update_matrix
+from handcal.core.types import EYES, Eye, Float64
 from handcal.rig.example import example_rig
 from handcal.session.trial import (
     Trial,
@@ -16,7 +17,6 @@ from handcal.session.trial import (
     trial_errors_arcmin,
     trial_json,
 )
-from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 CALIBRATED_M = np.array([0.003, -0.002, 0.004])

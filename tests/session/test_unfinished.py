@@ -3,13 +3,13 @@ from pathlib import Path
 
 import numpy as np
 
+from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
 from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.session.unfinished import unfinished_and_repaired
-from handcal.types import Alignment
 
 
 def make(parent: Path, name: str, wearer: str = "") -> Session:

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import update_matrix
-from handcal.geometry import project, transform
+from handcal.core.display import update_matrix
+from handcal.core.geometry import project, transform
 from handcal.register.rcicp import best_rigid
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment, simulate_alignment
 from handcal.sim.hand import HandModel, make_hand

@@ -1,9 +1,9 @@
 import numpy as np
 
-from handcal.geometry import image_points, rigid, transform
+from handcal.core.geometry import image_points, rigid, transform
+from handcal.core.types import Intrinsics
 from handcal.rig.board import Board, corners_m
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses, board_view
-from handcal.types import Intrinsics
 
 BOARD = Board(kind="checkerboard")
 CAMERA = Intrinsics(320, 240, 266.0, 265.0, 162.0, 119.0, (-0.25, 0.08, 0.001, -0.001, -0.01))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from handcal.camera.camera import Camera
-from handcal.errors import CameraError, CameraTimeoutError
-from handcal.geometry import rigid, transform
+from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Float64, Frame, Intrinsics
 from handcal.sim.camera import SyntheticCamera, SyntheticSettings
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import RoomSettings, make_room
 from handcal.sim.scene import SceneState
-from handcal.types import Float64, Frame, Intrinsics
 
 SMALL = Intrinsics(width=320, height=180, fx=251.0, fy=251.0, cx=159.5, cy=89.5)
 T_W_HAND = rigid([0.1, 0.1, 0.0], [0.0, 0.02, 0.5])

@@ -3,15 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection
-from handcal.geometry import image_points, project, rigid, transform
+from handcal.core.display import eye_projection
+from handcal.core.geometry import image_points, project, rigid, transform
+from handcal.core.types import Float64, Intrinsics
 from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.rig.cube import Cube, find_cube, marker_corners_m
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter, draw_cube
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import Float64, Intrinsics
 
 CUBE = Cube()
 WHOLE = example_rig().eyes["right"]

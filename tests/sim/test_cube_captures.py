@@ -6,12 +6,14 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection
-from handcal.errors import CancelledError, FileError
-from handcal.geometry import project, transform
+from handcal.core.display import eye_projection
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.geometry import project, transform
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import Float64, Intrinsics
 from handcal.io.files import read_json
 from handcal.lab.evaluate.cube_test import judge_captures
-from handcal.progress import Progress
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import eye_prior
 from handcal.register.results import SolveSettings, solve_session
@@ -21,7 +23,6 @@ from handcal.rig.cube_track import cube_corners_m
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid
-from handcal.rig_types import Rig
 from handcal.sim.cube_captures import (
     POSITIONS,
     CaptureSettings,
@@ -32,7 +33,6 @@ from handcal.sim.cube_captures import (
 from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.wearer import draw_placement_error
-from handcal.types import Float64, Intrinsics
 
 CAMERA = Intrinsics(640, 360, 900.0, 898.5, 322.0, 177.5, (-0.08, 0.05, 0.0004, -0.0003, 0.0))
 SETTINGS = CaptureSettings(positions=("left",), poses=1, points=1000, camera=CAMERA)

@@ -3,17 +3,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import project, rigid, transform
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.geometry import project, rigid, transform
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import EYES, Eye
 from handcal.rig.example import example_rig
-from handcal.rig_types import EyeDisplay, Rig
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.wearer import Wearer
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Eye
 
 T_W_H = rigid([0.02, -0.05, 0.03], [0.05, 0.0, 0.1])
 # Far enough away for the fingertips to lie in the display; the forearm leaves it below.

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix
-from handcal.errors import LinkError
-from handcal.geometry import invert, transform
+from handcal.core.display import projection_matrix
+from handcal.core.errors import LinkError
+from handcal.core.geometry import invert, transform
+from handcal.core.types import EYES, Projection
 from handcal.io.resources import resource_path
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.reliable import Delivery
@@ -24,7 +25,6 @@ from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
 from handcal.sim.headset import HeadsetSettings, run_headset
 from handcal.sim.scene import SceneReceiver, SceneState
-from handcal.types import EYES, Projection
 
 KEY = "a pairing key of the tests"
 RIG_PATH = resource_path("example_rig.yaml")

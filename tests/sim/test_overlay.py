@@ -3,15 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection
-from handcal.errors import HandcalError
-from handcal.geometry import project, rigid, transform
+from handcal.core.display import eye_projection
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import project, rigid, transform
+from handcal.core.types import EYES, Eye, Float64
 from handcal.lab.bench.trials import trial_hand
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import PlacementError
-from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 

@@ -3,7 +3,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.geometry import invert
+from handcal.core.geometry import invert
+from handcal.core.types import EYES, Float64, Intrinsics
 from handcal.io.images import read_image
 from handcal.rig.board_finder import find_board
 from handcal.rig.example import example_rig
@@ -16,7 +17,6 @@ from handcal.sim.photographs import (
     VIEWPOINT_CAMERA,
     write_photographs,
 )
-from handcal.types import EYES, Float64, Intrinsics
 
 
 def seen_pose(path: Path, camera: Intrinsics) -> Float64:

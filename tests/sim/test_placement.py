@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.display import projection_matrix, view_of_eye
-from handcal.geometry import invert, rigid, transform
+from handcal.core.display import projection_matrix, view_of_eye
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import EYES, Eye, Float64
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.placement import (
@@ -17,7 +18,6 @@ from handcal.sim.placement import (
     view_through,
 )
 from handcal.sim.raster import visible_points
-from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 T_W_H = rigid([0.02, 0.01, 0.03], [0.1, 0.05, -0.1])

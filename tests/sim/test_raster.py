@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from handcal.geometry import camera_matrix, invert, project, rigid, transform
+from handcal.core.geometry import camera_matrix, invert, project, rigid, transform
+from handcal.core.types import Float64, Intrinsics
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import D415, draw_hand, visible_points
-from handcal.types import Float64, Intrinsics
 
 ODD = Intrinsics(width=640, height=400, fx=610.0, fy=580.0, cx=300.2, cy=220.7)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handcal.geometry import invert, rigid
+from handcal.core.geometry import invert, rigid
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import D415, draw_hand
 from handcal.sim.render import World, render

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from handcal.geometry import invert, rigid, transform
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import Float64, Intrinsics
 from handcal.sim.room import Room, draw_room, make_room
-from handcal.types import Float64, Intrinsics
 
 CAMERA = Intrinsics(width=320, height=180, fx=251.0, fy=240.0, cx=160.5, cy=88.0)
 

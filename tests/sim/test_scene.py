@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
 from handcal.sim.scene import ScenePublisher, SceneReceiver, SceneState, pack, unpack
 
 

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.types import Float32
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import Float32
 
 FOCAL_PX = 1005.0
 SETTINGS = SensorSettings()

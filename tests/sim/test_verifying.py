@@ -7,14 +7,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection, view_of_eye
-from handcal.geometry import invert, rigid, transform
+from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import EYES, Eye, Float64
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.register.nudge import nudged_shift_m
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.verifying import SeenDifference, SimulatedVerification, see_difference
-from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 T_W_H = rigid([0.1, -0.2, 0.05], [0.3, -0.1, 0.2])

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection
-from handcal.geometry import image_points, invert, rigid, transform
+from handcal.core.display import eye_projection
+from handcal.core.geometry import image_points, invert, rigid, transform
+from handcal.core.types import Intrinsics
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.viewpoint import photograph_display
-from handcal.types import Intrinsics
 
 DISPLAY = example_rig().eyes["right"]
 CAMERA = Intrinsics(640, 360, 900.0, 905.0, 322.0, 177.0, (-0.1, 0.05, 0.001, 0.0, 0.0))

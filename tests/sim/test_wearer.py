@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.display import projection_matrix, view_of_eye
-from handcal.geometry import invert, transform
+from handcal.core.display import projection_matrix, view_of_eye
+from handcal.core.geometry import invert, transform
+from handcal.core.types import EYES, Eye, Float64
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import D415, draw_hand, visible_points
 from handcal.sim.wearer import DisplayView, Wearer, WearerAction, draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Eye, Float64
 
 RIG = example_rig()
 STEADY = WearerSettings(

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from handcal.display import projection_matrix
-from handcal.errors import PoseError
-from handcal.geometry import rigid
+from handcal.core.display import projection_matrix
+from handcal.core.errors import PoseError
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Eye, Float64, Frame, HeadsetIdentity, Intrinsics, UInt16
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import HeadsetServer
 from handcal.link.settings import LinkSettings
@@ -25,7 +26,6 @@ from handcal.sim.sensor import SensorSettings, sense_depth
 from handcal.station.delay import DelaySettings
 from handcal.station.procedure import Calibration
 from handcal.station.states import CalibrationSettings, Observation, State
-from handcal.types import EYES, Eye, Float64, Frame, HeadsetIdentity, Intrinsics, UInt16
 from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from handcal.core.types import EYES, HandCloud
 from handcal.rig.example import example_rig
 from handcal.station.aligning import ADVISE_EVERY_NS, Aligning, align_prompt
 from handcal.station.hands import PlacedHand
 from handcal.station.states import CalibrationSettings, Observation, State
-from handcal.types import EYES, HandCloud
 
 TURN_BACK = "Tilt your hand anticlockwise, then confirm."
 

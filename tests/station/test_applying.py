@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix
-from handcal.errors import LinkError
+from handcal.core.display import projection_matrix
+from handcal.core.errors import LinkError
+from handcal.core.types import EYES, Eye, Float64, Verdict, VerdictName
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.session.session import Session
 from handcal.station.procedure import Calibration
 from handcal.station.solve_again import solve
 from handcal.station.states import ProcedureError, State
-from handcal.types import EYES, Eye, Float64, Verdict, VerdictName
 from tests.helpers import eventually
 from tests.station.stage import (
     RIG,

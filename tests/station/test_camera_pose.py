@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.errors import CameraError, CameraTimeoutError, HandcalError, PoseError
-from handcal.geometry import rigid
+from handcal.core.errors import CameraError, CameraTimeoutError, HandcalError, PoseError
+from handcal.core.geometry import rigid
+from handcal.core.types import LOOK_AROUND, Float64, Frame, Intrinsics
 from handcal.station.camera_pose import find_camera_pose, run_camera_pose
-from handcal.types import LOOK_AROUND, Float64, Frame, Intrinsics
 
 T_H_D: Float64 = rigid([0.3, -0.2, 0.1], [0.02, -0.03, 0.05])
 OTHER_WORLD: Float64 = rigid([0.0, 0.5, 0.0], [1.0, 0.0, 2.0])

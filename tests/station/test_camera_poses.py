@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.display import view_of_eye
-from handcal.geometry import rigid
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES
 from handcal.station.states import State
-from handcal.types import EYES
 from tests.helpers import eventually
 from tests.station.stage import RIG, T_D_HAND, T_D_NEAR, T_W_H, Stage
 

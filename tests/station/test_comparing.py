@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.core.types import Eye, Float64
 from handcal.rig.example import example_rig
 from handcal.session.comparison import Drawing, read_comparisons
 from handcal.session.session import Session
 from handcal.station.comparing import Comparing
 from handcal.station.states import ProcedureError
-from handcal.types import Eye, Float64
 
 APPLIED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0]), "right": np.zeros(3)}
 

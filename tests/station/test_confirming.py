@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import view_of_eye
-from handcal.errors import HandError
-from handcal.geometry import rigid, transform
+from handcal.core.display import view_of_eye
+from handcal.core.errors import HandError
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import EYES, Float64
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.register.guard import RotationGuard
 from handcal.session.session import Session
 from handcal.station.aligning import ADVISE_EVERY_NS, align_prompt
 from handcal.station.states import CalibrationSettings, ProcedureError, State
-from handcal.types import EYES, Float64
 from tests.helpers import eventually
 from tests.station.stage import (
     CAMERA_AHEAD_NS,

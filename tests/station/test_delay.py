@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from handcal.camera.clock import FrameClock
-from handcal.errors import PoseError, PosePendingError
-from handcal.geometry import rigid
+from handcal.core.errors import PoseError, PosePendingError
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, Frame, HandCloud, Intrinsics
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.station.delay import DelayMeter, DelaySettings
 from handcal.station.hands import PlacedHand
-from handcal.types import Float64, Frame, HandCloud, Intrinsics
 
 CAMERA = Intrinsics(320, 180, 251.0, 251.0, 159.5, 89.5)
 T_H_D = rigid([0.02, -0.03, 0.01], [0.0, -0.05, 0.03])

@@ -9,19 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import CancelledError, HandcalError
+from handcal.core.errors import CancelledError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import DisplayCheck
+from handcal.core.types import Eye, HeadsetIdentity
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
-from handcal.progress import Progress
 from handcal.rig.display_check import Probe
 from handcal.rig.example import example_rig
 from handcal.rig.report import display_finding, report_rig
 from handcal.rig.rig_file import read_rig, write_rig
-from handcal.rig_types import DisplayCheck
 from handcal.sim.display import DISPLAY_MODES, DisplayMode, SimulatedDisplay
 from handcal.station.display_check import Answer, Show, by_camera, by_wearer, run_display_check
 from handcal.station.evidence import Evidence
-from handcal.types import Eye, HeadsetIdentity
 from tests.helpers import eventually
 
 KEY = b"a pairing key of the tests"

@@ -15,13 +15,13 @@ import pytest
 
 from handcal.camera.sdk_devices import Device
 from handcal.camera.usb import explain_absence
-from handcal.errors import CameraError, FileError, LinkError
+from handcal.core.errors import CameraError, FileError, LinkError
+from handcal.core.types import CameraIdentity
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.station import doctor
 from handcal.station.doctor import Finding, Health, examine
-from handcal.types import CameraIdentity
 
 
 def fail_with(error: Exception) -> object:

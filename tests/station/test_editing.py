@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix
-from handcal.errors import FileError
+from handcal.core.display import projection_matrix
+from handcal.core.errors import FileError
+from handcal.core.types import Eye, EyeDistance, Float64, Projection
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
 from handcal.station.solve_again import solve
 from handcal.station.states import ProcedureError, State
-from handcal.types import Eye, EyeDistance, Float64, Projection
 from tests.helpers import eventually
 from tests.station.stage import IDENTITY, RIG, T_D_HAND, Stage, shows, shows_offline_projections
 

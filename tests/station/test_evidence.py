@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.rig_types import DepthCheck
+from handcal.core.types import CameraIdentity, Frame
 from handcal.rig.example import example_rig
-from handcal.rig_types import DepthCheck
 from handcal.station.evidence import FROZEN_FRAMES, Contradiction, Evidence
-from handcal.types import CameraIdentity, Frame
 
 RIG = example_rig()
 IDENTITY = CameraIdentity("Intel RealSense D415", "1234")

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import EYES, Eye, Float64, Verdict
 from handcal.session.session import Session
 from handcal.station.former import SLIP_M, read_former
 from handcal.station.procedure import Calibration
 from handcal.station.states import ProcedureError, State
-from handcal.types import EYES, Eye, Float64, Verdict
 from tests.helpers import eventually
 from tests.station.stage import RIG, SETTINGS, Stage, events
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from handcal.errors import HandError, PoseError, PosePendingError
-from handcal.geometry import rigid
+from handcal.core.errors import HandError, PoseError, PosePendingError
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, HandCloud
 from handcal.station.hands import RecentHands
-from handcal.types import Float64, HandCloud
 
 PERIOD_NS = 100_000_000
 T_H_D = rigid([0.0, 0.0, 0.0], [0.0, 0.1, 0.0])

@@ -12,14 +12,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from handcal.errors import HandcalError, PoseError
-from handcal.geometry import invert, rigid, transform
+from handcal.core.errors import HandcalError, PoseError
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.rig_types import DisplayCheck
+from handcal.core.types import Float64, Frame, HeadsetIdentity, HeadsetView, Intrinsics
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION
 from handcal.rig.example import example_rig
-from handcal.rig_types import DisplayCheck
 from handcal.sim.camera import SyntheticCamera, SyntheticSettings
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
@@ -34,7 +35,6 @@ from handcal.station.headset import (
     headset_state,
     run_pose_delay,
 )
-from handcal.types import Float64, Frame, HeadsetIdentity, HeadsetView, Intrinsics
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.types import Float64
 from handcal.station.hands import PlacedHand
 from handcal.station.hold import merge_hold
-from handcal.types import Float64
 from tests.station.test_hands import cloud
 
 SIDE = 60

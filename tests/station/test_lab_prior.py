@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.progress import Progress
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Alignment, EyeDistance
 from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_position_m, eye_prior
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
-from handcal.rig_types import Rig
 from handcal.session.library import correct_wearer
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.station import lab_prior
 from handcal.station.lab_prior import run_learn_prior
-from handcal.types import EYES, Alignment, EyeDistance
 
 RIG = example_rig()
 SETTINGS = PriorSettings()

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.display import view_of_eye
-from handcal.geometry import transform
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import transform
+from handcal.core.types import EYES, Eye
 from handcal.link.client import HeadsetClient
 from handcal.link.nudges import NudgeSum
 from handcal.link.server import HeadsetServer
@@ -18,7 +19,6 @@ from handcal.session.session import Session
 from handcal.station.plan import NextStep, Plan, PlanSettings, StepName
 from handcal.station.states import State
 from handcal.station.verifying import skipped_eyes
-from handcal.types import EYES, Eye
 from tests.helpers import eventually
 from tests.station.stage import HEADSET_AHEAD_NS, RIG, T_D_HAND, Stage
 

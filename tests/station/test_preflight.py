@@ -20,7 +20,8 @@ from handcal.camera.folder import record_folder
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.sdk_devices import Device
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
-from handcal.errors import LinkError
+from handcal.core.errors import LinkError
+from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.hand.settings import SegmentSettings
 from handcal.io.resources import resource_path
 from handcal.link.pairing import new_pairing_key
@@ -31,7 +32,6 @@ from handcal.station.doctor import Finding, Health
 from handcal.station.plan import PlanSettings
 from handcal.station.preflight import PARTS, Part, check_station, is_ready
 from handcal.station.settings import StationSettings, with_source
-from handcal.types import CameraIdentity, Frame, Intrinsics
 
 KEY = new_pairing_key()
 D415 = Device("Intel RealSense D415", "123", "5.16", "3.2")

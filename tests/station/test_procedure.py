@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix, update_matrix, view_of_eye
-from handcal.errors import FileError
-from handcal.geometry import invert, rigid, transform
+from handcal.core.display import projection_matrix, update_matrix, view_of_eye
+from handcal.core.errors import FileError
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.types import EYES, Eye, Float64, Frame, HeadsetIdentity, HeadsetView
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.register.results import results_json
@@ -21,7 +22,6 @@ from handcal.session.session import Session
 from handcal.station.evidence import FROZEN_FRAMES
 from handcal.station.procedure import Calibration
 from handcal.station.states import CalibrationSettings, ProcedureError, State
-from handcal.types import EYES, Eye, Float64, Frame, HeadsetIdentity, HeadsetView
 from tests.helpers import eventually
 from tests.station.stage import (
     CAMERA,

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.core.types import Alignment
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
 from handcal.station.procedure import Calibration
 from handcal.station.states import ProcedureError, State
-from handcal.types import Alignment
 from tests.helpers import eventually
 from tests.station.stage import RIG, SETTINGS, Stage, shows, shows_offline_projections
 

@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 
 from handcal.camera.record import RecordSettings, record
-from handcal.errors import CancelledError, HandcalError
-from handcal.geometry import rigid
+from handcal.core.errors import CancelledError, HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.progress import Progress
+from handcal.core.types import HeadsetIdentity
 from handcal.link.client import HeadsetClient
 from handcal.link.pairing import Pairing, Pairings
-from handcal.progress import Progress
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import Session
 from handcal.sim.camera import SyntheticCamera
@@ -28,7 +29,6 @@ from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.station.run import RunSettings, run_calibration
 from handcal.station.settings import StationSettings
-from handcal.types import HeadsetIdentity
 from tests.helpers import slow_simulator, write_small_rig
 
 KEY = "a pairing key of the tests"

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Alignment
 from handcal.register.results import SolveSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.station.solve_again import solve_again, stored_solve_settings
-from handcal.types import Alignment
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 import handcal.station.opening
-from handcal.errors import CameraError, FileError, LinkError
+from handcal.core.errors import CameraError, FileError, LinkError
+from handcal.core.types import EYES, Alignment, Eye, Float64, Frame
 from handcal.io.settings import settings_json
 from handcal.link.pairing import new_pairing_key
 from handcal.register.fuse import FuseSettings
@@ -37,7 +38,6 @@ from handcal.station.snapshot import Snapshot
 from handcal.station.states import CalibrationSettings, ProcedureError, State
 from handcal.station.station import Station
 from handcal.station.verifying import SKIPPED
-from handcal.types import EYES, Alignment, Eye, Float64, Frame
 from tests.helpers import Patience, eventually, slow_simulator, write_small_rig
 
 NAIVE_SEED = 3

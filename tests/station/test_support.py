@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import CancelledError, FileError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.progress import Progress
 from handcal.rig.example import example_rig
 from handcal.session.library import delete_session
 from handcal.session.session import Session

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import reprojection_error_px
-from handcal.errors import CameraEndError, FileError, HandcalError
-from handcal.geometry import transform
+from handcal.core.display import reprojection_error_px
+from handcal.core.errors import CameraEndError, FileError, HandcalError
+from handcal.core.geometry import transform
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Intrinsics
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
@@ -24,7 +25,6 @@ from handcal.sim.wearer_settings import WearerSettings
 from handcal.station import user_test
 from handcal.station.cube_tracking import CubeTracker, run_cube_tracking
 from handcal.station.user_test import TrialSettings, calibrated_shifts_m, run_user_trials
-from handcal.types import EYES, Eye, Float64, HeadsetIdentity, Intrinsics
 from tests.helpers import ROOT
 
 TRUE_M: dict[Eye, Float64] = {

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.display import projection_matrix
-from handcal.geometry import rigid
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Eye, EyeDistance, Float64
 from handcal.link.client import HeadsetClient
 from handcal.link.nudges import MAX_NUDGE_ARCMIN, NudgeSum
 from handcal.link.server import HeadsetServer
 from handcal.register.nudge import nudged_shift_m
 from handcal.session.session import Session
 from handcal.station.states import ProcedureError, State
-from handcal.types import EYES, Eye, EyeDistance, Float64
 from tests.helpers import eventually
 from tests.station.stage import (
     HEADSET_AHEAD_NS,

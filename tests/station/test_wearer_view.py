@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection, reprojection_error_px, target_corners_m
-from handcal.geometry import project
+from handcal.core.display import eye_projection, reprojection_error_px, target_corners_m
+from handcal.core.geometry import project
+from handcal.core.types import Float64
 from handcal.rig.example import FOCAL_PX, example_rig
 from handcal.station.wearer_view import EyeView, render_eye_view
-from handcal.types import Float64
 
 DISPLAY = example_rig().eyes["left"]
 OUTLINE_M = np.array([[x, y, 0.5] for x in (-0.04, 0.04) for y in (-0.03, 0.03)])

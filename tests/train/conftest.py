@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from handcal.types import UInt8
+from handcal.core.types import UInt8
 
 if TYPE_CHECKING:
     from handcal.train.model import HandNet

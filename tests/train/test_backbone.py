@@ -9,7 +9,7 @@ pytest.importorskip("torch")
 import torch
 from torch.nn import functional
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.train.backbone import load_backbone
 from handcal.train.model import HandNet
 

@@ -9,7 +9,8 @@ pytest.importorskip("onnx")
 import onnxruntime
 import torch
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Float32, UInt8
 from handcal.hand.detect import points
 from handcal.hand.shipped import FLOAT_MODEL
 from handcal.io.resources import resource_path
@@ -17,7 +18,6 @@ from handcal.lab.evaluate.annotations import Photo
 from handcal.train.export import export_integer
 from handcal.train.loop import read_average
 from handcal.train.model import HandNet
-from handcal.types import Float32, UInt8
 
 
 def seen(image: UInt8) -> torch.Tensor:

@@ -6,11 +6,11 @@ pytest.importorskip("torch")
 pytest.importorskip("onnx")
 import torch
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import UInt8
 from handcal.io.resources import resource_path
 from handcal.train.exported import load_exported
 from handcal.train.model import HandNet
-from handcal.types import UInt8
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ pytest.importorskip("torch")
 import torch
 from torch import Tensor
 
+from handcal.core.types import Float32
 from handcal.hand.detect import points
 from handcal.train.loss import Grid, detection_loss
-from handcal.types import Float32
 
 PLACES, STRIDES = points(64, 64)
 GRID = Grid(torch.tensor(PLACES), torch.tensor(STRIDES))

@@ -8,7 +8,9 @@ from typing import TypeAlias, cast
 import numpy as np
 
 from handcal.camera.radial import DEPTH_SCALE_M, PinholeView, is_not_wrapped, white_brightness
-from handcal.geometry import invert, transform
+from handcal.core.geometry import invert, transform
+from handcal.core.progress import Progress
+from handcal.core.types import Bool, Float32, Float64, Frame, Intrinsics, UInt16
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.lab.bench.figure import BenchFigure
@@ -18,11 +20,9 @@ from handcal.lab.study.procedure_trial import ProcedureModel, See
 from handcal.lab.study.procedures import ProcedureSettings, procedure_trial
 from handcal.lab.study.run import Case
 from handcal.lab.study.wearers import StudyWearer
-from handcal.progress import Progress
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
 from handcal.sim.raster import D415, draw_hand
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import Bool, Float32, Float64, Frame, Intrinsics, UInt16
 
 _SEED = 1
 _POINTS = 1500

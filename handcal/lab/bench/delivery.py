@@ -6,6 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
+from handcal.core.progress import Progress
+from handcal.core.types import HeadsetIdentity
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured
@@ -13,8 +15,6 @@ from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
 from handcal.link.pairing import new_device_id, new_pairing_key
 from handcal.link.server import HeadsetServer
-from handcal.progress import Progress
-from handcal.types import HeadsetIdentity
 
 _LOSSES = 0.0, 0.3
 _PATIENCE_S = 5.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from handcal.core.progress import Progress
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import (
@@ -15,7 +16,6 @@ from handcal.lab.bench.trials import (
     run_trials,
 )
 from handcal.lab.study.trials import floor_error_m, solve_trial
-from handcal.progress import Progress
 
 _CUT_SIGMA_M = 0.0015
 _SIGMA_M = 0.0005, 0.002

@@ -8,13 +8,16 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.display import view_of_eye
-from handcal.geometry import image_points, invert, rigid
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import image_points, invert, rigid
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, Float64, Intrinsics
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
 from handcal.lab.bench.trials import Measured
-from handcal.progress import Progress
+from handcal.report.statistics import MeanInterval
 from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.board import Board
 from handcal.rig.camera import calibrate_camera
@@ -31,11 +34,8 @@ from handcal.rig.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.stereo import calibrate_stereo
 from handcal.rig.viewpoint import viewpoint_from_stereo
 from handcal.rig.views import BoardImage, board_image
-from handcal.rig_types import Rig
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
-from handcal.statistics import MeanInterval
-from handcal.types import EYES, Eye, Float64, Intrinsics
 
 HEADSET_CAMERA = Intrinsics(
     1280, 720, 1010.0, 1008.0, 645.0, 356.0, (0.06, -0.13, 0.0006, -0.0004, 0.04)

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from handcal.core.progress import Progress
+from handcal.core.types import METHODS, Float64
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import (
@@ -23,9 +25,7 @@ from handcal.lab.bench.trials import (
     trial_alignment,
 )
 from handcal.lab.study.trials import floor_error_m, solve_trial
-from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings
-from handcal.types import METHODS, Float64
 
 _SLOW = "paper", "linear"
 _PUBLISHED_MM = 4.0

@@ -13,17 +13,17 @@ import numpy as np
 import small_gicp
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import invert, rigid, transform
+from handcal.core.geometry import invert, rigid, transform
+from handcal.core.progress import Progress
+from handcal.core.types import Float64
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured, measured_alignment
-from handcal.progress import Progress
 from handcal.register.consistent import match_hands
 from handcal.register.guard import RotationGuard
 from handcal.register.rcicp import best_rigid
 from handcal.register.solve import solve_eye_shift
 from handcal.sim.alignments import SimulatedAlignment
-from handcal.types import Float64
 
 Register: TypeAlias = Callable[[SimulatedAlignment], Float64 | None]
 """Return T_cursor_hand, (4, 4); None for what gives no movement."""

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from handcal.core.progress import Progress
 from handcal.lab.bench.cameras import measure_cameras
 from handcal.lab.bench.delivery import measure_delivery
 from handcal.lab.bench.measured_clouds import measure_covariance, measure_cuts
@@ -20,7 +21,6 @@ from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.speed import measure_speed
 from handcal.lab.bench.trials import Measured
 from handcal.lab.bench.wearer import measure_wearer
-from handcal.progress import Progress
 
 PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "speed": measure_speed,

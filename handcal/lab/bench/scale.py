@@ -7,13 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
+from handcal.core.progress import Progress
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured
 from handcal.lab.study.noise import FLOOR, NoiseSettings, noise_study
 from handcal.lab.study.run import Study, run_study
 from handcal.lab.study.store import StudyRow
-from handcal.progress import Progress
 
 # Each process makes its own hands; in a whole study this time is negligible.
 _HANDS = 2

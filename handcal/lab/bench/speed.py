@@ -9,15 +9,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from handcal.errors import HandError
-from handcal.geometry import rigid
+from handcal.core.errors import HandError
+from handcal.core.geometry import rigid
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Alignment, Float64, Frame
 from handcal.hand.roi import Detector, RoiFinder
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.hand.shipped import load_detector
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Measured, trial_hand
-from handcal.progress import Progress
 from handcal.register.guard import RotationGuard, rotation_between
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
@@ -28,7 +29,6 @@ from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.types import EYES, Alignment, Float64, Frame
 
 Input = TypeVar("Input")
 

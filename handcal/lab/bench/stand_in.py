@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.display import reprojection_arcmin
+from handcal.core.display import reprojection_arcmin
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Float64
 from handcal.lab.bench.trials import run_trials, trial_hand
-from handcal.progress import Progress
 from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment
-from handcal.rig_types import Rig
+from handcal.report.statistics import MeanInterval, mean_interval
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.wearer import draw_eyes, draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.statistics import MeanInterval, mean_interval
-from handcal.types import EYES, Float64
 
 _POINTS = 3000
 _DEPTH_SIGMA_M = 0.001

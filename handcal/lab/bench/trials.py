@@ -11,12 +11,12 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from handcal.core.progress import Progress
+from handcal.core.types import Float64
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.study.trials import study_hand
-from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment, simulate_alignment
 from handcal.sim.hand import HandModel
-from handcal.types import Float64
 
 Task = TypeVar("Task")
 Case = TypeVar("Case")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Method
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.trials import Errors, Measured, collect_errors, trial_hand
-from handcal.progress import Progress
 from handcal.register.solve import solve_alignment
 from handcal.rig.example import example_rig
 from handcal.sim.overlay import overlay_by_eye
-from handcal.types import EYES, Method
 
 _ASIDE_M, _ALONG_M = 0.005, 0.010
 _BIAS_MM = 0.3

@@ -14,10 +14,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Bool, Float64, UInt8
 from handcal.io.files import read_json
 from handcal.io.images import read_image
-from handcal.types import Bool, Float64, UInt8
 
 _CORNER = 0.5  # the image's upper left corner in these coordinates
 _NAME_MAX = 40  # letters of a group's name

@@ -8,9 +8,9 @@ from typing import Literal, TypeAlias
 import cv2
 import numpy as np
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.types import Float64, UInt8
 from handcal.lab.evaluate.annotations import Photo
-from handcal.types import Float64, UInt8
 
 Glove: TypeAlias = Literal["blue", "black"]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from handcal.core.types import Float64, UInt8
 from handcal.hand.detect import DetectSettings, overlaps
 from handcal.io.images import write_png
 from handcal.lab.evaluate.annotations import Photo
 from handcal.lab.evaluate.precision import MATCH_OVERLAP, ImageResult
-from handcal.types import Float64, UInt8
 
 _COLUMNS = 6
 _TILE_PX, _MOST_TILES = 240, 36

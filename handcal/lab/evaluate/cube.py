@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.frozen import freeze
-from handcal.geometry import camera_matrix, transform
+from handcal.core.frozen import freeze
+from handcal.core.geometry import camera_matrix, transform
+from handcal.core.types import Float64, Intrinsics
 from handcal.rig.cube import MIN_FACES, Cube, CubeError, cube_pose, marker_corners_m
-from handcal.types import Float64, Intrinsics
 
 
 @dataclass(frozen=True, slots=True, eq=False)

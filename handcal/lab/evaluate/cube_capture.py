@@ -9,7 +9,9 @@ import cv2
 import numpy as np
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraTimeoutError
+from handcal.core.errors import CameraTimeoutError
+from handcal.core.progress import Progress
+from handcal.core.types import Float32, Float64, UInt8
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.lab.evaluate.cube_folder import (
@@ -20,12 +22,10 @@ from handcal.lab.evaluate.cube_folder import (
     PlannedCapture,
     missing_captures,
 )
-from handcal.progress import Progress
 from handcal.rig.board import BoardError
 from handcal.rig.board_finder import find_board
 from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.grid import Grid
-from handcal.types import Float32, Float64, UInt8
 
 # Images buffered by the camera were taken before the operator was ready.
 _STALE_IMAGES = 5

@@ -9,6 +9,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
+from handcal.core.types import Intrinsics
 from handcal.export.figures import name_axes
 from handcal.lab.evaluate.cube_summary import ErrorSummary
 from handcal.lab.evaluate.cube_test import CubeRow, CubeTest
@@ -16,9 +17,8 @@ from handcal.lab.methods.published import MISALIGNMENT
 from handcal.report.cells import interval_ends, mean_sd
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
+from handcal.report.statistics import INTERVAL_METHOD
 from handcal.rig.cube import Cube
-from handcal.statistics import INTERVAL_METHOD
-from handcal.types import Intrinsics
 
 _METHOD = (
     "A camera in the eye's place captures the real cube with the display off, and the drawn cube "

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from handcal.lab.evaluate.cube_test import CubeRow
-from handcal.statistics import MeanInterval, Summary, mean_interval, summarise
+from handcal.report.statistics import MeanInterval, Summary, mean_interval, summarise
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,18 +12,18 @@ from typing import TypeAlias
 import cv2
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.types import Intrinsics, UInt8
 from handcal.io.images import read_image
 from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
-from handcal.progress import Progress
 from handcal.rig.board import BoardError
 from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.display import fit_homography, pose_before
 from handcal.rig.grid import Grid, find_grid
 from handcal.rig.views import ViewsError
 from handcal.rig.warp import RotationWarp
-from handcal.types import Intrinsics, UInt8
 
 CubeRow: TypeAlias = dict[str, float | int | str]
 """Errors of one pair of captures; units are in the names."""

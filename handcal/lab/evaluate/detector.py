@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from handcal.core.progress import Progress
 from handcal.hand.detect import CANDIDATE_SCORE_MIN, DetectSettings, overlaps
 from handcal.hand.roi import Detector
 from handcal.lab.evaluate.annotations import Photo
@@ -20,7 +21,6 @@ from handcal.lab.evaluate.precision import (
     precision_recall,
     wilson,
 )
-from handcal.progress import Progress
 
 EVALUATED = DetectSettings(score_min=CANDIDATE_SCORE_MIN)
 """A precision/recall curve needs the uncertain detections too."""

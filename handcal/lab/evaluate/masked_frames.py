@@ -19,11 +19,11 @@ from handcal.camera.images import (
     read_color,
     read_depth,
 )
-from handcal.errors import FileError
-from handcal.frozen import freeze
+from handcal.core.errors import FileError
+from handcal.core.frozen import freeze
+from handcal.core.types import Bool, Float64, Frame, Intrinsics, UInt8
 from handcal.io.files import read_json
 from handcal.io.images import IMAGE_SUFFIXES, read_image
-from handcal.types import Bool, Float64, Frame, Intrinsics, UInt8
 
 _MOST_FRAMES = 10_000
 _WRIST, _MIDDLE_FINGER = 0, 9  # of 21 joints: the wrist, then four for each finger from the thumb

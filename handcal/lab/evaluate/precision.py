@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handcal.core.types import Bool, Float64
 from handcal.hand.detect import overlaps
-from handcal.types import Bool, Float64
 
 MATCH_OVERLAP = 0.5
 """Minimum intersection over union for a detection to count as a hit."""

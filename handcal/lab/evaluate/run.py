@@ -8,7 +8,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 from handcal.io.files import make_folder, require_suffix, user_path
@@ -30,7 +32,6 @@ from handcal.lab.settings import (
     output_folder,
 )
 from handcal.lab.study.store import free_of_studies
-from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal.rig.cube import Cube
@@ -39,7 +40,6 @@ from handcal.rig.formats import read_intrinsics
 from handcal.rig.grid import Grid, grid_on
 from handcal.rig.rig_file import read_rig
 from handcal.rig.warp import RotationWarp
-from handcal.rig_types import Rig
 from handcal.sim.cube_captures import CaptureSettings, write_captures
 
 # Shares of the time.

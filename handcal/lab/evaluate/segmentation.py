@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from handcal.errors import HandError
+from handcal.core.errors import HandError
+from handcal.core.types import Bool, Frame, HandCloud
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import between, view_depth
 from handcal.lab.evaluate.masked_frames import MaskedFrame, cropped, scaled, subsampled
-from handcal.types import Bool, Frame, HandCloud
 
 Find = Callable[[Frame], HandCloud]
 """Segments the hand in a frame that stands alone; raises HandError if it finds none."""

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from handcal.core.types import Bool, UInt8
 from handcal.lab.evaluate.masked_frames import MaskedFrame
 from handcal.lab.evaluate.segmentation import FrameFigures
-from handcal.types import Bool, UInt8
 
 _COLUMNS, _MOST_TILES = 4, 200
 _TILE_PX = 320

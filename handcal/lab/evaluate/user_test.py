@@ -12,15 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
 from handcal.export.tables import corner_rows
-from handcal.progress import Progress
-from handcal.session.journal import JOURNAL
-from handcal.session.record import replay
-from handcal.session.session import Session, SessionRecord
-from handcal.session.state import SessionEvent
-from handcal.session.trial import calibration_numbers
-from handcal.statistics import (
+from handcal.report.statistics import (
     MeanInterval,
     Summary,
     VarianceComponents,
@@ -28,6 +23,11 @@ from handcal.statistics import (
     summarise,
     variance_components,
 )
+from handcal.session.journal import JOURNAL
+from handcal.session.record import replay
+from handcal.session.session import Session, SessionRecord
+from handcal.session.state import SessionEvent
+from handcal.session.trial import calibration_numbers
 
 CornerRow: TypeAlias = dict[str, Any]
 """One corner of one trial: the columns of `corner_rows`, and whose it is."""

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
+from handcal.core.types import EYES, Float64
 from handcal.export.figures import COLORS, MARKERS, name_axes
 from handcal.lab.evaluate.user_test import CornerRow, GroupErrors
 from handcal.report.page import families, plain
-from handcal.types import EYES, Float64
 
 # More points than these are drawn as a picture: otherwise a page would take long to show.
 _MOST_POINTS = 2000

@@ -12,9 +12,9 @@ from handcal.lab.methods.published import REPROJECTION
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with
+from handcal.report.statistics import INTERVAL_METHOD
 from handcal.session.comparison import count_comparisons, read_comparisons
 from handcal.session.trial import calibration_numbers
-from handcal.statistics import INTERVAL_METHOD
 
 # Wearers in one figure, and the height of each.
 _WEARERS, _WEARER_MM, _FIGURE_MM = 24, 6.0, 30.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 
 # Below this share of the largest singular value, a second solution fits as well as the first.
 _AMBIGUOUS = 1e-6

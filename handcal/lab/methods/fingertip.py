@@ -16,9 +16,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64
 from handcal.lab.methods.points import check_pairs
-from handcal.rig_types import EyeDisplay
-from handcal.types import Float64
 
 FEWEST_ALIGNMENTS = 2
 """Each gives two equations for three unknowns."""
@@ -29,7 +29,7 @@ _UNTOLD = 1e-9
 def solve_eye_from_points(points_E_m: ArrayLike, pixels: ArrayLike, display: EyeDisplay) -> Float64:
     """Return the eye shift for which a known display fits alignments of single points.
 
-    With ``n = (K H0)^-1 [m; 1]`` and UQ (`handcal.display`), each alignment requires
+    With ``n = (K H0)^-1 [m; 1]`` and UQ (`handcal.core.display`), each alignment requires
     ``n (z - φ3) = UQ p``, which is linear in φ; divided by z, the residuals are in pixels.
 
     Parameters

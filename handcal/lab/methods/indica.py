@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import rq
 
-from handcal.display import update_matrix
+from handcal.core.display import update_matrix
+from handcal.core.types import Float64
 from handcal.lab.methods.points import check_points
-from handcal.types import Float64
 
 
 def solve_indica_recycled(

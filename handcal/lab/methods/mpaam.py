@@ -14,10 +14,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64
 from handcal.lab.methods.dlt import fit_projective
 from handcal.lab.methods.points import check_pairs
-from handcal.types import Float64
 
 MapModel: TypeAlias = Literal["isometric", "affine", "perspective"]
 FEWEST_PAIRS: dict[MapModel, int] = {"isometric": 3, "affine": 4, "perspective": 5}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 
 _MOST = 100_000
 _FARTHEST = 1e6

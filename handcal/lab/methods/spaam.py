@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from handcal.core.types import Float64
 from handcal.lab.methods.dlt import fit_projective
 from handcal.lab.methods.points import check_pairs
-from handcal.types import Float64
 
 FEWEST_ALIGNMENTS = 6
 """Each gives two equations for 11 unknowns."""

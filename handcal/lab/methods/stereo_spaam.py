@@ -13,8 +13,8 @@ from collections.abc import Mapping
 
 from numpy.typing import ArrayLike
 
+from handcal.core.types import Eye, Float64
 from handcal.lab.methods.spaam import solve_spaam
-from handcal.types import Eye, Float64
 
 
 def solve_stereo_spaam(

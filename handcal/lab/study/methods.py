@@ -12,8 +12,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
-from handcal.geometry import invert, project, transform
+from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
+from handcal.core.geometry import invert, project, transform
+from handcal.core.types import EYES, Alignment, Eye, EyeShift, Float64
 from handcal.lab.methods.fingertip import solve_eye_from_points
 from handcal.lab.methods.indica import solve_indica_recycled
 from handcal.lab.methods.mpaam import FEWEST_PAIRS, solve_mpaam
@@ -25,7 +26,6 @@ from handcal.lab.study.wearers import StudyWearer, align_cube, align_hand, align
 from handcal.register.fuse import FuseSettings, fuse_alignments
 from handcal.register.solve import solve_alignment
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Alignment, Eye, EyeShift, Float64
 
 Projections: TypeAlias = Mapping[Eye, Float64]
 """Pixels from points in H, (3, 4), for each eye."""

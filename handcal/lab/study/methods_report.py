@@ -9,16 +9,16 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from handcal.display import TARGET_DEPTHS_M
+from handcal.core.display import TARGET_DEPTHS_M
+from handcal.core.types import EYES, Float64
 from handcal.export.figures import COLORS, name_axes
 from handcal.lab.methods.published import MISALIGNMENT, REPROJECTION
 from handcal.lab.study.methods import HANDCAL_BOTH, HANDCAL_EACH, PAPER, MethodSettings
 from handcal.lab.study.store import StudyRow
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
+from handcal.report.statistics import mean_interval, summarise
 from handcal.rig.example import example_rig
-from handcal.statistics import mean_interval, summarise
-from handcal.types import EYES, Float64
 
 ARCMIN_COLUMNS = tuple(f"{eye}_{corner}_arcmin" for eye in EYES for corner in (1, 2, 3, 4))
 _MODEL = (

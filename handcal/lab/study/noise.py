@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from handcal.core.types import EYES, METHODS, Float64, Intrinsics, Method
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import floor_error_m, solve_by_paper, solve_trial, study_hand
@@ -22,7 +23,6 @@ from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import PlacementError
 from handcal.sim.wearer import draw_eyes, draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, METHODS, Float64, Intrinsics, Method
 
 FLOOR = "known pairs"
 """Name of the lower bound: least squares with the true pairs, disturbed only by a rotated hand."""

@@ -9,8 +9,19 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.display import arcmin_from_px, eye_projection, projection_matrix, view_of_eye
-from handcal.geometry import invert, project, rigid, transform
+from handcal.core.display import arcmin_from_px, eye_projection, projection_matrix, view_of_eye
+from handcal.core.geometry import invert, project, rigid, transform
+from handcal.core.types import (
+    EYES,
+    Alignment,
+    Bool,
+    Eye,
+    EyeDistance,
+    EyeShift,
+    Float64,
+    PlanName,
+    Verification,
+)
 from handcal.lab.study.wearers import StudyWearer
 from handcal.register.fuse import FuseSettings
 from handcal.register.guard import GuardSettings
@@ -30,17 +41,6 @@ from handcal.sim.people import (
 from handcal.sim.placement import apply_placement_error, overlay_hand, view_through
 from handcal.sim.raster import visible_points
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import (
-    EYES,
-    Alignment,
-    Bool,
-    Eye,
-    EyeDistance,
-    EyeShift,
-    Float64,
-    PlanName,
-    Verification,
-)
 
 EyeDistanceSource: TypeAlias = Literal["none", "ruler", "headset"]
 

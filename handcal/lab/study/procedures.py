@@ -13,22 +13,22 @@ from typing import Any, cast
 
 import numpy as np
 
-from handcal.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
-from handcal.errors import HandcalError
-from handcal.geometry import invert, project, transform
+from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import invert, project, transform
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Eye, Float64, Intrinsics
 from handcal.lab.methods.spaam import solve_spaam
 from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study.procedure_trial import Calibrated, ProcedureModel, lead_through
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearers import StudyWearer, align_points, draw_wearer
-from handcal.progress import Progress
 from handcal.register.benefit import depth_error_m
 from handcal.register.placement import PlacementSettings
 from handcal.register.prior import LearnedPrior, learn_prior
 from handcal.sim.people import VARIANTS, Variant, begin_sitting
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Eye, Float64, Intrinsics
 
 EARLIER_SESSIONS = 20
 """Number of simulated sessions that a learned prior is from."""

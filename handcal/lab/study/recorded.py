@@ -16,14 +16,14 @@ from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 from scipy.spatial.transform import Rotation
 
-from handcal.display import arcmin_from_px
-from handcal.errors import FileError
-from handcal.geometry import project
+from handcal.core.display import arcmin_from_px
+from handcal.core.errors import FileError
+from handcal.core.geometry import project
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64
 from handcal.lab.methods.fingertip import solve_eye_from_points
 from handcal.lab.methods.indica import solve_indica_full, solve_indica_recycled, split_projection
 from handcal.lab.methods.spaam import solve_spaam
-from handcal.rig_types import EyeDisplay
-from handcal.types import Float64
 
 BASE = "Base"
 _LARGEST_BYTES = 1_000_000

@@ -12,10 +12,10 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeAlias
 
-from handcal.errors import CancelledError
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
 from handcal.lab.study.store import StudyFolder, StudyRow, holds_study
 from handcal.lab.study.workers import open_workers
-from handcal.progress import Progress
 
 Case: TypeAlias = dict[str, float | int | str]
 """Identifies a cell of the study and a wearer or trial in it; JSON-able."""

@@ -14,7 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import make_folder, read_json, write_atomic, write_json
 from handcal.report.rows import rows_csv
 

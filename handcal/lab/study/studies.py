@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from handcal.core.progress import Progress
 from handcal.lab.settings import (
     MethodComparisonSettings,
     NoiseStudySettings,
@@ -23,7 +24,6 @@ from handcal.lab.study.run import Study, resumable, run_study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE
 from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
-from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.report.write import write_report
 

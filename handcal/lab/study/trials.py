@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Final
 
-from handcal.geometry import transform
+from handcal.core.geometry import transform
+from handcal.core.types import EyeShift, Float64, Method
 from handcal.register.model import fit_shift
 from handcal.register.rcicp import solve_paper
 from handcal.register.solve import solve_eye_shift
 from handcal.sim.alignments import SimulatedAlignment
 from handcal.sim.hand import HandModel, make_hand
-from handcal.types import EyeShift, Float64, Method
 
 BEST_ITERATE: Final = "paper, best iterate"
 """The published iteration, ended at the smallest distance of the pairs instead of the last."""

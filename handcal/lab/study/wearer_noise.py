@@ -15,13 +15,13 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from handcal.display import TARGET_DEPTHS_M
-from handcal.errors import HandcalError
+from handcal.core.display import TARGET_DEPTHS_M
+from handcal.core.errors import HandcalError
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Eye, Float64
 from handcal.lab.study.methods import MethodSettings, rendered, study_wearer, target_errors
 from handcal.lab.study.trials import BEST_ITERATE, solve_by_paper
 from handcal.lab.study.wearers import StudyWearer, align_hand
-from handcal.progress import Progress
-from handcal.types import EYES, Eye, Float64
 
 PAPER_MEAN_ARCMIN, PAPER_SD_ARCMIN = 10.79, 3.21
 """Hu et al. 2021, user test: all corners."""

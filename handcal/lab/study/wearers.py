@@ -11,18 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.display import TARGET_SIDE_M, eye_projection, projection_matrix, view_of_eye
-from handcal.geometry import invert, project, rigid, transform
+from handcal.core.display import TARGET_SIDE_M, eye_projection, projection_matrix, view_of_eye
+from handcal.core.geometry import invert, project, rigid, transform
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Alignment, Eye, Float64
 from handcal.lab.study.trials import study_hand
 from handcal.register.guard import GuardSettings
 from handcal.rig.example import example_rig
-from handcal.rig_types import Rig
 from handcal.sim.hand import HandModel
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.placement import apply_placement_error, overlay_hand, view_through
 from handcal.sim.wearer import draw_eyes, draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Alignment, Eye, Float64
 
 _REACH_M = 0.35, 0.70
 _CUBE_REACH_M = 0.48, 0.62

@@ -19,7 +19,7 @@ from concurrent.futures import (
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 
 _CONNECT_S = 30
 _MOST_ON_WINDOWS = 61  # processes that a ProcessPoolExecutor can wait for there

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.files import make_folder
 from handcal.io.resources import resource_path
 

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import Part, is_ready

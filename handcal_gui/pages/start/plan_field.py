@@ -7,8 +7,8 @@ from dataclasses import replace
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
+from handcal.core.types import EYES, Eye, PlanName
 from handcal.station.settings import StationSettings
-from handcal.types import EYES, Eye, PlanName
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, fill_row
 

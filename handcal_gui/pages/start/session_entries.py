@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import Eye
 from handcal.io.files import modified_s
 from handcal.session.journal import find_journals
 from handcal.session.library import EyeOutcome, eye_outcomes
 from handcal.session.record import replay
 from handcal.session.unfinished import UnfinishedSession, unfinished_and_repaired
-from handcal.types import Eye
 from handcal_gui.preferences import MOST_RECENT
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize

@@ -6,9 +6,9 @@ from PySide6.QtCore import QRectF, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QStackedLayout, QWidget
 
+from handcal.core.types import EYES, Eye, Frame
 from handcal.hand.overlay import contour_px
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Eye, Frame
 from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.camera.hand_overlay import HandOverlay

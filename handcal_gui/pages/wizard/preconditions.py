@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from handcal.core.types import Eye
 from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
 from handcal.station.snapshot import Snapshot
-from handcal.types import Eye
 from handcal_gui.pages.wizard.view import EYE_WORDS, Precondition
 from handcal_gui.translation import tr
 from handcal_gui.widgets.sentence import sentence

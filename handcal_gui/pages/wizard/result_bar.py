@@ -8,12 +8,12 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPagedPaintDevice, QTextDocument
 from PySide6.QtWidgets import QWidget
 
+from handcal.core.types import Eye
 from handcal.register.results import Results
 from handcal.register.verdict import VerdictSettings
 from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal.types import Eye
 from handcal_gui.keys import add_action
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handcal.core.types import Eye, VerdictName
 from handcal.register.guard import turn_advice
 from handcal.register.results import USED, Results
 from handcal.report.cells import signed
@@ -14,7 +15,6 @@ from handcal.station.procedure import Procedure
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.verifying import VerifyingView
-from handcal.types import Eye, VerdictName
 from handcal_gui.pages.wizard.preconditions import (
     doubted_eyes,
     eyes_accepted,

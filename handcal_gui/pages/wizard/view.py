@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from handcal.types import Eye, VerdictName
+from handcal.core.types import Eye, VerdictName
 from handcal_gui.translation import tr
 
 EYE_WORDS: dict[Eye, str] = {"left": tr("left"), "right": tr("right")}

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from handcal.types import Float64, UInt8, UInt16
+from handcal.core.types import Float64, UInt8, UInt16
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 

@@ -9,7 +9,7 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPen, QTransform
 
-from handcal.types import Bool, Float64, HandCloud
+from handcal.core.types import Bool, Float64, HandCloud
 from handcal_gui.theme import colors
 
 _MASK_ALPHA = 70

@@ -10,8 +10,8 @@ import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
+from handcal.core.types import Float64
 from handcal.report.cells import with_minus
-from handcal.types import Float64
 from handcal_gui.panels.cloud.orbit import Orbit
 from handcal_gui.theme import SPACING_PX, colors
 

@@ -21,7 +21,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from handcal.types import Float64, UInt8
+from handcal.core.types import Float64, UInt8
 from handcal_gui.keys import add_action
 from handcal_gui.panels.cloud.box_axes import Box, draw_box, draw_scale
 from handcal_gui.panels.cloud.orbit import Direction, Orbit

@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 
 _QUARTER_RAD = np.pi / 2
 _LEAST_PX_PER_MM, _MOST_PX_PER_MM = 0.05, 50.0

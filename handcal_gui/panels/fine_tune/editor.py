@@ -14,9 +14,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.display import DrawnMove
+from handcal.core.display import DrawnMove
+from handcal.core.types import Float64
 from handcal.report.cells import signed
-from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, number_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import NumberField

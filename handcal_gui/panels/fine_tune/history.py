@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from handcal.frozen import readonly
-from handcal.types import Eye, Float64
+from handcal.core.frozen import readonly
+from handcal.core.types import Eye, Float64
 
 Shifts: TypeAlias = Mapping[Eye, Float64]
 """φ of each eye, (3,) float64, metres."""

@@ -9,8 +9,8 @@ import numpy as np
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget
 
+from handcal.core.types import Float64
 from handcal.link.rates import LinkRates
-from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import hbox

@@ -14,8 +14,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.types import METHODS, Method
 from handcal.register.results import Results
-from handcal.types import METHODS, Method
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import with_name

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
+from handcal.core.types import EyeShift
 from handcal.register.results import Results
-from handcal.types import EyeShift
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot

@@ -8,12 +8,12 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
 
+from handcal.core.types import EYES, Alignment, Eye
 from handcal.register.results import Results
 from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial
 from handcal.station.snapshot import Snapshot
-from handcal.types import EYES, Alignment, Eye
 from handcal_gui.keys import add_action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot

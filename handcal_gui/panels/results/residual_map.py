@@ -7,7 +7,7 @@ import pyqtgraph as pg
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 from handcal_gui.theme import follow_theme
 from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot

@@ -9,9 +9,9 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
-from handcal.geometry import transform
+from handcal.core.geometry import transform
+from handcal.core.types import Alignment, Eye, EyeShift
 from handcal.register.results import Results
-from handcal.types import Alignment, Eye, EyeShift
 from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

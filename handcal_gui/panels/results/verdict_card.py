@@ -6,9 +6,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
+from handcal.core.types import Eye
 from handcal.register.results import Results
 from handcal.session.judged_trials import EyeTrials
-from handcal.types import Eye
 from handcal_gui.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.layouts import vbox

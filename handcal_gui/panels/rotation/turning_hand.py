@@ -17,7 +17,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 from handcal_gui.theme import colors
 from handcal_gui.translation import tr
 

@@ -13,11 +13,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.types import EyeDistance
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.station.snapshot import Snapshot
-from handcal.types import EyeDistance
 from handcal_gui.panels.session.notes_editor import NotesEditor
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
-from handcal.display import TARGET_DEPTHS_M
+from handcal.core.display import TARGET_DEPTHS_M
+from handcal.core.types import EYES, Eye, Float64
 from handcal.session.trial import Trial, trial_spread
-from handcal.types import EYES, Eye, Float64
 from handcal_gui.translation import tr
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES

@@ -12,8 +12,8 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QTransform
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from handcal.core.types import Float64
 from handcal.station.wearer_view import EyeView
-from handcal.types import Float64
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.widgets.legend import DOTS_APART, HALO_PX, draw_dots, role_color
 from handcal_gui.widgets.paint_turns import update_in_turn

@@ -6,9 +6,9 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QCheckBox, QHBoxLayout, QLabel, QWidget
 
+from handcal.core.types import EYES, Eye
 from handcal.station.snapshot import Snapshot
 from handcal.station.wearer_view import EyeView, Overlay
-from handcal.types import EYES, Eye
 from handcal_gui.panels.wearer_view.eye_canvas import LINES, EyeCanvas, show_alike
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -15,16 +15,16 @@ from PySide6.QtWidgets import QCheckBox, QLineEdit, QWidget
 
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
+from handcal.core.progress import Progress
+from handcal.core.types import UInt8
 from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_capture import RestWatch, instruction, keep_capture
 from handcal.lab.evaluate.cube_folder import GRID, CapturePlan, PlannedCapture, missing_captures
 from handcal.lab.evaluate.run import cube_and_grid, position_warp
-from handcal.progress import Progress
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
 from handcal.rig.warp import RotationWarp
 from handcal.station.doctor import Finding, Health
-from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 from handcal.camera.camera import Camera
 from handcal.camera.realsense import RealSenseCamera
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.link.pairing import Pairings, pairing_file
 from handcal.link.server import HeadsetServer
 from handcal_gui.translation import tr

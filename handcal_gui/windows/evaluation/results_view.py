@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.types import UInt8
 from handcal.report.document import Figure, Report, Table
-from handcal.types import UInt8
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel

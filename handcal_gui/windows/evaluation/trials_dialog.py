@@ -12,15 +12,15 @@ from typing import TypeAlias
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.types import Eye, Float64
 from handcal.io.files import user_path
-from handcal.progress import Progress
 from handcal.session.journal import JOURNAL
 from handcal.session.session import Session
 from handcal.session.trial import Trial
 from handcal.station.doctor import Finding, Health
 from handcal.station.user_test import StudyLeader, TrialOrder, record_user_trials
-from handcal.types import Eye, Float64
 from handcal_gui.evaluation_entries import UserEntries
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr

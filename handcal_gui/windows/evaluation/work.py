@@ -10,16 +10,16 @@ from typing import Any, Protocol
 import cv2
 import numpy as np
 
+from handcal.core.progress import Progress
+from handcal.core.types import UInt8
 from handcal.io.files import require_writable
 from handcal.io.images import read_image
 from handcal.lab.settings import output_folder
 from handcal.lab.study.run import RUNNING, Study, share_done
 from handcal.lab.study.store import free_of_studies
 from handcal.lab.study.studies import STUDY_SHARE
-from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.station.doctor import Finding, Health
-from handcal.types import UInt8
 from handcal_gui.translation import tr
 from handcal_gui.windows.evaluation.time_left import TimeLeft
 

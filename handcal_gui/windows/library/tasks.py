@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from handcal.errors import CancelledError, FileError, InUseError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError, FileError, InUseError
+from handcal.core.progress import Progress
 from handcal.session.library import (
     LibraryEntry,
     correct_wearer,

@@ -9,9 +9,10 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QDialog, QGridLayout, QLabel, QWidget
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.progress import Progress
+from handcal.core.types import EYES, Eye
 from handcal.io.images import IMAGE_SUFFIXES
-from handcal.progress import Progress
 from handcal.rig.accept import FEWEST_VIEWS, LIMIT_ARCMIN
 from handcal.rig.acceptance import (
     Acceptance,
@@ -26,7 +27,6 @@ from handcal.rig.choose import ALIKE, ChooseSettings
 from handcal.rig.grid import grid_on
 from handcal.rig.rig_file import write_rig
 from handcal.station.doctor import Finding, Health
-from handcal.types import EYES, Eye
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip

@@ -14,7 +14,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.rig_types import PART_NAMES, Rig
+from handcal.core.types import UInt8
 from handcal.io.images import write_png
 from handcal.io.resources import resource_path
 from handcal.rig.board import DICTIONARIES, Board, BoardKind
@@ -22,9 +24,7 @@ from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.compare import compare_rigs
 from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import PART_NAMES, Rig
 from handcal.station.doctor import Finding, Health
-from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -8,13 +8,13 @@ from functools import partial
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.types import Eye
 from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.choose import ALIKE
 from handcal.rig.grid import Grid, draw_grid, grid_on
 from handcal.station.doctor import Finding, Health
-from handcal.types import Eye
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, make_linked, number, whole_number

@@ -12,12 +12,12 @@ from typing import Any
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.rig_types import Rig
 from handcal.io.files import read_json, user_path
 from handcal.rig.board import Board
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
-from handcal.rig_types import Rig
 from handcal_gui.translation import tr
 from handcal_gui.windows.rig.project_folder import LastAcceptance, ProjectFolder
 from handcal_gui.windows.rig.solve import SolvedPart

@@ -9,7 +9,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.rig_types import Rig
 from handcal.io.files import make_folder, read_json, user_path, write_json
 from handcal.io.resources import resource_path
 from handcal.io.settings import read_settings, settings_json
@@ -18,7 +19,6 @@ from handcal.rig.camera import LensChoice
 from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.steps import DisplayInputs
-from handcal.rig_types import Rig
 from handcal_gui.translation import tr
 
 Distance: TypeAlias = Literal["measured", "solved"]

@@ -18,12 +18,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.errors import FileError, HandcalError
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.rig_types import PART_NAMES, RIG_PARTS, Rig
 from handcal.io.files import user_path
 from handcal.rig.check import MAX_NAME
 from handcal.rig.report import RigFinding, report_rig
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import PART_NAMES, RIG_PARTS, Rig
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

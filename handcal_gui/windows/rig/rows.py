@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Eye, Float64
 from handcal.rig.assemble import STEREO_PARAMETERS
 from handcal.rig.camera import CameraCalibration
 from handcal.rig.compare import compare_rigs
 from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration
 from handcal.rig.stereo import StereoCalibration
-from handcal.rig_types import Rig
-from handcal.types import EYES, Eye, Float64
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.number_table import Row

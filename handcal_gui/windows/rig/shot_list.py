@@ -26,7 +26,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.types import UInt8
+from handcal.core.types import UInt8
 from handcal_gui.theme import SPACING_PX, flat_header, follow_theme, icon, number_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN

@@ -9,10 +9,10 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import UInt8
 from handcal.rig.board import BoardView
 from handcal.rig.views import BoardImage
-from handcal.types import UInt8
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr

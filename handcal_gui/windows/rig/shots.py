@@ -9,12 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.types import UInt8
 from handcal.io.images import read_image
-from handcal.progress import Progress
 from handcal.rig.board import Board
 from handcal.rig.views import BoardImage, image_files, pair_views, read_views
-from handcal.types import UInt8
 from handcal_gui.translation import tr
 
 _SMALL_PX = 96

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.rig_types import Rig
+from handcal.core.types import Eye
 from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.camera import CameraSettings, calibrate_camera, tilt
@@ -24,8 +26,6 @@ from handcal.rig.steps import (
 from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
 from handcal.rig.views import BoardImage, WorstView
-from handcal.rig_types import Rig
-from handcal.types import Eye
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.project_folder import (

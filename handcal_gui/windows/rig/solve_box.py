@@ -9,8 +9,8 @@ from typing import Any
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from handcal.progress import Progress
-from handcal.rig_types import Origin
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Origin
 from handcal.station.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

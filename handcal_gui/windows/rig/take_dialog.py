@@ -15,7 +15,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.take_board import are_kept, keep_imager, keep_images, see_board
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 from handcal.rig.board import Board, BoardView
 from handcal.rig.choose import ChooseSettings, ViewSelector, variety
 from handcal.rig.views import ASKED_VIEWS, BoardImage, board_image, coverage

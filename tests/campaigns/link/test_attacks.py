@@ -15,15 +15,15 @@ from typing import TypeAlias
 import numpy as np
 import pytest
 
-from handcal.errors import LinkError, PoseError
-from handcal.geometry import rigid
+from handcal.core.errors import LinkError, PoseError
+from handcal.core.geometry import rigid
+from handcal.core.types import HeadsetIdentity
 from handcal.link import greetings, messages, wire
 from handcal.link.client import HeadsetClient
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer
 from handcal.link.transport import Address, UdpTransport
 from handcal.link.wire import Packet, Slot, Welcome
-from handcal.types import HeadsetIdentity
 from tests.helpers import eventually
 
 pytestmark = pytest.mark.campaign

@@ -9,7 +9,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal_gui.autopilot.screenshots import Screenshots
 from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView
 from handcal_gui.widgets.layouts import hbox

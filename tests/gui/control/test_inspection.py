@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import CancelledError
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
 from handcal.export import window_3d
 from handcal.export.outcome import SessionOutcome
-from handcal.progress import Progress
 from handcal.session.session import SessionRecord
 from handcal_gui.control import inspection
 from handcal_gui.preferences import PreferencesFile

@@ -21,8 +21,8 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import CancelledError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
 from handcal.register.results import Results
 from handcal.rig.example import example_rig
 from handcal.session.library import correct_wearer, delete_session

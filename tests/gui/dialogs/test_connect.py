@@ -19,12 +19,12 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.core.rig_types import Rig
+from handcal.core.types import HeadsetIdentity
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer
-from handcal.rig_types import Rig
-from handcal.types import HeadsetIdentity
 from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.qr_code import QrCode

@@ -19,7 +19,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.bridge.bridge import Bridge
 from handcal.bridge.bridges import BridgeSettings
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.closable import Closable
 from handcal.session.facts import SessionFacts
 from handcal.station.states import ProcedureError

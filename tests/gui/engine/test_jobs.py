@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import FileError
-from handcal.progress import Progress
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
 from handcal_gui.engine.jobs import Job
 
 

@@ -8,7 +8,7 @@ import threading
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal_gui.engine.latest_job import LatestJob
 
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
-from handcal.types import UInt8, UInt16
+from handcal.core.types import UInt8, UInt16
 from handcal_gui.widgets.image_view import ImageView, shrink
 
 RED = QColor(255, 0, 0)

@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import FileError
-from handcal.progress import Progress
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
 from handcal_gui.widgets.job_bar import JobBar
 
 

@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraError, CameraTimeoutError
+from handcal.core.errors import CameraError, CameraTimeoutError
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.path_field import PathField

@@ -11,7 +11,7 @@ from PySide6.QtPrintSupport import QPrintDialog, QPrinter
 from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal_gui.widgets.printing import ask_printer, print_pages
 from tests.gui.helpers import text
 

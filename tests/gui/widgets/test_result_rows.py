@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verdict
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.rig_types import Rig
 from handcal.session.judged_trials import EyeTrials, eye_trials
 from handcal.session.record import SessionRecord
 from handcal.session.trial import Trial, make_trial
-from handcal.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verdict
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,

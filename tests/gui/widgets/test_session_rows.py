@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.types import EYES, Alignment, Eye
 from handcal.register.results import Results
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial
-from handcal.types import EYES, Alignment, Eye
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
     STATISTICS_COLUMNS,

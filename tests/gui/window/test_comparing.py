@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 
-from handcal.rig_types import Rig
+from handcal.core.rig_types import Rig
 from handcal.session.session import SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.states import State

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
+from handcal.core.progress import Progress
 from handcal.lab.bench import QUICK
 from handcal.lab.bench.cameras import measure_cameras
-from handcal.progress import Progress
 
 
 def test_each_camera_calibrates_the_same_wearer() -> None:

@@ -2,12 +2,12 @@ from pathlib import Path
 
 import pytest
 
+from handcal.core.types import Intrinsics
 from handcal.lab.bench.offline import OfflineRun, OfflineSettings, calibrate_from_photographs
 from handcal.rig.compare import compare_rigs
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.sim.boards import PictureSettings
-from handcal.types import Intrinsics
 
 # Half the size and a third of the views of what is measured in earnest.
 SMALL = OfflineSettings(

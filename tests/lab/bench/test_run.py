@@ -3,8 +3,8 @@ from typing import Any
 
 import pytest
 
+from handcal.core.progress import Progress
 from handcal.lab.bench import QUICK, bench_table, run_bench
-from handcal.progress import Progress
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.geometry import rigid
+from handcal.core.geometry import rigid
+from handcal.core.progress import Progress
 from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
-from handcal.progress import Progress
 from handcal.rig.example import example_rig
 
 

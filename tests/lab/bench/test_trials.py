@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from handcal.core.progress import Progress
 from handcal.lab.bench.trials import (
     Errors,
     collect_errors,
@@ -9,7 +10,6 @@ from handcal.lab.bench.trials import (
     trial_alignment,
 )
 from handcal.lab.study.trials import floor_error_m, solve_trial
-from handcal.progress import Progress
 from handcal.sim.alignments import AlignmentSettings
 
 SMALL = AlignmentSettings(count=300)

@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.io.images import read_image
 from handcal.lab.evaluate.annotations import Photo, read_annotations
 

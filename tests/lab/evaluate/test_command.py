@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import main
+from handcal.core.types import UInt8
 from handcal.hand.detect import Detections
-from handcal.types import UInt8
 
 
 class Seer:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
 from handcal.lab.evaluate.annotations import Photo
 from handcal.lab.evaluate.conditions import Conditions, shown
 

@@ -3,12 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.display import eye_projection
-from handcal.geometry import image_points, project, rigid, transform
+from handcal.core.display import eye_projection
+from handcal.core.geometry import image_points, project, rigid, transform
+from handcal.core.types import Float64, Intrinsics
 from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.rig.cube import Cube, CubeError, marker_corners_m
 from handcal.rig.example import example_rig
-from handcal.types import Float64, Intrinsics
 
 CUBE = Cube()
 CAMERA = Intrinsics(1280, 720, 1800.0, 1797.0, 644.0, 355.0)

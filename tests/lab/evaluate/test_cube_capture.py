@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraEndError, CancelledError
-from handcal.geometry import rigid
+from handcal.core.errors import CameraEndError, CancelledError
+from handcal.core.geometry import rigid
+from handcal.core.types import Intrinsics, UInt8
 from handcal.io.images import write_png
 from handcal.lab.evaluate.cube_capture import (
     RestWatch,
@@ -26,7 +27,6 @@ from handcal.rig.cube import Cube, CubeError
 from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from handcal.types import Intrinsics, UInt8
 
 CUBE, GRID = Cube(), Grid(640, 360)
 PLAN = CapturePlan(positions=("centre",), poses=1, drawn=("a",))

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.lab.evaluate.cube_folder import CapturePlan, find_captures, missing_captures
 
 

@@ -1,6 +1,7 @@
 import numpy as np
 from matplotlib.figure import Figure as Canvas
 
+from handcal.core.types import Intrinsics
 from handcal.lab.evaluate.cube import CubeMisalignment
 from handcal.lab.evaluate.cube_report import cube_report
 from handcal.lab.evaluate.cube_summary import cube_summary
@@ -8,7 +9,6 @@ from handcal.lab.evaluate.cube_test import CubeTest, cube_row
 from handcal.report.document import Table
 from handcal.report.figures import draw_figure
 from handcal.rig.cube import Cube
-from handcal.types import Intrinsics
 
 CAMERA = Intrinsics(640, 360, 900.0, 900.0, 320.0, 180.0)
 

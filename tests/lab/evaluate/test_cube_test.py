@@ -8,14 +8,15 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from handcal.display import eye_projection
-from handcal.errors import CancelledError, FileError
-from handcal.geometry import image_points, invert, rigid, transform
+from handcal.core.display import eye_projection
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.geometry import image_points, invert, rigid, transform
+from handcal.core.progress import Progress
+from handcal.core.types import Float64, Intrinsics
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.lab.evaluate.cube import CubeMisalignment
 from handcal.lab.evaluate.cube_test import cube_row, display_warp, judge_captures
-from handcal.progress import Progress
 from handcal.rig.cube import Cube, find_cube, marker_corners_m
 from handcal.rig.example import example_rig
 from handcal.rig.grid import Grid, draw_grid
@@ -23,7 +24,6 @@ from handcal.rig.warp import RotationWarp
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
-from handcal.types import Float64, Intrinsics
 
 CUBE = Cube()
 CAMERA = Intrinsics(640, 360, 900.0, 898.5, 322.0, 177.5, (-0.08, 0.05, 0.0004, -0.0003, 0.0))

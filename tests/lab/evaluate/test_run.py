@@ -7,23 +7,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.display import TARGET_DEPTHS_M
-from handcal.errors import CancelledError, FileError, HandcalError
+from handcal.core.display import TARGET_DEPTHS_M
+from handcal.core.errors import CancelledError, FileError, HandcalError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
+from handcal.core.types import EYES
 from handcal.io.images import write_png
 from handcal.lab.evaluate.run import run_cube_test, run_user_test
 from handcal.lab.settings import CubeTestSettings, NoiseStudySettings, UserTestSettings
 from handcal.lab.study.studies import run_noise_study
-from handcal.progress import Progress
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import write_cube
 from handcal.rig.example import example_rig
 from handcal.rig.formats import write_intrinsics
-from handcal.rig_types import Rig
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.cube_captures import CaptureSettings
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA
-from handcal.types import EYES
 
 
 @pytest.fixture

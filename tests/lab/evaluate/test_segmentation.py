@@ -15,7 +15,9 @@ from matplotlib.figure import Figure as Canvas
 
 from handcal.camera.images import write_frame
 from handcal.cli.main import main
-from handcal.errors import CancelledError, FileError, HandError
+from handcal.core.errors import CancelledError, FileError, HandError
+from handcal.core.progress import Progress
+from handcal.core.types import Frame, HandCloud
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.io.images import read_image
@@ -30,9 +32,7 @@ from handcal.lab.evaluate.masked_frames import (
 from handcal.lab.evaluate.run import run_segmentation_test
 from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
 from handcal.lab.settings import SegmentationTestSettings
-from handcal.progress import Progress
 from handcal.sim.camera import simulated_frame
-from handcal.types import Frame, HandCloud
 
 GATE = SegmentSettings()
 KEYS = {

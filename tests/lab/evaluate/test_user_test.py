@@ -12,20 +12,20 @@ import pytest
 from matplotlib.figure import Figure as Canvas
 
 from handcal.cli.main import main
-from handcal.display import TARGET_DEPTHS_M
-from handcal.errors import FileError
+from handcal.core.display import TARGET_DEPTHS_M
+from handcal.core.errors import FileError
+from handcal.core.types import EYES, Float64
 from handcal.lab.evaluate.user_test import UserTest, evaluate_user_test, read_user_test
 from handcal.lab.evaluate.user_test_figures import draw_wearers
 from handcal.lab.evaluate.user_test_report import user_test_report
 from handcal.report.cells import median_quartiles
 from handcal.report.document import Table
+from handcal.report.statistics import mean_interval
 from handcal.rig.example import example_rig
 from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, comparison_json
 from handcal.session.journal import Event
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.statistics import mean_interval
-from handcal.types import EYES, Float64
 
 RIG = example_rig()
 

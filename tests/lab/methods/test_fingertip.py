@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.display import eye_projection
-from handcal.geometry import project
+from handcal.core.display import eye_projection
+from handcal.core.geometry import project
 from handcal.lab.methods.fingertip import solve_eye_from_points
 from handcal.rig.example import example_rig
 

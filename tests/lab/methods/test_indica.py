@@ -3,11 +3,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.display import eye_projection
-from handcal.geometry import rigid
+from handcal.core.display import eye_projection
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64
 from handcal.lab.methods.indica import solve_indica_full, solve_indica_recycled, split_projection
 from handcal.rig.example import example_rig
-from handcal.types import Float64
 
 DISPLAY = example_rig().eyes["right"]
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from handcal.geometry import rigid, transform
+from handcal.core.geometry import rigid, transform
+from handcal.core.types import Float64
 from handcal.lab.methods.mpaam import FEWEST_PAIRS, MapModel, solve_mpaam
-from handcal.types import Float64
 
 CORNERS_M = 0.04 * np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [1, 1, 1]], dtype=float

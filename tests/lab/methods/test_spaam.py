@@ -3,12 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.display import eye_projection
-from handcal.geometry import project, rigid
+from handcal.core.display import eye_projection
+from handcal.core.geometry import project, rigid
+from handcal.core.types import EYES, Float64
 from handcal.lab.methods.spaam import solve_spaam
 from handcal.lab.methods.stereo_spaam import solve_stereo_spaam
 from handcal.rig.example import example_rig
-from handcal.types import EYES, Float64
 
 DISPLAY = example_rig().eyes["left"]
 

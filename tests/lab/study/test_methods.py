@@ -3,8 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.errors import HandcalError
-from handcal.geometry import project
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import project
+from handcal.core.progress import Progress
+from handcal.core.types import EYES
 from handcal.lab.methods.spaam import solve_spaam
 from handcal.lab.study import wearer_noise
 from handcal.lab.study.methods import (
@@ -24,8 +26,6 @@ from handcal.lab.study.run import Case
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.wearer_noise import PAPER_MEAN_ARCMIN, fit_noise
 from handcal.lab.study.wearers import align_cube, align_points
-from handcal.progress import Progress
-from handcal.types import EYES
 
 ERRORLESS = MethodSettings(
     wearers=1,

@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.types import METHODS, Float64
 from handcal.lab.study.noise import (
     ERRORS_MM,
     FLOOR,
@@ -17,7 +18,6 @@ from handcal.lab.study.noise import (
 from handcal.lab.study.run import Case
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE
-from handcal.types import METHODS, Float64
 
 SETTINGS = replace(QUICK_NOISE, hands=1, depth_sigma_m=0.0)
 QUIET = replace(SETTINGS, points=1000, linear_trials=0, paper_trials=0)

@@ -9,7 +9,7 @@ from handcal.lab.study.noise import ERRORS_MM, HANDS, QUICK_NOISE
 from handcal.lab.study.noise_report import LINE_MM, noise_report
 from handcal.lab.study.store import StudyRow
 from handcal.report.document import Report, Table
-from handcal.statistics import mean_interval
+from handcal.report.statistics import mean_interval
 
 ANGLES = 0.0, 5.0, 9.0, 10.0, 20.0
 SETTINGS = replace(QUICK_NOISE, coarse_deg=(0.0, 5.0, 10.0, 20.0), fine_deg=(0.0, 5.0, 9.0))

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import main
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.types import EYES, Eye
 from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study.procedure_trial import ProcedureModel, lead_through
 from handcal.lab.study.procedures import (
@@ -24,7 +25,6 @@ from handcal.register.placement import PlacementSettings
 from handcal.sim.hand import HandSettings, Side, make_hand
 from handcal.sim.people import begin_sitting
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.types import EYES, Eye
 
 MODEL = ProcedureModel(points=500)
 SETTINGS = ProcedureSettings(3, MODEL)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import main
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.lab.study.methods import MethodSettings
 from handcal.lab.study.recorded import evaluate_recordings, read_recordings
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import CancelledError, FileError, HandcalError
+from handcal.core.errors import CancelledError, FileError, HandcalError
+from handcal.core.progress import Progress
 from handcal.lab.study.run import Case, Study, run_study, share_done
 from handcal.lab.study.store import StudyRow
-from handcal.progress import Progress
 from tests.helpers import ROOT
 
 CASES, MIDDLE = 90, 45

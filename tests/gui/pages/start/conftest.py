@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 from handcal.station.doctor import Finding, Health
 from handcal.station.preflight import PARTS, Part
 from handcal.station.settings import StationSettings

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.types import EYES
 from handcal.session.session import Session
-from handcal.types import EYES
 from handcal_gui.pages.start.example import copy_example
 
 

@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtWidgets import QComboBox, QPushButton
 from pytestqt.qtbot import QtBot
 
+from handcal.core.types import EYES
 from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
-from handcal.types import EYES
 from handcal_gui.pages.start.plan_field import PlanField
 from handcal_gui.preferences import Preferences, PreferencesFile
 from handcal_gui.program import Program

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
+from handcal.core.types import Alignment
 from handcal.io.lock import FileLock
 from handcal.rig.example import example_rig
 from handcal.session.library import EyeOutcome
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
 from handcal.session.state import VERIFYING
-from handcal.types import Alignment
 from handcal_gui.pages.start.session_entries import find_sessions
 from tests.gui.views import VERIFIED
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.types import UInt8
+from handcal.core.types import UInt8
 from handcal_gui.panels.camera.depth_scale import DepthColors, DepthLegend
 
 GATE_M = (0.35, 0.70)

@@ -11,8 +11,8 @@ from PySide6.QtGui import QAction, QImage
 from PySide6.QtWidgets import QComboBox, QFileDialog, QLabel, QMessageBox, QToolButton
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import FileError
-from handcal.geometry import rigid
+from handcal.core.errors import FileError
+from handcal.core.geometry import rigid
 from handcal.hand.settings import SegmentSettings
 from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.camera.depth_scale import DepthLegend

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.rig_types import Rig
+from handcal.core.rig_types import Rig
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal_gui.panels.fine_tune.history import Shifts

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.types import Eye
+from handcal.core.types import Eye
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 
 Show = Callable[..., None]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.types import EYES, Eye
+from handcal.core.types import EYES, Eye
 from handcal_gui.panels.fine_tune.history import ShiftHistory, Shifts, moved, same_shifts
 
 LIMIT_M = 0.03

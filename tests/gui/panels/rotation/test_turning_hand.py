@@ -5,7 +5,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 from scipy.spatial.transform import Rotation
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 from handcal_gui.panels.rotation.turning_hand import TurningHand
 
 NEAREST = {"x": (0, 0, -1), "y": (0, 0, -1), "z": (0, -1, 0)}

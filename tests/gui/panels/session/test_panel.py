@@ -17,14 +17,14 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.core.rig_types import Rig
+from handcal.core.types import EyeDistance
 from handcal.register.results import Results
-from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
-from handcal.types import EyeDistance
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.record_table import RecordTable

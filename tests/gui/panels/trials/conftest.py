@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.rig_types import Rig
+from handcal.core.rig_types import Rig
+from handcal.core.types import Eye
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.types import Eye
 from handcal_gui.panels.trials.panel import TrialsPanel
 from tests.gui.helpers import show
 

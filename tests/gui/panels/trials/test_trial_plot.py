@@ -7,10 +7,10 @@ from PySide6.QtWidgets import (
     QTabWidget,
 )
 
-from handcal.rig_types import Rig
+from handcal.core.rig_types import Rig
+from handcal.core.types import Eye
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.types import Eye
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.panels.trials.trial_plot import TrialPlot
 from handcal_gui.widgets.number_table import NumberTable

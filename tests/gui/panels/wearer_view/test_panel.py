@@ -7,11 +7,11 @@ from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QApplication, QCheckBox, QLabel
 from pytestqt.qtbot import QtBot
 
+from handcal.core.types import EYES, Eye
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
 from handcal.station.states import State
 from handcal.station.wearer_view import EyeView
-from handcal.types import EYES, Eye
 from handcal_gui.pages.wizard.picture import GuidePicture
 from handcal_gui.pages.wizard.view import Step
 from handcal_gui.panels.wearer_view.eye_canvas import EyeCanvas

@@ -12,12 +12,12 @@ import pytest
 from matplotlib.axes import Axes
 from PySide6.QtWidgets import QWidget
 
-from handcal.errors import HandcalError
+from handcal.core.errors import HandcalError
+from handcal.core.progress import Progress
 from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.studies import StudyResult, run_and_report
-from handcal.progress import Progress
 from handcal.report.document import Column, Figure, Report, Section, Table
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import whole_number

@@ -16,8 +16,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import CameraError
-from handcal.geometry import rigid
+from handcal.core.errors import CameraError
+from handcal.core.geometry import rigid
+from handcal.core.types import Intrinsics, UInt8
 from handcal.rig.cube import Cube
 from handcal.rig.cube_file import write_cube
 from handcal.rig.example import example_rig
@@ -25,7 +26,6 @@ from handcal.rig.formats import write_intrinsics
 from handcal.rig.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
-from handcal.types import Intrinsics, UInt8
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras

@@ -9,7 +9,9 @@ import pytest
 from PySide6.QtWidgets import QSpinBox
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.rig_types import Rig
 from handcal.lab.evaluate.cube_folder import CapturePlan
 from handcal.lab.settings import (
     MethodComparisonSettings,
@@ -20,8 +22,6 @@ from handcal.lab.study.methods import QUICK_METHODS, MethodSettings
 from handcal.lab.study.noise import QUICK_NOISE
 from handcal.lab.study.store import StudyFolder
 from handcal.lab.study.studies import noise_cases, run_method_comparison, run_noise_study
-from handcal.progress import Progress
-from handcal.rig_types import Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries

@@ -13,9 +13,9 @@ from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.errors import CameraError
+from handcal.core.errors import CameraError
+from handcal.core.progress import Progress
 from handcal.link.pairing import Pairings
-from handcal.progress import Progress
 from handcal.station.cube_tracking import CubeSight, CubeTracking, TrackingOrder, track_cube
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView

@@ -14,15 +14,15 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QTableWidget, QWidget
 from pytestqt.qtbot import QtBot
 
-from handcal.display import eye_projection
-from handcal.errors import HandcalError
-from handcal.geometry import project
-from handcal.progress import Progress
+from handcal.core.display import eye_projection
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import project
+from handcal.core.progress import Progress
+from handcal.core.types import Float64
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import Trial
 from handcal.station.user_test import StudyLeader, TrialOrder
-from handcal.types import Float64
 from handcal_gui.evaluation_entries import UserEntries
 from handcal_gui.windows.evaluation.trials_dialog import STEP_M, TrialsDialog
 from tests.gui.helpers import letters

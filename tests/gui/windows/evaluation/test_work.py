@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from handcal.errors import CancelledError, FileError
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.progress import Progress
 from handcal.lab.evaluate.run import UserTestRun
 from handcal.lab.settings import NoiseStudySettings
 from handcal.lab.study.run import run_study
-from handcal.progress import Progress
 from handcal.report.document import Report
 from handcal.report.write import write_report
 from handcal_gui.evaluation_entries import UserEntries

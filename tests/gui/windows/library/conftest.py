@@ -12,9 +12,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QInputDialog, QPushButton, QTableView
 from pytestqt.qtbot import QtBot
 
+from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
-from handcal.types import Alignment
 from handcal_gui.windows.library.window import LibraryWindow
 from tests.gui.helpers import child, text
 

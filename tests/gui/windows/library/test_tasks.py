@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 from handcal_gui.windows.library.tasks import check_sessions, delete_sessions
 
 

@@ -14,11 +14,11 @@ import pytest
 from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
+from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.rig import board_finder
 from handcal.rig.board import Board, Int64
 from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_photographs
-from handcal.types import Float64, Intrinsics, UInt8
 from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,
     ProjectFolder,

@@ -19,10 +19,10 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
+from handcal.core.rig_types import Origin
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
-from handcal.rig_types import Origin
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.rig.board_page import BoardPage
 from handcal_gui.windows.rig.project import RigProject

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.errors import FileError
+from handcal.core.errors import FileError
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
 from handcal_gui.windows.rig.project_folder import (

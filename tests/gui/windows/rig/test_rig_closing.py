@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.progress import Progress
+from handcal.core.progress import Progress
 from handcal_gui.windows.rig.project_folder import ProjectFolder
 from handcal_gui.windows.rig.solve_box import SolveBox
 from handcal_gui.windows.rig.wizard import RigWizard

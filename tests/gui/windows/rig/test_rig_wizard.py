@@ -25,11 +25,11 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.core.rig_types import Origin
 from handcal.rig.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.formats import write_intrinsics
 from handcal.rig.rig_file import read_rig
-from handcal.rig_types import Origin
 from handcal_gui.theme import colors, icon
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.job_bar import JobBar

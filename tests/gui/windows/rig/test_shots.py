@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from handcal.camera.take_board import keep_images
-from handcal.errors import CancelledError, FileError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError, FileError
+from handcal.core.progress import Progress
 from handcal.rig.views import ViewsError
 from handcal_gui.windows.rig.shots import excluding, look
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from handcal.cli.main import parse
-from handcal.display import view_of_eye
-from handcal.errors import HandcalError
-from handcal.geometry import invert, rigid
+from handcal.core.display import view_of_eye
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import invert, rigid
 from handcal.io.files import write_json
 from handcal.rig.assemble import screen_of
 from handcal.rig.example import example_rig

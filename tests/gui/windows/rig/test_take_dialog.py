@@ -25,7 +25,7 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
-from handcal.errors import CameraError
+from handcal.core.errors import CameraError
 from handcal.rig.choose import ALIKE, ChooseSettings
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.image_view import ImageView

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from handcal.geometry import (
+from handcal.core.geometry import (
     camera_matrix,
     interpolate_pose,
     invert,
@@ -15,7 +15,7 @@ from handcal.geometry import (
     rotation_vector,
     transform,
 )
-from handcal.types import Float64, Intrinsics
+from handcal.core.types import Float64, Intrinsics
 
 COORDINATE = st.floats(-3, 3, allow_subnormal=False)
 VECTORS = st.tuples(COORDINATE, COORDINATE, COORDINATE)

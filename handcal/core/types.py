@@ -17,7 +17,7 @@ from typing import Literal, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.frozen import brief, freeze, html_table, readonly
+from handcal.core.frozen import brief, freeze, html_table, readonly
 
 Float64: TypeAlias = NDArray[np.float64]
 Float32: TypeAlias = NDArray[np.float32]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from handcal.types import Float64
+from handcal.core.types import Float64
 
 # Fewer clusters than this do not determine the skewness.
 _FEWEST_FOR_SKEWNESS = 10

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.display import (
+from handcal.core.display import (
     arcmin_from_px,
     as_shifts,
     effect_at,
@@ -16,10 +16,10 @@ from handcal.display import (
     update_matrix,
     view_of_eye,
 )
-from handcal.geometry import project, rigid, transform
+from handcal.core.geometry import project, rigid, transform
+from handcal.core.rig_types import EyeDisplay
+from handcal.core.types import Float64
 from handcal.rig.example import example_rig
-from handcal.rig_types import EyeDisplay
-from handcal.types import Float64
 
 DISPLAY = example_rig().eyes["right"]
 SHIFTS = st.tuples(*[st.floats(-0.02, 0.02)] * 3)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from handcal.conventions import (
+from handcal.core.conventions import (
     Pose,
     opengl_projection,
     opengl_transform,
@@ -13,10 +13,10 @@ from handcal.conventions import (
     unity_transform,
     unity_world_to_camera,
 )
-from handcal.display import projection_matrix, update_matrix
-from handcal.geometry import invert, project, rigid, transform
+from handcal.core.display import projection_matrix, update_matrix
+from handcal.core.geometry import invert, project, rigid, transform
+from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.rig.example import example_rig
-from handcal.types import EYES, Eye, Float64, Projection
 
 WIDTH_PX, HEIGHT_PX = 200, 100
 HALF = np.sqrt(0.5)  # sine and cosine of 45°

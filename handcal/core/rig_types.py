@@ -1,6 +1,6 @@
 """The offline calibration of a headset, as the rig file holds it.
 
-Frames and axes are those of `handcal.types`.
+Frames and axes are those of `handcal.core.types`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.frozen import brief, freeze
-from handcal.types import EYES, CameraIdentity, Eye, Float64, HeadsetIdentity, Intrinsics
+from handcal.core.frozen import brief, freeze
+from handcal.core.types import EYES, CameraIdentity, Eye, Float64, HeadsetIdentity, Intrinsics
 
 RigPart: TypeAlias = Literal["left", "right", "T_H_D"]
 RIG_PARTS: tuple[RigPart, ...] = ("left", "right", "T_H_D")

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.random import Generator
 
-from handcal.statistics import mean_interval, summarise, variance_components
-from handcal.types import Float64
+from handcal.core.types import Float64
+from handcal.report.statistics import mean_interval, summarise, variance_components
 
 STUDIES = 1000
 # Three standard deviations of a share of 1,000 about 0.95 are 0.021.

@@ -2,8 +2,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.errors import CancelledError
-from handcal.progress import Progress
+from handcal.core.errors import CancelledError
+from handcal.core.progress import Progress
 
 shares = st.floats(0.0, 1.0)
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.types import Float64, Intrinsics
+from handcal.core.types import Float64, Intrinsics
 
 _ROTATION_TOLERANCE = 1e-5
 

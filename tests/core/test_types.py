@@ -3,11 +3,11 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
-from handcal.frozen import readonly
-from handcal.geometry import rigid
+from handcal.core.frozen import readonly
+from handcal.core.geometry import rigid
+from handcal.core.rig_types import Rig
+from handcal.core.types import Alignment, Eye, Frame, Intrinsics, Projection
 from handcal.rig.example import example_rig
-from handcal.rig_types import Rig
-from handcal.types import Alignment, Eye, Frame, Intrinsics, Projection
 
 INTRINSICS = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from handcal.errors import CancelledError
+from handcal.core.errors import CancelledError
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""The vocabulary that every package uses: values, errors, geometry and the display model."""
