@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from handcal.calibration.states import CalibrationSettings
 from handcal.core.display import TARGET_DEPTHS_M
 from handcal.core.types import EYES, Alignment, Eye, Float64
 from handcal.io.settings import settings_json
@@ -16,7 +17,6 @@ from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.states import CalibrationSettings
 
 TARGET = Path(__file__).parents[1] / "resources/example_session"
 SEED = 3

@@ -14,9 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import handcal
+from handcal.calibration.states import Observation, State
 from handcal.cli.terminal import errors_in_one_line
 from handcal.station.settings import StationSettings
-from handcal.station.states import Observation, State
 from handcal.station.station import Station
 
 LIMIT_S, LEAST_STEPS = 60.0, 300

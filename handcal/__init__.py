@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from handcal.calibration.solve_again import solve
     from handcal.camera.images import read_frame
     from handcal.core.conventions import to_opengl, to_openxr, to_unity
     from handcal.core.display import projections, update_matrix
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from handcal.register.solve import solve_eye_shift
     from handcal.rig.rig_file import read_rig, write_rig
     from handcal.session.session import open_session
-    from handcal.station.solve_again import solve
 
     __version__: str
 

@@ -24,6 +24,7 @@ import numpy as np
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
+from handcal.calibration.states import State
 from handcal.camera.camera import Camera
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
@@ -36,7 +37,6 @@ from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.app import keep_window_quick, use_english_capitals
 from handcal_gui.engine.garbage import collect_in_this_thread

@@ -14,13 +14,13 @@ from typing import Any, Literal, Self, TypeAlias, get_type_hints
 from PySide6.QtCore import QObject, QStandardPaths, Signal
 
 from handcal.bridge.bridges import BridgeSettings
+from handcal.calibration.plan import PlanSettings
 from handcal.core.errors import FileError
 from handcal.core.types import EyePlan
 from handcal.export.export import ExportSettings
 from handcal.io.files import make_folder, read_json, write_json
 from handcal.io.settings import read_settings, settings_json
 from handcal.link.pairing import Pairings
-from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.evaluation_entries import EvaluationEntries
 from handcal_gui.translation import tr

@@ -11,9 +11,9 @@ from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMessageBox
 
+from handcal.calibration.plan import with_eyes
 from handcal.core.errors import FileError
 from handcal.session.session import Session
-from handcal.station.plan import with_eyes
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui import FIRST_SIZE_PX

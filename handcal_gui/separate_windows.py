@@ -19,7 +19,7 @@ from handcal.export.many import Exported, export_sessions
 from handcal.link.server import HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import SessionRecord
-from handcal.station.support import SupportSettings
+from handcal.station.checks.support import SupportSettings
 from handcal_gui.control.inspection import Inspection
 from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController

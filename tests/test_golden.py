@@ -20,6 +20,8 @@ import matplotlib.font_manager  # noqa: F401 - at its first import it starts a p
 import numpy as np
 import pytest
 
+from handcal.calibration.solve_again import solve_again
+from handcal.calibration.states import CalibrationSettings
 from handcal.core.display import projection_matrix
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, METHODS, Alignment, Eye, Float64
@@ -41,8 +43,6 @@ from handcal.sim.render import World
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.solve_again import solve_again
-from handcal.station.states import CalibrationSettings
 from tests.helpers import DATA
 
 GOLDEN = DATA / "golden.json"

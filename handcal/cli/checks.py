@@ -18,7 +18,7 @@ from handcal.core.errors import HandcalError
 
 if TYPE_CHECKING:
     from handcal.core.progress import Progress
-    from handcal.station.doctor import Finding
+    from handcal.station.checks.doctor import Finding
 
 
 @command(
@@ -71,7 +71,7 @@ def bench(arguments: argparse.Namespace) -> None:
 )
 def doctor(arguments: argparse.Namespace) -> None:
     """Check the installation, the camera and the headset, with advice for each problem."""
-    from handcal.station.doctor import Health, examine
+    from handcal.station.checks.doctor import Health, examine
 
     if arguments.stamps and not (arguments.headset and arguments.rig):
         fail("--stamps needs --headset and --rig; see handcal doctor --help", 2)
@@ -98,7 +98,7 @@ def doctor(arguments: argparse.Namespace) -> None:
 )
 def support(arguments: argparse.Namespace) -> None:
     """Write one file for a bug report: doctor, versions, log without names, frames if wanted."""
-    from handcal.station.support import default_settings, run_support
+    from handcal.station.checks.support import default_settings, run_support
 
     settings = default_settings()
     sessions = tuple(arguments.sessions or ())
@@ -115,7 +115,7 @@ def _headset_findings(arguments: argparse.Namespace) -> list[Finding]:
     from handcal.cli.cameras import open_source
     from handcal.link.server import HeadsetServer
     from handcal.rig.rig_file import read_rig
-    from handcal.station.doctor import examine_headset
+    from handcal.station.checks.doctor import examine_headset
 
     pairings = paired_headsets(arguments.keys)
     if not pairings.all:

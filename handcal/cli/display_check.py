@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from handcal.core.types import Eye
     from handcal.link.server import HeadsetServer
     from handcal.rig.display_check import Probe
-    from handcal.station.display_check import Answer, Observe, Show
+    from handcal.station.checks.display_check import Answer, Observe, Show
 
 _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-plane"
 
@@ -59,7 +59,7 @@ def display_check(arguments: argparse.Namespace) -> None:
     from handcal.core.types import EYES
     from handcal.rig.report import display_finding
     from handcal.rig.rig_file import read_rig, write_rig
-    from handcal.station.display_check import run_display_check
+    from handcal.station.checks.display_check import run_display_check
 
     rig = read_rig(arguments.rig)
     eyes = EYES if arguments.eyes == "both" else (arguments.eyes,)
@@ -89,7 +89,7 @@ def _simulated(rig: Rig, mode: str) -> Iterator[tuple[HeadsetServer, Observe]]:
     from handcal.link.pairing import new_device_id, new_pairing_key
     from handcal.link.server import HeadsetServer
     from handcal.sim.display import DISPLAY_MODES, SimulatedDisplay
-    from handcal.station.display_check import by_camera
+    from handcal.station.checks.display_check import by_camera
 
     key = new_pairing_key().encode()
     identity = HeadsetIdentity(new_device_id(), "Simulated display", "simulator", mode)
@@ -119,7 +119,7 @@ def network_server(arguments: argparse.Namespace) -> Iterator[HeadsetServer]:
 @contextmanager
 def _observer(viewpoint: str | None) -> Iterator[Observe]:
     from handcal.camera.viewpoint import open_viewpoint
-    from handcal.station.display_check import by_camera, by_wearer
+    from handcal.station.checks.display_check import by_camera, by_wearer
 
     if viewpoint is None:
         yield by_wearer(_ask)

@@ -38,10 +38,10 @@ def solve(arguments: argparse.Namespace) -> None:
     """Solve a stored session again; the session itself is not changed."""
     import numpy as np
 
+    from handcal.calibration import solve_again
     from handcal.core.types import EyeDistance
     from handcal.register.results import results_json
     from handcal.session.session import Session
-    from handcal.station import solve_again
 
     eye_distance = None
     if arguments.eye_distance_mm is not None:
@@ -173,12 +173,12 @@ def prior(arguments: argparse.Namespace) -> None:
 
     import numpy as np
 
+    from handcal.calibration.lab_prior import run_learn_prior
     from handcal.core.errors import FileError
     from handcal.core.types import EYES
     from handcal.io.resources import resource_path
     from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior, eye_slice
     from handcal.rig.rig_file import read_rig
-    from handcal.station.lab_prior import run_learn_prior
 
     if not arguments.folder.is_dir():
         raise FileError(f"{arguments.folder} is not a folder; choose the one that holds sessions")

@@ -8,13 +8,13 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from handcal.calibration.solve_again import solve_again, stored_solve_settings
 from handcal.core.display import projection_matrix
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.register.results import Results, SolveSettings
 from handcal.session.session import SessionRecord
 from handcal.session.trial import SAME_SHIFT_M
-from handcal.station.solve_again import solve_again, stored_solve_settings
 
 ShiftOrigin: TypeAlias = Literal["fine_tuned", "solved", "offline"]
 

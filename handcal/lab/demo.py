@@ -15,6 +15,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from handcal.calibration.evidence import Contradiction
+from handcal.calibration.former import SLIP_M
+from handcal.calibration.plan import PlanSettings, with_eyes
+from handcal.calibration.procedure import Calibration
+from handcal.calibration.states import Observation
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
@@ -26,15 +31,10 @@ from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import Side
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.evidence import Contradiction
 from handcal.station.faults import Fault
 from handcal.station.follow import Patience, deliver, follow_plan
-from handcal.station.former import SLIP_M
-from handcal.station.plan import PlanSettings, with_eyes
-from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import Observation
 from handcal.station.station import Station
 
 # A slow computer gets more time.

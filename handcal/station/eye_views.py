@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handcal.calibration.hands import PlacedHand
+from handcal.calibration.procedure import Calibration
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, transform
 from handcal.core.rig_types import Rig
@@ -16,8 +18,6 @@ from handcal.sim.eyes import TrueEyes
 from handcal.sim.scene import SceneState
 from handcal.sim.simulation import Simulation
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.hands import PlacedHand
-from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.wearer_view import EyeView, render_eye_view
 

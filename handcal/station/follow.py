@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from handcal.calibration.plan import StepName
 from handcal.core.errors import CancelledError, HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import Eye
-from handcal.station.plan import StepName
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 

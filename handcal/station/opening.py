@@ -7,6 +7,10 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
+from handcal.calibration.former import Former
+from handcal.calibration.lab_prior import run_learn_prior
+from handcal.calibration.plan import PlanSettings
+from handcal.calibration.solve_again import stored_solve_settings
 from handcal.camera.camera import Camera
 from handcal.camera.live import open_hololens2, open_live
 from handcal.camera.realsense import RealSenseCamera
@@ -24,11 +28,7 @@ from handcal.session.state import SessionEvent
 from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
-from handcal.station.former import Former
-from handcal.station.lab_prior import run_learn_prior
-from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
-from handcal.station.solve_again import stored_solve_settings
 
 _FIRST_FILES = {"alignments", "rig.yaml", "settings.json", JOURNAL, JOURNAL_END, "lock"}
 _FIRST_EVENTS = {SessionEvent.CREATED, SessionEvent.FACTS_SAVED, SessionEvent.FINE_TUNED}

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from handcal.calibration.plan import PlanSettings, with_eyes
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import EyePlan, PlanName
 from handcal.link.pairing import Pairings
-from handcal.station.doctor import Health
+from handcal.station.checks.doctor import Health
+from handcal.station.checks.preflight import check_station
 from handcal.station.follow import Patience, deliver, follow_plan
-from handcal.station.plan import PlanSettings, with_eyes
-from handcal.station.preflight import check_station
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from handcal.calibration.plan import PlanSettings
+from handcal.calibration.states import CalibrationSettings
 from handcal.camera.hololens2 import hololens2_settings
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
@@ -13,8 +15,6 @@ from handcal.io.files import user_path
 from handcal.io.resources import resource_path
 from handcal.sim.hand import Side
 from handcal.station.faults import Fault
-from handcal.station.plan import PlanSettings
-from handcal.station.states import CalibrationSettings
 
 Source = Literal["simulator", "recording", "realsense", "hololens2", "oak", "orbbec"]
 HeadsetKind = Literal["virtual", "network"]

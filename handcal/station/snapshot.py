@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from handcal.calibration.plan import NextStep, PlanSettings
+from handcal.calibration.procedure import Procedure
+from handcal.calibration.states import CalibrationSettings, Observation
 from handcal.camera.feed import CameraStatus
 from handcal.core.types import Eye, Frame
 from handcal.link.statistics import LinkStatistics
 from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
-from handcal.station.plan import NextStep, PlanSettings
-from handcal.station.procedure import Procedure
-from handcal.station.states import CalibrationSettings, Observation
 from handcal.station.wearer_view import EyeView
 
 

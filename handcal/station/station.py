@@ -11,6 +11,12 @@ from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from handcal.calibration.former import Former, read_former
+from handcal.calibration.hands import PlacedHand
+from handcal.calibration.plan import NextStep, Plan, StepName
+from handcal.calibration.procedure import Calibration
+from handcal.calibration.states import Observation, ProcedureError, State
+from handcal.calibration.verifying import skipped_eyes
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
 from handcal.core.errors import FileError, LinkError
@@ -25,23 +31,17 @@ from handcal.rig.rig_file import read_rig
 from handcal.session.state import Kind
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
+from handcal.station.checks.headset import link_problem
 from handcal.station.eye_views import EyeViews
-from handcal.station.former import Former, read_former
-from handcal.station.hands import PlacedHand
-from handcal.station.headset import link_problem
 from handcal.station.opening import (
     open_camera,
     plan_of_session,
     resume_or_create,
     start_headset,
 )
-from handcal.station.plan import NextStep, Plan, StepName
-from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import Observation, ProcedureError, State
-from handcal.station.trials import Trials
-from handcal.station.verifying import skipped_eyes
+from handcal.station.user_test.trials import Trials
 from handcal.station.weak import weakly
 
 _STORE_PERIOD_S = 1.0

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
+from handcal.calibration.procedure import Calibration
+from handcal.calibration.states import State
 from handcal.core.errors import FileError
-from handcal.station.procedure import Calibration
-from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.docks import Panels
 from handcal_gui.engine.engine_thread import Command

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from PySide6.QtCore import QObject
 
+from handcal.calibration.solve_again import solve_again
 from handcal.core.progress import Progress
 from handcal.core.types import Method
 from handcal.register.results import SolveSettings
 from handcal.session.session import SessionRecord
-from handcal.station.solve_again import solve_again
 from handcal_gui.engine.jobs import Job
 from handcal_gui.panels.results.panel import ResultsPanel
 

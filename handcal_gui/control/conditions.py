@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 
+from handcal.calibration.states import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import Observation
 from handcal_gui.translation import tr
 
 _LASTS_S = 0.8

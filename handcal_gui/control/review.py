@@ -8,12 +8,12 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
+from handcal.calibration.solve_again import solve_again, stored_solve_settings
 from handcal.core.progress import Progress
 from handcal.core.types import Eye
 from handcal.register.results import Results, SolveSettings
 from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord
-from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal_gui.control.compare import Comparison
 from handcal_gui.engine.jobs import Job
 from handcal_gui.engine.latest_job import LatestJob

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QWidg
 from handcal.export.export import ExportSettings
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.io.files import require_writable, user_path
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.export.many import Exported
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX, icon
 from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel

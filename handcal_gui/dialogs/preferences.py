@@ -8,8 +8,8 @@ from PySide6.QtGui import QHideEvent, QIcon, QShowEvent
 from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDialogButtonBox, QWidget
 
 from handcal.bridge.bridges import BridgeSettings
-from handcal.station.doctor import Finding, Health
-from handcal.station.preflight import check_sessions, gate_problem
+from handcal.station.checks.doctor import Finding, Health
+from handcal.station.checks.preflight import check_sessions, gate_problem
 from handcal.station.settings import StationSettings
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.preferences import Preferences, Theme

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QDialog, QFormLayout, QWidget
 
 from handcal.core.progress import Progress
 from handcal.io.files import require_writable, user_path
-from handcal.station.doctor import Finding, Health
-from handcal.station.support import SupportSettings, run_support
+from handcal.station.checks.doctor import Finding, Health
+from handcal.station.checks.support import SupportSettings, run_support
 from handcal_gui.engine.jobs import Job
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX

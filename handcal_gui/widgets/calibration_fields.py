@@ -9,10 +9,10 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
+from handcal.calibration.states import CalibrationSettings
 from handcal.core.types import Method
 from handcal.hand.settings import Roi
-from handcal.station.doctor import Finding
-from handcal.station.states import CalibrationSettings
+from handcal.station.checks.doctor import Finding
 from handcal_gui.theme import SPACING_PX, scale_font
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice, label_for, number

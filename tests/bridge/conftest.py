@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.calibration.hands import PlacedHand
+from handcal.calibration.procedure import Procedure
+from handcal.calibration.states import Observation, State
 from handcal.camera.feed import CameraStatus
 from handcal.core.geometry import rigid, transform
 from handcal.core.types import Eye, Float64, HandCloud
 from handcal.link.statistics import LinkStatistics
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
-from handcal.station.hands import PlacedHand
-from handcal.station.procedure import Procedure
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import Observation, State
 
 POINTS_D_M = (
     np.random.default_rng(0)

@@ -12,12 +12,12 @@ import pytest
 
 from handcal.bridge.bridge import Bridge
 from handcal.bridge.lsl import LslOutput, events
+from handcal.calibration.states import State
 from handcal.core.types import Alignment
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.journal import Event
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 
 pylsl = pytest.importorskip("pylsl")
 

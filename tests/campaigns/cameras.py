@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
+from handcal.calibration.states import State
 from handcal.camera.camera import Camera
 from handcal.core.errors import CameraError, CameraTimeoutError, HandcalError
 from handcal.core.types import EYES, Frame
 from handcal.io.closable import Closable
 from handcal.station.settings import StationSettings
-from handcal.station.states import State
 from handcal.station.station import Station
 from tests.campaigns.campaign import Tally, campaign
 from tests.helpers import write_small_rig

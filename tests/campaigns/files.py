@@ -51,7 +51,7 @@ IMPORTED = (
     *(f"handcal.cli.{name}" for name in ("cameras", "evaluate", "rig", "rig_files", "sessions")),
     "handcal.camera.playback", "handcal.cli.replay", "handcal.cli.rig_displays",
     "handcal.cli.simulate", "handcal.export.export", "handcal.hand.shipped",
-    "handcal.station.solve_again",
+    "handcal.calibration.solve_again",
 )  # fmt: skip
 Words: TypeAlias = "list[str] | Callable[[], object]"
 Case: TypeAlias = Callable[[Path, random.Random], Words]

@@ -14,10 +14,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from statistics import fmean
 
+from handcal.calibration.states import State
 from handcal.core.errors import HandcalError
 from handcal.core.types import EYES
 from handcal.station.settings import StationSettings
-from handcal.station.states import State
 from handcal.station.station import Station
 from tests.campaigns.campaign import Tally, campaign
 from tests.helpers import write_small_rig

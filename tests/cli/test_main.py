@@ -22,8 +22,8 @@ from handcal.lab import bench
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
-from handcal.station import doctor
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks import doctor
+from handcal.station.checks.doctor import Finding, Health
 from tests.helpers import write_small_rig
 
 # A shell that starts tests in the background has SIGINT ignored, and so would the program.

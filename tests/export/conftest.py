@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from handcal.calibration.states import CalibrationSettings
 from handcal.core.types import EYES, Alignment, Verification
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.io.settings import settings_json
@@ -12,7 +13,6 @@ from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
-from handcal.station.states import CalibrationSettings
 
 RIG = example_rig()
 VERIFIED = Verification((0.0, 0.0, 0.0), (1.0, -2.0), (0.001, 0.0, 0.0), hand_E_m=(0.0, 0.0, 0.5))

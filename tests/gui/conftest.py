@@ -17,6 +17,10 @@ import pytest
 from PySide6.QtCore import QCoreApplication, QEvent
 from scipy.spatial.transform import Rotation
 
+from handcal.calibration.hands import PlacedHand
+from handcal.calibration.plan import NextStep, StepName
+from handcal.calibration.procedure import Procedure
+from handcal.calibration.states import CalibrationSettings, Observation, State
 from handcal.camera.feed import CameraStatus
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.display import view_of_eye
@@ -48,12 +52,8 @@ from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.sensor import SensorSettings, sense_depth
-from handcal.station.hands import PlacedHand
-from handcal.station.plan import NextStep, StepName
-from handcal.station.procedure import Procedure
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import CalibrationSettings, Observation, State
 from handcal.station.wearer_view import EyeView, render_eye_view
 from tests.helpers import write_small_rig
 

@@ -10,10 +10,10 @@ import pytest
 from PySide6.QtGui import QAction
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.pages.wizard.wizard import WizardPanel
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QStandardPaths
 
+from handcal.calibration.states import CalibrationSettings
 from handcal.core.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.register.guard import GuardSettings
 from handcal.register.placement import PlacementSettings
 from handcal.station.settings import StationSettings
-from handcal.station.states import CalibrationSettings
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
 from handcal_gui.preferences import (
     PREFERENCES_VERSION,

@@ -17,11 +17,11 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.calibration.solve_again import solve_again, stored_solve_settings
 from handcal.core.errors import FileError
 from handcal.core.types import EYES, UInt8
 from handcal.io.closable import Closable
 from handcal.session.session import Session, SessionRecord
-from handcal.station.solve_again import solve_again, stored_solve_settings
 from handcal_gui.pages.start.session_entries import find_sessions
 from tests.helpers import ROOT, Patience, output_of, write_small_rig
 

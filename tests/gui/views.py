@@ -7,6 +7,9 @@ from dataclasses import replace
 from itertools import product
 from typing import Any
 
+from handcal.calibration.plan import NextStep, PlanSettings, StepName
+from handcal.calibration.states import CalibrationSettings, State
+from handcal.calibration.verifying import VerifyingView
 from handcal.core.types import EYES, Eye, Float64, Verdict, VerdictName, Verification
 from handcal.link.nudges import NudgeSum
 from handcal.register.results import SolveSettings
@@ -14,10 +17,7 @@ from handcal.register.verdict import VerdictSettings
 from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import make_trial
-from handcal.station.plan import NextStep, PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import CalibrationSettings, State
-from handcal.station.verifying import VerifyingView
 from handcal_gui.pages.wizard.step_views import save_view
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step, WizardView

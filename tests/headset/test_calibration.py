@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
+from handcal.calibration.states import CalibrationSettings, State
 from handcal.core.progress import Progress
 from handcal.core.types import EYES
 from handcal.io.resources import resource_path
 from handcal.lab.demo import DemoSettings, run_demo
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import CalibrationSettings, State
 from handcal.station.station import Station
 from tests.headset.mono_client import command
 from tests.helpers import Patience

@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typing_extensions import TypeAliasType
 
+from handcal.calibration.states import CalibrationSettings
 from handcal.core.errors import FileError
 from handcal.core.types import Float64
 from handcal.io.settings import read_settings, settings_json
 from handcal.lab.demo import DemoSettings
 from handcal.register.fuse import FuseSettings
-from handcal.station.states import CalibrationSettings
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.calibration.states import CalibrationSettings
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import CancelledError
 from handcal.core.progress import Progress
@@ -23,7 +24,6 @@ from handcal.register.verdict import VerdictSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.states import CalibrationSettings
 
 RIG = example_rig()
 

@@ -8,12 +8,12 @@ from typing import cast
 import numpy as np
 import pytest
 
+from handcal.calibration.hands import PlacedHand
+from handcal.calibration.procedure import Calibration
 from handcal.core.types import EYES, HandCloud
 from handcal.rig.example import example_rig
 from handcal.station import eye_views
 from handcal.station.eye_views import EyeViews
-from handcal.station.hands import PlacedHand
-from handcal.station.procedure import Calibration
 from handcal.station.settings import StationSettings
 
 FRAME_NS = 333_000_000

@@ -15,6 +15,11 @@ import numpy as np
 import pytest
 
 import handcal.station.opening
+from handcal.calibration.former import Former
+from handcal.calibration.plan import PlanSettings
+from handcal.calibration.states import CalibrationSettings, ProcedureError, State
+from handcal.calibration.timing.delay import DelaySettings
+from handcal.calibration.verifying import SKIPPED
 from handcal.core.errors import CameraError, FileError, LinkError
 from handcal.core.types import EYES, Alignment, Eye, Float64, Frame
 from handcal.io.settings import settings_json
@@ -28,16 +33,11 @@ from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.delay import DelaySettings
 from handcal.station.faults import Fault
-from handcal.station.former import Former
 from handcal.station.opening import resume_or_create
-from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import CalibrationSettings, ProcedureError, State
 from handcal.station.station import Station
-from handcal.station.verifying import SKIPPED
 from tests.helpers import Patience, eventually, slow_simulator, write_small_rig
 
 NAIVE_SEED = 3

@@ -20,8 +20,8 @@ from PySide6.QtWidgets import (
 
 from handcal.core.progress import Progress
 from handcal.session.state import MAX_WEARER_CHARACTERS, clean_wearer
-from handcal.station.doctor import Finding, Health
-from handcal.station.preflight import Part, is_ready
+from handcal.station.checks.doctor import Finding, Health
+from handcal.station.checks.preflight import Part, is_ready
 from handcal.station.settings import StationSettings
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.pages.start.card import Card

@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QSizePolicy, QWidget
 
-from handcal.station.preflight import check_station
+from handcal.station.checks.preflight import check_station
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.new_calibration import Check, NewCalibration

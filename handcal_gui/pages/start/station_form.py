@@ -11,8 +11,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
 from handcal.hand.settings import SegmentSettings
-from handcal.station.doctor import Finding, Health
-from handcal.station.preflight import PARTS, Part, gate_problem
+from handcal.station.checks.doctor import Finding, Health
+from handcal.station.checks.preflight import PARTS, Part, gate_problem
 from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.advanced_fields import AdvancedFields
 from handcal_gui.pages.start.camera_field import CameraField

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handcal.calibration.procedure import Procedure
+from handcal.calibration.states import State
+from handcal.calibration.verifying import VerifyingView
 from handcal.core.types import Eye, VerdictName
 from handcal.register.guard import turn_advice
 from handcal.register.results import USED, Results
 from handcal.report.cells import signed
 from handcal.session.session import SessionRecord
-from handcal.station.procedure import Procedure
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
-from handcal.station.verifying import VerifyingView
 from handcal_gui.pages.wizard.preconditions import (
     doubted_eyes,
     eyes_accepted,

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from handcal.calibration.plan import NextStep, StepName
+from handcal.calibration.states import State
 from handcal.core.types import Eye
 from handcal.register.results import USED
-from handcal.station.plan import NextStep, StepName
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.pages.wizard.preconditions import (
     eyes_accepted,
     hand_found,

@@ -9,10 +9,10 @@ from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QAction, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
+from handcal.calibration.plan import PlanSettings
+from handcal.calibration.states import State
 from handcal.core.types import EyePlan
-from handcal.station.plan import PlanSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.keys import add_action
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT, GuidePicture

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.calibration.states import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.core.errors import FileError
 from handcal.core.types import Frame
@@ -24,7 +25,6 @@ from handcal.hand.overlay import contour_px
 from handcal.hand.settings import SegmentSettings
 from handcal.io.files import write_atomic
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import Observation
 from handcal_gui.panels.camera.depth_scale import DepthColors, DepthLegend
 from handcal_gui.panels.camera.hand_overlay import HandOverlay
 from handcal_gui.theme import SPACING_PX, follow_theme, icon

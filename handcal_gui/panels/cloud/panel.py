@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QWidget
 
+from handcal.calibration.hands import PlacedHand
 from handcal.core.geometry import invert, transform
 from handcal.core.types import Alignment, Float64, UInt8
 from handcal.register.pairs import matched_pairs
-from handcal.station.hands import PlacedHand
 from handcal.station.snapshot import Snapshot
 from handcal_gui.keys import add_action
 from handcal_gui.panels.cloud.cloud_view import CloudView

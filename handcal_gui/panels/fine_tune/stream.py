@@ -7,8 +7,8 @@ from enum import Enum
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from handcal.calibration.states import State
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
 from handcal_gui.translation import tr
 

@@ -8,12 +8,12 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
+from handcal.calibration.hands import PlacedHand
+from handcal.calibration.states import Observation, State
 from handcal.core.types import Float64
 from handcal.register.guard import turn_advice
 from handcal.session.record import SessionRecord
-from handcal.station.hands import PlacedHand
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import Observation, State
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.turning_hand import TurningHand
 from handcal_gui.theme import SPACING_PX, scale_font

@@ -15,12 +15,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.calibration.states import State
 from handcal.core.display import TARGET_DEPTHS_M
 from handcal.core.types import EYES, Eye, Float64
 from handcal.session.comparison import read_comparisons
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.keys import add_action
 from handcal_gui.panels.trials.comparison_row import ComparisonRow
 from handcal_gui.panels.trials.trial_plot import TrialPlot

@@ -24,7 +24,7 @@ from handcal.lab.evaluate.run import cube_and_grid, position_warp
 from handcal.rig.cube import Cube
 from handcal.rig.grid import Grid
 from handcal.rig.warp import RotationWarp
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, scale_font

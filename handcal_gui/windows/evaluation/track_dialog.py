@@ -16,8 +16,13 @@ from scipy.spatial.transform import Rotation
 from handcal.core.progress import Progress
 from handcal.core.types import Float64
 from handcal.io.files import user_path
-from handcal.station.cube_tracking import CubeSight, CubeTracking, TrackingOrder, track_cube
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
+from handcal.station.user_test.cube_tracking import (
+    CubeSight,
+    CubeTracking,
+    TrackingOrder,
+    track_cube,
+)
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr

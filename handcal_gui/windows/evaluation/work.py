@@ -19,7 +19,7 @@ from handcal.lab.study.run import RUNNING, Study, share_done
 from handcal.lab.study.store import free_of_studies
 from handcal.lab.study.studies import STUDY_SHARE
 from handcal.report.document import Report
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.translation import tr
 from handcal_gui.windows.evaluation.time_left import TimeLeft
 

@@ -26,7 +26,7 @@ from handcal.rig.board import Board
 from handcal.rig.choose import ALIKE, ChooseSettings
 from handcal.rig.grid import grid_on
 from handcal.rig.rig_file import write_rig
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip

@@ -24,7 +24,7 @@ from handcal.rig.board_print import draw_board, write_board_pdf
 from handcal.rig.compare import compare_rigs
 from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -14,7 +14,7 @@ from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.choose import ALIKE
 from handcal.rig.grid import Grid, draw_grid, grid_on
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.fields import button, choice, make_linked, number, whole_number

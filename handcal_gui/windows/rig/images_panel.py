@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
 from handcal.io.files import user_path
 from handcal.rig.board import Board
 from handcal.rig.views import coverage
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.drawing import Drawing

@@ -24,7 +24,7 @@ from handcal.io.files import user_path
 from handcal.rig.check import MAX_NAME
 from handcal.rig.report import RigFinding, report_rig
 from handcal.rig.rig_file import read_rig
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.core.progress import Progress
 from handcal.core.rig_types import Origin
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import main_button, paragraph

@@ -19,7 +19,7 @@ from handcal.core.progress import Progress
 from handcal.rig.board import Board, BoardView
 from handcal.rig.choose import ChooseSettings, ViewSelector, variety
 from handcal.rig.views import ASKED_VIEWS, BoardImage, board_image, coverage
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

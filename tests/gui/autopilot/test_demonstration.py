@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import pytest
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import CalibrationSettings
 from handcal.session.session import Session
 from handcal.station.settings import StationSettings
-from handcal.station.states import CalibrationSettings
 from handcal_gui.autopilot import autopilot, demonstration, tour
 from handcal_gui.autopilot.demonstration import Demonstration
 from handcal_gui.preferences import PreferencesFile

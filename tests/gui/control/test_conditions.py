@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from handcal.calibration.states import State
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.control.conditions import Conditions
 
 Maker = Callable[..., Snapshot]

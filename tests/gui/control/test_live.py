@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.engine.engine_thread import EngineThread
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.preferences import PreferencesFile

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.solve_again import stored_solve_settings
 from handcal.core.errors import CancelledError
 from handcal.core.progress import Progress
 from handcal.register.results import Results
@@ -28,7 +29,6 @@ from handcal.rig.example import example_rig
 from handcal.session.library import correct_wearer, delete_session
 from handcal.session.record import Replayed, replay
 from handcal.session.session import Session, SessionRecord
-from handcal.station.solve_again import stored_solve_settings
 from handcal_gui.control import review
 from handcal_gui.control.review import _Stored
 from handcal_gui.pages.review_page import ReviewPage
@@ -319,7 +319,7 @@ def test_opening_can_be_cancelled(
     program: Program, qtbot: QtBot, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     solver = Solver()
-    monkeypatch.setattr("handcal.station.solve_again.solve_session", solver)
+    monkeypatch.setattr("handcal.calibration.solve_again.solve_session", solver)
     program.open_session(record.path)
     qtbot.waitUntil(
         lambda: child(program, QProgressDialog, "opening").isVisible(), timeout=PATIENCE_MS

@@ -8,8 +8,8 @@ import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.station import support
-from handcal.station.support import SupportSettings
+from handcal.station.checks import support
+from handcal.station.checks.support import SupportSettings
 from handcal_gui.dialogs.support import SupportDialog
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, text

@@ -19,10 +19,10 @@ from pytestqt.qtbot import QtBot
 
 from handcal.bridge.bridge import Bridge
 from handcal.bridge.bridges import BridgeSettings
+from handcal.calibration.states import ProcedureError
 from handcal.core.errors import FileError
 from handcal.io.closable import Closable
 from handcal.session.facts import SessionFacts
-from handcal.station.states import ProcedureError
 from handcal.station.station import Station
 from handcal_gui.engine.engine_thread import EngineThread
 

@@ -11,9 +11,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.session.session import Session, SessionRecord
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.program import Program
 

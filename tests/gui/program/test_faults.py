@@ -12,9 +12,9 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QMessageBox, QPlainTextEdit, QPushButton
 
+from handcal.calibration.states import State
 from handcal.session.session import Session
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui import launch
 from handcal_gui.pages.wizard.view import Action

@@ -9,10 +9,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPushButton
 
+from handcal.calibration.plan import PlanSettings
+from handcal.calibration.states import State
 from handcal.register.placement import PlacementSettings
-from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
-from handcal.station.states import State
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.widgets.times import session_time
 from tests.gui.helpers import button

@@ -25,11 +25,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.calibration.states import State
 from handcal.core.errors import LinkError
 from handcal.core.types import Float64
 from handcal.export.export import ExportSettings
 from handcal.session.session import Session, SessionRecord
-from handcal.station.states import State
 from handcal.station.station import Station
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.pages.wizard.view import Action

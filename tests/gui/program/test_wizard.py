@@ -12,7 +12,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPlainTextEdit, QPushButton
 
-from handcal.station.states import State
+from handcal.calibration.states import State
 from handcal_gui.pages.wizard.view import Action
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.preferences import PreferencesFile

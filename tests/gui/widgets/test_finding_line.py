@@ -9,7 +9,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
-from handcal.station.doctor import Finding, Health
+from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.widgets.finding_line import FindingLine
 
 

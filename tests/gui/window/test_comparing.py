@@ -10,10 +10,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.rig_types import Rig
 from handcal.session.session import SessionRecord
 from handcal.session.trial import make_trial
-from handcal.station.states import State
 from handcal_gui.program import Program
 from tests.gui.helpers import button, child, letters
 from tests.gui.window.conftest import Maker, press

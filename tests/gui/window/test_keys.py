@@ -23,10 +23,10 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
+from handcal.calibration.verifying import VerifyingView
 from handcal.link.nudges import NudgeSum
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
-from handcal.station.verifying import VerifyingView
 from handcal_gui.keys import keys_by_group
 from handcal_gui.pages.wizard.action_bar import ActionBar
 from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step, WizardView

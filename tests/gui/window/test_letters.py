@@ -24,9 +24,9 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
-from handcal.station.states import State
 from handcal_gui.docks import is_in_sight
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.wizard import result_bar

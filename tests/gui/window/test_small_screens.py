@@ -19,11 +19,11 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.types import EYES, Method, Verdict
 from handcal.register.results import Results
 from handcal.session.session import SessionRecord
 from handcal.session.trial import make_trial
-from handcal.station.states import State
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.wizard.picture import OF_THE_RESULT
 from handcal_gui.pages.wizard.step_views import align_view, verification_view

@@ -20,8 +20,8 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.session.session import SessionRecord
-from handcal.station.states import State
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.preferences import PreferencesFile
 from handcal_gui.program import Program

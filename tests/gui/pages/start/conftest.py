@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.core.progress import Progress
-from handcal.station.doctor import Finding, Health
-from handcal.station.preflight import PARTS, Part
+from handcal.station.checks.doctor import Finding, Health
+from handcal.station.checks.preflight import PARTS, Part
 from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.session_entries import KnownSessions
 from handcal_gui.pages.start.start_page import StartPage

@@ -6,8 +6,8 @@ import pytest
 from PySide6.QtWidgets import QComboBox, QPushButton
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.plan import PlanSettings
 from handcal.core.types import EYES
-from handcal.station.plan import PlanSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.plan_field import PlanField
 from handcal_gui.preferences import Preferences, PreferencesFile

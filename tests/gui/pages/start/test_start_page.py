@@ -25,8 +25,8 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.types import Eye
 from handcal.session.library import EyeOutcome
-from handcal.station.doctor import Health
-from handcal.station.preflight import Part
+from handcal.station.checks.doctor import Health
+from handcal.station.checks.preflight import Part
 from handcal_gui.pages.start.card import Card
 from handcal_gui.pages.start.session_entries import Entry, KnownSessions
 from handcal_gui.pages.start.start_page import StartPage

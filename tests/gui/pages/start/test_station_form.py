@@ -25,8 +25,8 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.hand.settings import SegmentSettings
-from handcal.station.doctor import Health
-from handcal.station.preflight import PARTS
+from handcal.station.checks.doctor import Health
+from handcal.station.checks.preflight import PARTS
 from handcal.station.settings import StationSettings
 from handcal_gui.pages.start.start_page import StartPage
 from handcal_gui.preferences import Preferences

@@ -13,11 +13,11 @@ from PySide6.QtPrintSupport import QPrinter
 from PySide6.QtWidgets import QApplication, QToolButton
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.rig_types import Rig
 from handcal.core.types import EYES, Verdict
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.pages.wizard.picture import GuidePicture
 from handcal_gui.pages.wizard.result_bar import ResultBar
 from handcal_gui.pages.wizard.view import Step

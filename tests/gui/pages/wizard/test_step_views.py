@@ -8,13 +8,13 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from handcal.calibration.states import CalibrationSettings, State
+from handcal.calibration.verifying import VerifyingView
 from handcal.core.errors import FileError
 from handcal.core.types import Eye, VerdictName, Verification
 from handcal.hand.settings import SegmentSettings
 from handcal.link.nudges import NudgeSum
 from handcal.session.session import SessionRecord
-from handcal.station.states import CalibrationSettings, State
-from handcal.station.verifying import VerifyingView
 from handcal_gui.pages.wizard.preconditions import hand_found
 from handcal_gui.pages.wizard.step_views import connect_view, distance, save_view
 from handcal_gui.pages.wizard.steps import Wizard

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.calibration.plan import PlanSettings, StepName
+from handcal.calibration.states import State
 from handcal.core.types import EYES, Eye, EyeShift, Verdict, VerdictName, Verification
 from handcal.register.verdict import Advice
 from handcal.session.state import WENT_BACK, SessionEvent
-from handcal.station.plan import PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, ButtonSpec, Step
 from tests.gui.views import (

@@ -9,11 +9,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.plan import PlanSettings, StepName
+from handcal.calibration.states import State
 from handcal.core.types import EYES
 from handcal.session.session import SessionRecord
-from handcal.station.plan import PlanSettings, StepName
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.pages.wizard.steps import Wizard
 from handcal_gui.pages.wizard.view import Action, Step
 from handcal_gui.pages.wizard.wizard import WizardPanel

@@ -8,10 +8,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.types import Alignment
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.panels.cloud.cloud_view import CloudView
 from handcal_gui.panels.cloud.orbit import Direction
 from handcal_gui.panels.cloud.panel import CloudPanel

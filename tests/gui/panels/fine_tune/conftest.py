@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.rig_types import Rig
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.panels.fine_tune.history import Shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from tests.gui.panels.fine_tune.controls import Show

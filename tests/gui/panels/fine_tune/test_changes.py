@@ -10,10 +10,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.rig_types import Rig
 from handcal.core.types import EYES, Verdict
 from handcal.register.results import Results
-from handcal.station.states import State
 from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.fine_tune.stream import PERIOD_MS, SETTLE_MS

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import MAX_HAND_SET_SHIFT_M, State
 from handcal.core.display import DrawnMove, effect_at
 from handcal.core.rig_types import Rig
 from handcal.core.types import EYES
@@ -30,7 +31,6 @@ from handcal.register.results import Results, results_json
 from handcal.session.record import SessionRecord
 from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import MAX_HAND_SET_SHIFT_M, State
 from handcal_gui.panels.fine_tune.history import Shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel
 from handcal_gui.panels.fine_tune.stream import PERIOD_MS

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.types import EYES
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
 from handcal_gui.panels.fine_tune.stream import PERIOD_MS, SETTLE_MS, Arrival, ShiftStream
 

@@ -12,13 +12,13 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QPushButton, QTabWidget
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.geometry import transform
 from handcal.core.rig_types import Rig
 from handcal.core.types import EYES, Alignment, Verdict, VerdictName
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
 from handcal_gui.panels.results.panel import ResultsPanel

@@ -9,10 +9,10 @@ import pytest
 from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import CalibrationSettings, State
 from handcal.register.guard import GuardSettings, turn_advice
 from handcal.session.journal import Event
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import CalibrationSettings, State
 from handcal_gui.panels.rotation.dial import RotationDial
 from handcal_gui.panels.rotation.panel import RotationPanel
 from handcal_gui.widgets.plots import Plot

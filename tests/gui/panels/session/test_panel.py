@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.rig_types import Rig
 from handcal.core.types import EyeDistance
 from handcal.register.results import Results
@@ -24,7 +25,6 @@ from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.panels.session.panel import SessionPanel
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.record_table import RecordTable

@@ -18,13 +18,13 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.rig_types import Rig
 from handcal.core.types import Eye, EyeShift
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal_gui.panels.trials.panel import TrialsPanel
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.key_cap import KeyCap

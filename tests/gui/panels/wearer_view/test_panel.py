@@ -7,10 +7,10 @@ from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QApplication, QCheckBox, QLabel
 from pytestqt.qtbot import QtBot
 
+from handcal.calibration.states import State
 from handcal.core.types import EYES, Eye
 from handcal.register.results import Results
 from handcal.station.snapshot import Snapshot
-from handcal.station.states import State
 from handcal.station.wearer_view import EyeView
 from handcal_gui.pages.wizard.picture import GuidePicture
 from handcal_gui.pages.wizard.view import Step

@@ -16,7 +16,12 @@ from pytestqt.qtbot import QtBot
 from handcal.core.errors import CameraError
 from handcal.core.progress import Progress
 from handcal.link.pairing import Pairings
-from handcal.station.cube_tracking import CubeSight, CubeTracking, TrackingOrder, track_cube
+from handcal.station.user_test.cube_tracking import (
+    CubeSight,
+    CubeTracking,
+    TrackingOrder,
+    track_cube,
+)
 from handcal_gui.evaluation_entries import CubeEntries
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.windows.evaluation import devices

@@ -1,0 +1,1 @@
+"""The procedure of one wearer's calibration: its plan, its steps, and its result."""

@@ -1,0 +1,136 @@
+"""Solve a stored session again, with its own or another method, without changing it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from handcal.calibration.states import CalibrationSettings
+from handcal.core.errors import FileError
+from handcal.core.progress import Progress
+from handcal.core.types import METHODS, EyeDistance, Method
+from handcal.io.settings import read_settings
+from handcal.register.results import Results, SolveSettings, solve_session
+from handcal.session.session import SessionRecord
+
+
+def solve(
+    session: SessionRecord,
+    *,
+    method: Method | None = None,
+    eye_distance: EyeDistance | None = None,
+) -> Results:
+    """Solve a stored session's alignments, fuse them and judge the result.
+
+    Parameters
+    ----------
+    session : SessionRecord
+        From `handcal.open_session`; it stays as it is.
+    method : {"consistent", "paper", "linear", "icp", "icp-open3d"}, optional
+        Solver of each alignment, the session's own if not given. ``paper``: Hu et al. 2021 as
+        published. ``linear``: its model with all three rows of each pair. ``consistent``: exact
+        factor, and robust to cuts, sampling and a turned hand. ``icp``: rigid, the paper's
+        baseline. Its other settings are the session's own.
+    eye_distance : EyeDistance, optional
+        The wearer's, in place of the one measured in the session, if any.
+
+    Returns
+    -------
+    Results
+        `eyes` holds φ of each solved eye, from C0 to C1 in E's axes, metres, fused from all
+        alignments. Equal input gives equal output, bit for bit.
+
+    Raises
+    ------
+    FileError
+        If the session has no alignments, one of them cannot be solved, or its settings cannot be
+        read.
+    HandError
+        If nearly all points of an alignment lie beside cut edges.
+    ValueError
+        If the method is unknown.
+
+    Examples
+    --------
+    >>> import handcal
+    >>> session = handcal.open_session("resources/example_session")
+    >>> results = handcal.solve(session)
+    >>> print(results.eyes["left"])
+    φ = (+3.16 ± 1.29, -4.42 ± 0.92, +0.99 ± 1.86) mm; rms 1.58 mm, 97 % inliers, converged
+    >>> results.verdicts["left"].name
+    'accept'
+    """
+    if method is not None and method not in METHODS:
+        raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")
+    settings = stored_solve_settings(session)
+    if method is not None:
+        settings = replace(settings, method=method)
+    results = solve_again(session, settings, eye_distance=eye_distance)
+    if results is None:
+        raise FileError(f"{session.path} holds no alignment to solve")
+    return results
+
+
+def stored_solve_settings(record: SessionRecord) -> SolveSettings:
+    """Return the solve settings of a session; FileError if they cannot be read."""
+    where = f"{record.path / 'settings.json'}: calibration"
+    return read_settings(CalibrationSettings, record.settings.get("calibration", {}), where).solve
+
+
+def solve_again(
+    record: SessionRecord,
+    settings: SolveSettings,
+    progress: Progress = Progress(),
+    eye_distance: EyeDistance | None = None,
+) -> Results | None:
+    """Return the results of a session's alignments; None if there are none to solve.
+
+    Parameters
+    ----------
+    record : SessionRecord
+    settings : SolveSettings
+    progress : Progress
+        As in `solve_session`.
+    eye_distance : EyeDistance, optional
+        The wearer's, in place of the session's own.
+
+    Raises
+    ------
+    FileError
+        If an alignment cannot be solved.
+    CancelledError
+        If it was cancelled.
+    """
+    if not record.is_solvable:
+        return None
+    try:
+        return solve_contents(record, settings, progress, eye_distance)
+    except ValueError as error:
+        raise FileError(f"{record.path} cannot be solved: {error}") from error
+
+
+def solve_contents(
+    record: SessionRecord,
+    settings: SolveSettings,
+    progress: Progress = Progress(),
+    eye_distance: EyeDistance | None = None,
+) -> Results:
+    """Return the results of all that a session holds; parameters as in `solve_again`.
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to solve, or an alignment cannot be solved.
+    CancelledError
+        If it was cancelled.
+    """
+    return solve_session(
+        record.alignments,
+        record.rig,
+        settings,
+        progress,
+        eye_distance=eye_distance or record.facts.eye_distance,
+        contradictions=record.facts.contradictions,
+        verified=record.facts.verified,
+        plan="recommended" if record.facts.plan == "recommended" else None,
+        usable_eyes=record.facts.usable_eyes,
+    )

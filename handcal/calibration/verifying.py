@@ -1,0 +1,271 @@
+"""The verification of one eye while it is in progress.
+
+With the hand at rest and the other eye closed, the wearer moves what the eye draws until the hand's
+outline covers the hand. The wearer's nudges come from the headset as sums, the technician's from
+the PC as steps; both add up.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handcal.calibration.hands import PlacedHand, RecentHands
+from handcal.core.display import view_of_eye
+from handcal.core.errors import HandError
+from handcal.core.geometry import invert, transform
+from handcal.core.rig_types import EyeDisplay, Rig
+from handcal.core.types import EYES, Eye, Float64, Verification
+from handcal.link.nudges import NudgeSum, VerifyRequest
+from handcal.link.server import Nudge
+from handcal.register.nudge import nudged_shift_m
+from handcal.session.journal import Event
+from handcal.session.state import VERIFYING, SessionEvent
+
+SKIPPED = "verification_skipped"
+_ENDS = (
+    SKIPPED,
+    "cursor_made",
+    SessionEvent.SOLVED,
+    SessionEvent.APPLIED,
+    SessionEvent.FINE_TUNED,
+    SessionEvent.FINISHED,
+)
+"""Events that end a verification."""
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyingView:
+    """A verification in progress."""
+
+    eye: Eye
+    moved: NudgeSum
+    """All movement of the drawing so far: the error found so far."""
+    before_m: tuple[float, float, float]
+    shift_m: tuple[float, float, float]
+    """φ before the verification, and with the movement so far."""
+    can_undo: bool
+    can_redo: bool
+    began_host_ns: int = 0
+    """Time of its first frame; 0 if it was resumed."""
+
+
+class Verifying:
+    """One eye's drawing, moved by the wearer.
+
+    Parameters
+    ----------
+    request : VerifyRequest
+        As sent to the headset.
+    display : EyeDisplay
+        Of this eye.
+    before_m : (3,) float64
+        φ that the eye is drawn with at the start.
+    hand_E_m : (3,) float64
+        Centre of the hand in the eye's E.
+    began_host_ns : int
+
+    Attributes
+    ----------
+    moved : NudgeSum
+        All movement so far.
+    shift_m : (3,) float64
+        φ with it.
+    fits : Nudge or None
+        The wearer's confirmation that the drawing covers the hand, until it is judged.
+    refusal : str
+        Reason why the last confirmation was refused; empty if none was.
+    """
+
+    def __init__(
+        self,
+        request: VerifyRequest,
+        display: EyeDisplay,
+        before_m: Float64,
+        hand_E_m: Float64,
+        began_host_ns: int = 0,
+    ) -> None:
+        self.request = request
+        self.before_m = before_m
+        self.hand_E_m = hand_E_m
+        self.moved = NudgeSum()
+        self.shift_m = before_m
+        self.fits: Nudge | None = None
+        self.refusal = ""
+        self._display = display
+        self._began_host_ns = began_host_ns
+        self._heard = NudgeSum()
+        self._session = 0
+        self._done: list[NudgeSum] = []
+        self._undone: list[NudgeSum] = []
+
+    @property
+    def eye(self) -> Eye:
+        """The eye that is verified."""
+        return self.request.eye
+
+    def view(self) -> VerifyingView:
+        """Return the verification as it is now."""
+        return VerifyingView(
+            self.eye,
+            self.moved,
+            _triple(self.before_m),
+            _triple(self.shift_m),
+            can_undo=bool(self._done),
+            can_redo=bool(self._undone),
+            began_host_ns=self._began_host_ns,
+        )
+
+    def nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
+        """Move the drawing; ValueError if it is moved too far."""
+        self._move(self.moved.plus(right_arcmin, down_arcmin, size))
+        self._undone.clear()
+
+    def hear(self, nudge: Nudge) -> tuple[float, float, float] | None:
+        """Take the wearer's sums; return what they add to the last ones, None if nothing.
+
+        A confirmation counts only for the drawing that the wearer has seen.
+        """
+        heard = nudge.moved
+        before = self._heard if nudge.session == self._session else NudgeSum()
+        self._heard, self._session = heard, nudge.session
+        step = (
+            heard.right_arcmin - before.right_arcmin,
+            heard.down_arcmin - before.down_arcmin,
+            heard.size - before.size,
+        )
+        if any(step):
+            return step
+        if nudge.fits:
+            self.fits = nudge
+        return None
+
+    def judge(self, fits: Nudge, hands: RecentHands, tolerance_s: float) -> PlacedHand | str:
+        """Return the hand that the drawing fits, or what the wearer must do before it counts.
+
+        Parameters
+        ----------
+        fits : Nudge
+            The wearer's confirmation.
+        hands : RecentHands
+        tolerance_s : float
+            Largest time between the confirmation and the hand.
+        """
+        if fits.problem:
+            return "The drawing has changed. Look and confirm again."
+        try:
+            hand = hands.nearest(fits.t_host_ns, tolerance_s)
+        except HandError as error:
+            return f"{error}. Hold it up and confirm again."
+        if hands.steady() is None:
+            return "Hold your hand still, and confirm again."
+        return hand
+
+    def undo(self) -> None:
+        """Undo the last nudge; ValueError if there is none."""
+        if not self._done:
+            raise ValueError("there is no nudge to undo")
+        self._undone.append(self.moved)
+        self._draw(self._done.pop())
+
+    def redo(self) -> None:
+        """Redo the last nudge that was undone; ValueError if there is none."""
+        if not self._undone:
+            raise ValueError("there is no nudge to redo")
+        self._move(self._undone.pop())
+
+    def result(self, hand_E_m: Float64) -> Verification:
+        """Return the verification, with the hand where it was when the drawing fitted."""
+        return Verification(
+            before_m=_triple(self.before_m),
+            nudge_arcmin=(self.moved.right_arcmin, self.moved.down_arcmin),
+            nudge_size=self.moved.size,
+            after_m=_triple(self.shift_m),
+            hand_E_m=_triple(hand_E_m),
+        )
+
+    def event(self) -> dict[str, Any]:
+        """Return what the journal keeps, so that the verification can be resumed."""
+        return {
+            "eye": self.eye,
+            "before_m": list(_triple(self.before_m)),
+            "hand_E_m": list(_triple(self.hand_E_m)),
+            "nudge_arcmin": [self.moved.right_arcmin, self.moved.down_arcmin],
+            "nudge_size": self.moved.size,
+        }
+
+    def _move(self, moved: NudgeSum) -> None:
+        before = self.moved
+        self._draw(moved)
+        self._done.append(before)
+
+    def _draw(self, moved: NudgeSum) -> None:
+        self.shift_m = nudged_shift_m(
+            self._display,
+            self.before_m,
+            self.hand_E_m,
+            moved.right_arcmin,
+            moved.down_arcmin,
+            moved.size,
+        )
+        self.moved = moved
+        self.fits = None
+
+
+def hand_centre_E_m(rig: Rig, eye: Eye, hand: PlacedHand) -> Float64:
+    """Return the centre (3,) of a hand in an eye's E."""
+    T_E_W = view_of_eye(rig.eyes[eye], hand.T_W_D @ invert(rig.T_H_D))
+    return np.asarray(transform(T_E_W, hand.points_W_m).mean(axis=0))
+
+
+def new_id() -> int:
+    """Return the id of another verification, which no earlier run of this program has used."""
+    return secrets.randbits(31) | 1
+
+
+def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Verifying | None:
+    """Return the verification that a session was in when it ended, or None."""
+    last: Event | None = None
+    for event in events:
+        if event.name == VERIFYING:
+            last = event
+        elif event.name in _ENDS or event.name.startswith("alignment_"):
+            last = None
+    if last is None:
+        return None
+    try:
+        eye: Eye = "left" if last.data["eye"] == "left" else "right"
+        before_m, hand_E_m = (
+            np.array(last.data[name], dtype=np.float64).reshape(3)
+            for name in ("before_m", "hand_E_m")
+        )
+        verifying = Verifying(VerifyRequest(new_id(), eye), displays[eye], before_m, hand_E_m)
+        right_arcmin, down_arcmin = last.data["nudge_arcmin"]
+        verifying.nudge(right_arcmin, down_arcmin, last.data["nudge_size"])
+    except (KeyError, TypeError, ValueError):
+        return None  # the eye is verified from the start
+    return verifying
+
+
+def skipped_eyes(events: Iterable[Event]) -> set[Eye]:
+    """Return the eyes whose verification was skipped in a session."""
+    named = [event.data.get("eye") for event in events if event.name == SKIPPED]
+    return {eye for eye in EYES if eye in named}
+
+
+def verify_prompt(eye: Eye) -> str:
+    """Return what the wearer is asked to do."""
+    other = "right" if eye == "left" else "left"
+    return (
+        f"Keep your hand up and still, and close your {other} eye. Move the outline with the "
+        "arrow keys until it covers your hand, then confirm."
+    )
+
+
+def _triple(values_m: Float64) -> tuple[float, float, float]:
+    x_m, y_m, z_m = (float(value_m) for value_m in values_m)
+    return x_m, y_m, z_m

@@ -1,0 +1,1 @@
+"""The user test of a calibrated wearer: targets, trials, blinded comparisons, and the cube."""

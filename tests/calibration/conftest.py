@@ -1,0 +1,36 @@
+"""Fixtures of the procedure's tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from handcal.link.client import HeadsetClient
+from handcal.link.server import HeadsetServer
+from handcal.session.session import Session
+from tests.calibration.stage import KEY, LINK, RIG, Stage, connect
+
+
+@pytest.fixture
+def server() -> Iterator[HeadsetServer]:
+    with HeadsetServer(KEY, settings=LINK) as server:
+        yield server
+
+
+@pytest.fixture
+def client(server: HeadsetServer) -> Iterator[HeadsetClient]:
+    with connect(server) as client:
+        yield client
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Iterator[Session]:
+    with Session.create(tmp_path, RIG, {}, name="session") as session:
+        yield session
+
+
+@pytest.fixture
+def stage(server: HeadsetServer, client: HeadsetClient, session: Session) -> Stage:
+    return Stage(server, client, session)

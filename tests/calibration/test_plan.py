@@ -1,0 +1,227 @@
+"""A plan's next step, decided from the calibration's state, and done when the hand is still."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handcal.calibration.plan import NextStep, Plan, PlanSettings, StepName
+from handcal.calibration.states import State
+from handcal.calibration.verifying import skipped_eyes
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import transform
+from handcal.core.types import EYES, Eye
+from handcal.link.client import HeadsetClient
+from handcal.link.nudges import NudgeSum
+from handcal.link.server import HeadsetServer
+from handcal.register.placement import PlacementSettings
+from handcal.session.session import Session
+from tests.calibration.stage import HEADSET_AHEAD_NS, RIG, T_D_HAND, Stage
+from tests.helpers import eventually
+
+RECOMMENDED = PlanSettings("recommended", is_automatic=True)
+# The hand of these tests does not move, so no other place may be in the camera's range.
+AT_THE_HAND = PlacementSettings(farthest_m=0.1, fewest=2, most=2, verifications=1)
+ONCE = PlacementSettings(fewest=1, most=1, verifications=1)
+
+
+class Planned:
+    """A stage that follows a plan."""
+
+    def __init__(self, stage: Stage, settings: PlanSettings, verifies_first: bool = False) -> None:
+        self.stage = stage
+        self.plan = Plan(stage.calibration, settings, verifies_first)
+
+    def advance(self, frames: int = 1) -> NextStep:
+        for _ in range(frames):
+            step = self.plan.advance(self.stage.see())
+        return step
+
+    def until(self, name: StepName, frames: int = 60) -> NextStep:
+        for _ in range(frames):
+            step = self.advance()
+            if self.stage.state() is State.APPLYING:
+                self.stage.calibration.wait_applied()
+            if step.name is name:
+                return step
+            if step.name is StepName.WAIT:
+                eventually(lambda: self.stage.calibration.is_applied)
+        raise AssertionError(f"{name} was not reached; the plan is at {step}")
+
+    def confirm(self) -> None:
+        """Confirm on the display's cursor, with the hand as it is."""
+        calibration = self.stage.calibration
+        eventually(lambda: self.stage.shown().cursor_W_m is not None and calibration.is_applied)
+        self.stage.press()
+
+    def fits(self, eye: Eye) -> None:
+        eventually(lambda: self.stage.shown().verify is not None)
+        eventually(lambda: self.stage.calibration.is_applied)
+        shown = self.stage.shown()
+        assert shown.verify is not None
+        assert shown.verify.eye == eye
+        t_ns = self.stage.t_ns + HEADSET_AHEAD_NS
+        self.stage.client.wait_acked(self.stage.client.nudge(t_ns, shown, NudgeSum(), True), 5.0)
+
+
+@pytest.fixture
+def make(server: HeadsetServer, client: HeadsetClient, session: Session) -> Callable[..., Planned]:
+    def build(settings: PlanSettings = RECOMMENDED, verifies_first: bool = False) -> Planned:
+        session.save_facts(plan=settings.name, usable_eyes=settings.usable_eyes)
+        stage = Stage(server, client, session)
+        return Planned(stage, settings, verifies_first)
+
+    return build
+
+
+def test_one_raise_serves_all_alignments_left_right_and_both(
+    make: Callable[..., Planned],
+) -> None:
+    """The simulated hand stays where it was raised, and the cursors are that hand, moved."""
+    planned = make(replace(RECOMMENDED, placement=PlacementSettings(fewest=3, most=3)))
+    assert planned.advance().name is StepName.RAISE
+    raised = None
+    cursors = []
+    for eyes in (("left",), ("right",), EYES):
+        step = planned.until(StepName.CURSOR)
+        assert set(step.eyes) == set(eyes)
+        calibration = planned.stage.calibration
+        assert raised is None or calibration.raised is raised
+        raised, cursor = calibration.raised, calibration.cursor
+        assert raised is not None
+        assert cursor is not None
+        moved_m = cursor.points_W_m - raised.points_W_m
+        np.testing.assert_allclose(moved_m, np.broadcast_to(moved_m[0], moved_m.shape), atol=1e-12)
+        cursors.append(cursor)
+        assert planned.advance().name is StepName.ALIGN
+        # The hand itself is the cursor's place for a wearer who need not move.
+        planned.confirm()
+        planned.until(StepName.SOLVE)
+    assert [one.eyes for one in planned.stage.calibration.alignments.values()] == [
+        ("left",),
+        ("right",),
+        ("left", "right"),
+    ]
+    assert raised is not None
+    # Nearer than the raised hand, as near as the camera can see.
+    T_E_W = view_of_eye(RIG.eyes["left"], planned.stage.calibration.T_W_H(raised))
+    depths_m = [transform(T_E_W, one.points_W_m)[:, 2].mean() for one in (raised, cursors[0])]
+    assert depths_m[1] < depths_m[0] + 1e-3
+
+
+def test_every_eye_is_verified_and_then_the_hand_may_be_lowered(
+    make: Callable[..., Planned], session: Session
+) -> None:
+    planned = make(replace(RECOMMENDED, placement=AT_THE_HAND))
+    for _ in EYES:
+        planned.until(StepName.CURSOR)
+        planned.confirm()
+        planned.until(StepName.SOLVE)
+    for eye in EYES:
+        assert planned.until(StepName.VERIFY).eyes == (eye,)
+        assert planned.advance().name is StepName.NUDGE
+        planned.fits(eye)
+    step = planned.until(StepName.DONE)
+    assert step.text
+    assert set(Session.open(session.path).facts.verified) == set(EYES)
+    eventually(lambda: planned.stage.shown().prompt == "")
+    assert planned.stage.calibration.raised is None
+
+
+def test_one_usable_eye(make: Callable[..., Planned]) -> None:
+    planned = make(PlanSettings("paper", usable_eyes=("right",), is_automatic=True, placement=ONCE))
+    assert planned.until(StepName.CURSOR).eyes == ("right",)
+    planned.confirm()
+    assert planned.until(StepName.VERIFY).eyes == ("right",)
+    planned.fits("right")
+    planned.until(StepName.DONE)
+    assert set(planned.stage.calibration.verifications) == {"right"}
+    assert planned.stage.calibration.results is not None
+    assert set(planned.stage.calibration.results.eyes) == {"right"}
+
+
+def test_a_stored_calibration_is_verified_before_anything_else(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make(verifies_first=True)
+    for eye in EYES:
+        assert planned.until(StepName.VERIFY).eyes == (eye,)
+        planned.fits(eye)
+    # Good as it is: kept without an alignment. Otherwise alignments follow.
+    step = planned.until(StepName.DONE)
+    results = planned.stage.calibration.results
+    assert results is not None
+    assert {one.name for one in results.verdicts.values()} <= {"accept", "keep"}
+    assert not planned.stage.calibration.alignments
+    assert "verdict" in step.text
+
+
+def test_the_paper_s_cursor_is_where_the_hand_is(make: Callable[..., Planned]) -> None:
+    planned = make(PlanSettings("paper", is_automatic=True, verify=False))
+    planned.until(StepName.CURSOR)
+    calibration = planned.stage.calibration
+    assert calibration.eyes == EYES
+    assert calibration.raised is None
+    assert calibration.cursor is not None
+    hand = calibration.steady_hand
+    assert hand is not None
+    assert np.linalg.norm(calibration.cursor.middle_W_m - hand.middle_W_m) < 0.002
+
+
+def test_asking_changes_nothing(make: Callable[..., Planned]) -> None:
+    planned = make()
+    planned.stage.hold(T_D_HAND)
+    eventually(lambda: planned.stage.calibration.is_applied)
+    first = planned.plan.next_step(is_steady=True)
+    second = planned.plan.next_step(is_steady=True)
+    assert first.name is second.name is StepName.CURSOR
+    assert planned.stage.state() is State.SHOW_HAND
+
+
+def test_the_whole_recommended_plan_with_one_usable_eye(make: Callable[..., Planned]) -> None:
+    planned = make(replace(RECOMMENDED, placement=AT_THE_HAND, usable_eyes=("right",)))
+    for _ in range(AT_THE_HAND.most):
+        assert planned.until(StepName.CURSOR).eyes == ("right",)
+        planned.confirm()
+    assert planned.until(StepName.VERIFY).eyes == ("right",)
+    planned.fits("right")
+    planned.until(StepName.DONE)
+    calibration = planned.stage.calibration
+    assert [one.eyes for one in calibration.alignments.values()] == [("right",)] * 2
+    assert calibration.results is not None
+    assert set(calibration.results.eyes) == set(calibration.verifications) == {"right"}
+
+
+def test_what_is_left_is_solved_again_after_an_alignment_was_deleted(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make(replace(RECOMMENDED, placement=AT_THE_HAND, verify=False))
+    calibration = planned.stage.calibration
+    for _ in range(AT_THE_HAND.most):
+        planned.until(StepName.CURSOR)
+        planned.confirm()
+    planned.until(StepName.DONE)
+    calibration.delete_alignment(2)
+    assert planned.plan.next_step(is_steady=False).name is StepName.SOLVE
+    assert planned.advance().name is StepName.SOLVE
+    assert calibration.results is not None
+    assert list(calibration.results.alignments) == [1]
+    # The place that has become free is filled, with what is known from the rest.
+    assert planned.until(StepName.CURSOR).eyes == ("right",)
+
+
+def test_a_skipped_eye_is_not_verified_by_the_plan(
+    make: Callable[..., Planned], session: Session
+) -> None:
+    planned = make(replace(RECOMMENDED, placement=ONCE, usable_eyes=("left",)))
+    planned.until(StepName.ALIGN)
+    planned.confirm()
+    planned.until(StepName.NUDGE)
+    planned.plan.skip()
+    assert planned.stage.state() is State.APPLIED
+    planned.until(StepName.DONE)
+    assert planned.stage.calibration.verifications == {}
+    assert skipped_eyes(Session.open(session.path).events) == {"left"}

@@ -1,0 +1,294 @@
+"""Verification of one eye: the wearer's and the technician's nudges, stored, fused and resumed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handcal.calibration.states import ProcedureError, State
+from handcal.core.display import projection_matrix
+from handcal.core.geometry import rigid
+from handcal.core.types import EYES, Eye, EyeDistance, Float64
+from handcal.link.client import HeadsetClient
+from handcal.link.nudges import MAX_NUDGE_ARCMIN, NudgeSum
+from handcal.link.server import HeadsetServer
+from handcal.register.nudge import nudged_shift_m
+from handcal.session.session import Session
+from tests.calibration.stage import (
+    HEADSET_AHEAD_NS,
+    RIG,
+    Stage,
+    connect,
+    events,
+)
+from tests.helpers import eventually
+
+STILL = NudgeSum()
+
+
+def begin(stage: Stage, eye: Eye = "left") -> None:
+    """Calibrate, hold the hand still and begin a verification."""
+    stage.calibrate()
+    stage.hold()
+    verify(stage, eye)
+
+
+def verify(stage: Stage, eye: Eye) -> None:
+    eventually(lambda: stage.calibration.is_applied)
+    stage.calibration.verify(eye)
+    eventually(lambda: stage.shown().verify and stage.shown().eyes == (eye,))
+
+
+def press(stage: Stage, moved: NudgeSum, fits: bool = False) -> None:
+    """Send the wearer's nudge with what is drawn now, and step."""
+    t_ns = stage.t_ns + HEADSET_AHEAD_NS
+    stage.client.wait_acked(stage.client.nudge(t_ns, stage.shown(), moved, fits), 5.0)
+    stage.see()
+
+
+def drawn_px(stage: Stage, eye: Eye) -> Float64:
+    """Return the projection that the headset draws with, once all have arrived."""
+    eventually(lambda: stage.calibration.is_applied)
+    return stage.shown().drawn[eye].P
+
+
+def fits(stage: Stage, moved: NudgeSum = STILL) -> None:
+    drawn_px(stage, "left")
+    press(stage, moved, fits=True)
+    stage.calibration.wait_applied()
+
+
+def test_the_headset_verifies_one_eye_and_shows_the_outline(stage: Stage) -> None:
+    begin(stage, "right")
+    assert stage.state() is State.VERIFY
+    stage.see()
+    eventually(lambda: stage.shown().is_outline)
+    shown = stage.shown()
+    assert shown.verify is not None
+    assert (shown.verify.eye, shown.live_eyes, shown.eyes) == ("right", ("right",), ("right",))
+    assert "close your left eye" in shown.prompt
+    stage.calibration.skip_verification()
+    assert stage.state() is State.APPLIED
+    eventually(lambda: stage.shown().verify is None and stage.shown().prompt == "")
+
+
+def test_each_nudge_changes_the_projection_and_the_word_stores_and_fuses_it(
+    stage: Stage, session: Session
+) -> None:
+    begin(stage)
+    before_m = stage.calibration.applied_shift_m["left"]
+    alone = stage.calibration.results
+    verifying = stage.calibration.verifying
+    assert verifying is not None
+    hand_E_m = verifying.hand_E_m
+    press(stage, NudgeSum(3.0, 0.0, 0.0))
+    press(stage, NudgeSum(3.0, -2.0, 0.004))
+    expected_m = nudged_shift_m(RIG.eyes["left"], before_m, hand_E_m, 3.0, -2.0, 0.004)
+    np.testing.assert_allclose(
+        drawn_px(stage, "left"), projection_matrix(RIG.eyes["left"], expected_m)
+    )
+    fits(stage, NudgeSum(3.0, -2.0, 0.004))
+    assert stage.state() is State.APPLIED
+    found = Session.open(session.path).facts.verified["left"]
+    assert found == stage.calibration.verifications["left"]
+    np.testing.assert_allclose(found.before_m, before_m)
+    np.testing.assert_allclose(found.after_m, expected_m)
+    assert found.nudge_arcmin == (3.0, -2.0)
+    assert found.nudge_size == 0.004
+    assert found.hand_E_m is not None
+    assert np.linalg.norm(np.subtract(found.hand_E_m, hand_E_m)) < 0.005
+    results = stage.calibration.results
+    assert alone is not None
+    assert results is not None
+    # The observation pulls φ toward where the drawing covered the hand, and makes it surer.
+    assert np.linalg.norm(results.eyes["left"].shift_m - expected_m) < np.linalg.norm(
+        alone.eyes["left"].shift_m - expected_m
+    )
+    assert np.trace(results.eyes["left"].covariance_m2) < np.trace(alone.eyes["left"].covariance_m2)
+    np.testing.assert_allclose(
+        stage.calibration.applied_shift_m["left"], results.rendered_shift_m["left"]
+    )
+    assert Session.open(session.path).is_applied
+
+
+def test_wearer_and_technician_add_up_and_the_technician_undoes(stage: Stage) -> None:
+    begin(stage)
+    calibration = stage.calibration
+    press(stage, NudgeSum(2.0))
+    calibration.nudge("left", 0.0, 5.0)
+    press(stage, NudgeSum(1.0))
+    assert calibration.verifying is not None
+    assert calibration.verifying.moved == NudgeSum(1.0, 5.0)
+    after_m = calibration.applied_shift_m["left"]
+    calibration.undo_nudge()
+    assert calibration.verifying.moved == NudgeSum(2.0, 5.0)
+    calibration.undo_nudge()
+    calibration.undo_nudge()
+    assert calibration.verifying.moved == NudgeSum()
+    np.testing.assert_allclose(
+        calibration.applied_shift_m["left"], calibration.verifying.before_m, atol=1e-12
+    )
+    with pytest.raises(ProcedureError, match="no nudge to undo"):
+        calibration.undo_nudge()
+    for _ in range(3):
+        calibration.redo_nudge()
+    np.testing.assert_allclose(calibration.applied_shift_m["left"], after_m)
+    with pytest.raises(ProcedureError, match="no nudge to redo"):
+        calibration.redo_nudge()
+    with pytest.raises(ProcedureError, match="right eye is not being verified"):
+        calibration.nudge("right", 1.0, 0.0)
+    with pytest.raises(ProcedureError, match="at most"):
+        calibration.nudge("left", MAX_NUDGE_ARCMIN, 0.0)
+    np.testing.assert_allclose(calibration.applied_shift_m["left"], after_m)
+
+
+def test_a_skipped_verification_leaves_no_trace_in_what_is_drawn(
+    stage: Stage, session: Session
+) -> None:
+    begin(stage)
+    before_m = stage.calibration.applied_shift_m["left"]
+    press(stage, NudgeSum(9.0, 9.0))
+    stage.calibration.skip_verification()
+    np.testing.assert_allclose(stage.calibration.applied_shift_m["left"], before_m)
+    np.testing.assert_allclose(
+        drawn_px(stage, "left"), projection_matrix(RIG.eyes["left"], before_m)
+    )
+    record = Session.open(session.path)
+    assert not record.facts.verified
+    assert record.is_applied
+    assert "verification_skipped" in dict(events(session))
+
+
+def test_the_technician_confirms_on_the_wearer_s_word(stage: Stage) -> None:
+    begin(stage)
+    stage.calibration.nudge("left", 1.0, 1.0)
+    eventually(lambda: stage.calibration.is_applied)
+    stage.see()
+    stage.calibration.verified()
+    assert stage.state() is State.APPLYING
+    stage.calibration.wait_applied()
+    assert set(stage.calibration.verifications) == {"left"}
+    with pytest.raises(ProcedureError, match="not being verified"):
+        stage.calibration.verified()
+
+
+def test_a_word_for_another_drawing_or_a_moving_hand_is_refused(
+    stage: Stage, session: Session
+) -> None:
+    begin(stage)
+    former = stage.shown()
+    t_ns = stage.t_ns + HEADSET_AHEAD_NS
+    stage.calibration.nudge("left", 4.0, 0.0)
+    drawn_px(stage, "left")
+    stage.client.wait_acked(stage.client.nudge(t_ns, former, NudgeSum(), True), 5.0)
+    stage.see()
+    assert stage.state() is State.VERIFY
+    assert "drawing has changed" in stage.calibration.refusal
+    stage.see(rigid([-0.2, 0.0, 0.0], [0.02, 0.0, 0.5]))
+    press(stage, NudgeSum(), fits=True)
+    assert stage.state() is State.VERIFY
+    assert "still" in stage.calibration.refusal
+    assert [name for name, _ in events(session)].count("verification_refused") == 2
+    stage.hold()
+    fits(stage)
+    assert stage.state() is State.APPLIED
+    assert not stage.calibration.evidence.contradictions
+
+
+def test_a_word_with_a_last_nudge_counts_only_once_the_wearer_has_seen_it(stage: Stage) -> None:
+    begin(stage)
+    press(stage, NudgeSum(1.0), fits=True)
+    assert stage.state() is State.VERIFY
+    fits(stage, NudgeSum(1.0))
+    assert stage.state() is State.APPLIED
+
+
+def test_nothing_else_can_be_done_meanwhile(stage: Stage) -> None:
+    with pytest.raises(ProcedureError, match="hold the hand up"):
+        stage.calibration.verify("left")
+    begin(stage)
+    calibration = stage.calibration
+    for act in (
+        calibration.solve,
+        calibration.apply,
+        calibration.make_cursor,
+        calibration.redo,
+        lambda: calibration.delete_alignment(1),
+        lambda: calibration.set_shift({"left": np.zeros(3)}),
+        lambda: calibration.set_eye_distance(EyeDistance(0.063)),
+    ):
+        with pytest.raises(ProcedureError):
+            act()
+    assert stage.state() is State.VERIFY
+
+
+def test_a_session_is_resumed_during_a_verification(
+    stage: Stage, server: HeadsetServer, client: HeadsetClient, session: Session
+) -> None:
+    begin(stage, "right")
+    press(stage, NudgeSum(2.0, 1.0, 0.002))
+    nudged_m = stage.calibration.applied_shift_m["right"]
+    again = Stage(server, client, session)
+    assert again.state() is State.VERIFY
+    assert again.calibration.verifying is not None
+    assert again.calibration.verifying.moved == NudgeSum(2.0, 1.0, 0.002)
+    np.testing.assert_allclose(again.calibration.applied_shift_m["right"], nudged_m)
+    again.hold()
+    eventually(lambda: again.calibration.is_applied and again.shown().verify)
+    again.calibration.nudge("right", 1.0, 0.0)
+    again.hold()
+    again.calibration.verified()
+    again.calibration.wait_applied()
+    found = again.calibration.verifications["right"]
+    assert found.nudge_arcmin == (3.0, 1.0)
+    # Once it has ended, it is not resumed again.
+    last = Stage(server, client, session)
+    assert last.state() is State.APPLIED
+    assert last.calibration.verifying is None
+    assert last.calibration.verifications == again.calibration.verifications
+
+
+@pytest.mark.parametrize(
+    "damage", [{"eye": "left"}, {"nudge_arcmin": ["a", 1.0]}, {"hand_E_m": [0.0, 0.0, -1.0]}]
+)
+def test_a_damaged_verification_is_not_resumed(
+    stage: Stage,
+    server: HeadsetServer,
+    client: HeadsetClient,
+    session: Session,
+    damage: dict[str, Any],
+) -> None:
+    begin(stage)
+    whole = {"before_m": [0.0] * 3, "hand_E_m": [0.0, 0.0, 0.5], "nudge_arcmin": [1.0, 1.0]}
+    session.record("verifying", **({} if damage == {"eye": "left"} else whole) | damage)
+    again = Stage(server, client, session)
+    assert again.state() is State.APPLIED
+
+
+def test_verifications_alone_make_a_result(stage: Stage) -> None:
+    """With a stored φ, or the offline calibration, no alignment is needed."""
+    for eye in EYES:
+        stage.hold()
+        verify(stage, eye)
+        stage.calibration.nudge(eye, 1.0, -1.0)
+        stage.hold(frames=2)
+        eventually(lambda: stage.calibration.is_applied)
+        stage.calibration.verified()
+        stage.calibration.wait_applied()
+    results = stage.calibration.results
+    assert results is not None
+    assert set(results.eyes) == set(EYES)
+    assert not stage.calibration.alignments
+    assert stage.state() is State.APPLIED
+
+
+def test_a_headset_that_reconnects_is_asked_again(
+    stage: Stage, server: HeadsetServer, client: HeadsetClient
+) -> None:
+    begin(stage)
+    client.close()
+    with connect(server) as other:
+        eventually(lambda: other.state().verify)
+        assert other.state().eyes == ("left",)
