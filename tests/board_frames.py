@@ -8,7 +8,7 @@ import numpy as np
 
 from handcal.core.geometry import image_points, invert, rigid, transform
 from handcal.core.types import Float32, Float64, Frame, Intrinsics
-from handcal.rig.board import Board, BoardView, corners_m
+from handcal.rig.boards.board import Board, BoardView, corners_m
 from handcal.sim.boards import BoardPainter, board_view, pixel_rays
 from handcal.sim.sensor import SensorSettings, sense_depth
 

@@ -61,9 +61,9 @@ _LONG = {
     "tests/lab/bench/test_offline.py",
     "tests/lab/bench/test_run.py",
     "tests/register/test_consistent.py",
-    "tests/rig/test_board.py",
-    "tests/rig/test_corpus.py",
-    "tests/rig/test_stereo.py",
+    "tests/rig/boards/test_board.py",
+    "tests/rig/boards/test_corpus.py",
+    "tests/rig/lens/test_stereo.py",
 }
 """Files of long series that are not quick; the files beside them test the same code."""
 _PROGRAMS = {

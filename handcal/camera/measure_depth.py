@@ -11,10 +11,10 @@ from handcal.core.errors import CameraEndError
 from handcal.core.progress import Progress
 from handcal.core.rig_types import DepthCheck
 from handcal.core.types import Frame
-from handcal.rig.board import Board, BoardError
-from handcal.rig.choose import ChooseSettings, ViewSelector
+from handcal.rig.boards.board import Board, BoardError
+from handcal.rig.boards.choose import ChooseSettings, ViewSelector
+from handcal.rig.boards.views import MAX_VIEWS, ViewsError
 from handcal.rig.depth import DepthView, depth_view, fit_depth
-from handcal.rig.views import MAX_VIEWS, ViewsError
 
 _SILENT_S = 5.0
 

@@ -15,9 +15,9 @@ from handcal.core.progress import Progress
 from handcal.core.types import CameraIdentity, Frame, UInt8
 from handcal.io.files import make_folder
 from handcal.io.images import png_bytes, write_png
-from handcal.rig.board import Board, BoardError, BoardView
-from handcal.rig.board_finder import find_board
-from handcal.rig.choose import ChooseSettings, ViewSelector
+from handcal.rig.boards.board import Board, BoardError, BoardView
+from handcal.rig.boards.choose import ChooseSettings, ViewSelector
+from handcal.rig.boards.finder import find_board
 from handcal.rig.formats import write_intrinsics, write_pose
 
 IMAGER, DEPTH_TO_COLOR = "depth-imager.json", "depth-to-color.json"

@@ -54,7 +54,7 @@ _HOW: dict[RigPart, str] = {
 )
 def accept(arguments: argparse.Namespace) -> None:
     """Check a rig without a wearer, with a camera in the eye's place; exit code 1 if it fails."""
-    from handcal.rig.acceptance import (
+    from handcal.rig.acceptance.acceptance import (
         AcceptanceSettings,
         passed_words,
         run_acceptance,
@@ -109,9 +109,9 @@ def simulate(arguments: argparse.Namespace) -> None:
     """Render the images of an offline calibration and of an acceptance, to practise with."""
     import numpy as np
 
+    from handcal.rig.displays.grid import Grid
     from handcal.rig.example import example_rig
     from handcal.rig.formats import write_intrinsics
-    from handcal.rig.grid import Grid
     from handcal.rig.rig_file import read_rig
     from handcal.sim.acceptance import write_acceptance
     from handcal.sim.photographs import BOARD, DEPTH_CAMERA, HEADSET_CAMERA, write_photographs

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, get_args
 from handcal.cli.output import console, show_progress, table
 from handcal.cli.terminal import arg, flag, number, value
 from handcal.core.errors import HandcalError
-from handcal.rig.board import Board, BoardKind
+from handcal.rig.boards.board import Board, BoardKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from handcal.rig.grid import Grid
+    from handcal.rig.boards.views import BoardImage
+    from handcal.rig.displays.grid import Grid
     from handcal.rig.verdict import CalibrationVerdict
-    from handcal.rig.views import BoardImage
 
 _BOARD = Board()
 _SIDE = number(float, 1.0, 1000.0)
@@ -57,7 +57,7 @@ def board_of(arguments: argparse.Namespace) -> Board:
 
 def grid_of(arguments: argparse.Namespace, width_px: int, height_px: int) -> Grid:
     """Return the grid that the options describe; HandcalError if the display is too small."""
-    from handcal.rig.grid import grid_on
+    from handcal.rig.displays.grid import grid_on
 
     return grid_on(width_px, height_px, arguments.square_px)
 
@@ -66,7 +66,7 @@ def views_of(
     paths: Iterable[Path], board: Board, dropped: Sequence[str] = ()
 ) -> tuple[BoardImage, ...]:
     """Look for a board in images, with progress; leave those out that are dropped."""
-    from handcal.rig.views import drop, image_files, read_views
+    from handcal.rig.boards.views import drop, image_files, read_views
 
     with show_progress() as progress:
         views = read_views(image_files(paths), board, progress)

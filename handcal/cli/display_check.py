@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from handcal.core.rig_types import Rig
     from handcal.core.types import Eye
     from handcal.link.server import HeadsetServer
-    from handcal.rig.display_check import Probe
+    from handcal.rig.displays.display_check import Probe
     from handcal.station.checks.display_check import Answer, Observe, Show
 
 _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-plane"

@@ -27,16 +27,16 @@ from handcal.cli.output import console, show_progress, until_interrupted
 from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
 from handcal.core.errors import FileError, HandcalError
 from handcal.io.files import make_folder, write_json
-from handcal.rig.camera import LENS_CHOICES
+from handcal.rig.boards.print_page import PAPERS
+from handcal.rig.boards.views import MAX_VIEWS
 from handcal.rig.formats import CALIBRATION_FORMATS
-from handcal.rig.print_page import PAPERS
-from handcal.rig.views import MAX_VIEWS
+from handcal.rig.lens.camera import LENS_CHOICES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from handcal.rig.boards.views import WorstView
     from handcal.rig.verdict import CalibrationVerdict
-    from handcal.rig.views import WorstView
 
 
 _CALIBRATION_OPTIONS = (
@@ -68,7 +68,7 @@ _CALIBRATION_OPTIONS = (
 def board(arguments: argparse.Namespace) -> None:
     """Make a calibration board: a PDF at true size, or a PNG for a screen."""
     from handcal.io.images import write_png
-    from handcal.rig.board_print import draw_board, write_board_pdf
+    from handcal.rig.boards.printing import draw_board, write_board_pdf
 
     if arguments.pdf is None and arguments.png is None:
         fail("no output given; add --pdf FILE, --png FILE or both", 2)
@@ -125,7 +125,7 @@ def take(arguments: argparse.Namespace) -> None:
     from handcal.camera.playback import PlaybackSettings
     from handcal.camera.take_board import TakeSettings, capture_views, keep_imager
     from handcal.camera.view_source import open_view_source
-    from handcal.rig.choose import ALIKE, ChooseSettings
+    from handcal.rig.boards.choose import ALIKE, ChooseSettings
 
     sources = [arguments.source, arguments.headset] if arguments.headset else [arguments.source]
     if len(set(sources)) < len(sources):
@@ -164,8 +164,8 @@ def take(arguments: argparse.Namespace) -> None:
 )
 def camera(arguments: argparse.Namespace) -> None:
     """Calibrate a camera's intrinsics from images of a board."""
-    from handcal.rig.camera import CameraSettings, calibrate_camera
     from handcal.rig.formats import camera_json, write_intrinsics
+    from handcal.rig.lens.camera import CameraSettings, calibrate_camera
 
     views = views_of(arguments.images, board_of(arguments), arguments.drop)
     result = calibrate_camera(views, CameraSettings(lens=arguments.lens))
@@ -226,9 +226,9 @@ def stereo(arguments: argparse.Namespace) -> None:
     """Calibrate the depth camera's pose on the headset from image pairs of one board."""
     import numpy as np
 
+    from handcal.rig.boards.views import pair_views
     from handcal.rig.formats import stereo_json, write_pose
     from handcal.rig.steps import calibrate_depth_camera
-    from handcal.rig.views import pair_views
 
     if arguments.format == "ros":
         raise HandcalError(

@@ -34,7 +34,7 @@ from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.core.types import Intrinsics
-    from handcal.rig.viewpoint import ViewpointPose
+    from handcal.rig.lens.viewpoint import ViewpointPose
 
 _METRES = number(float, 0.1, 100.0)
 _DISPLAY = arg(
@@ -55,7 +55,7 @@ _DISPLAY = arg(
 def grid(arguments: argparse.Namespace) -> None:
     """Make the grid that a display shows to the viewpoint camera, pixel for pixel."""
     from handcal.io.images import write_png
-    from handcal.rig.grid import draw_grid
+    from handcal.rig.displays.grid import draw_grid
 
     made = grid_of(arguments, *arguments.display)
     make_folder(arguments.png.parent)
@@ -73,7 +73,7 @@ def grid(arguments: argparse.Namespace) -> None:
 def gray(arguments: argparse.Namespace) -> None:
     """Make the Gray-code patterns that a display shows one after the other, in place of a grid."""
     from handcal.io.images import write_png
-    from handcal.rig.gray_code import gray_patterns
+    from handcal.rig.displays.gray_code import gray_patterns
 
     made = dict(gray_patterns(*arguments.display))
     make_folder(arguments.output)
@@ -140,8 +140,8 @@ def display(arguments: argparse.Namespace) -> None:
     import numpy as np
 
     from handcal.rig.assemble import with_display
+    from handcal.rig.displays.gray_code import flatness_arcmin, read_gray_code
     from handcal.rig.formats import read_intrinsics
-    from handcal.rig.gray_code import flatness_arcmin, read_gray_code
     from handcal.rig.steps import DisplayInputs, calibrate_by_gray_code, calibrate_eye_display
 
     rig, eye = rig_or_example(arguments.rig), arguments.eye

@@ -14,12 +14,12 @@ import numpy as np
 
 from handcal.core.rig_types import Origin, Rig, RigPart
 from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics
+from handcal.rig.boards.views import ViewsError
 from handcal.rig.check import MAX_TEXT
-from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration, Screen
-from handcal.rig.lens import as_pinhole
-from handcal.rig.stereo import StereoCalibration
+from handcal.rig.displays.display import DISPLAY_PARAMETERS, DisplayCalibration, Screen
+from handcal.rig.lens.lens import as_pinhole
+from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import ViewsError
 
 STEREO_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m")
 """Parameters of the covariance of T_H_D."""

@@ -18,12 +18,12 @@ from handcal.core.geometry import image_points, invert, transform
 from handcal.core.rig_types import DepthCheck
 from handcal.core.types import Float64, Frame
 from handcal.report.cells import signed
-from handcal.rig.board import BoardError, BoardView
+from handcal.rig.boards.board import BoardError, BoardView
+from handcal.rig.boards.views import ViewsError
 from handcal.rig.check import MAX_RANGES
-from handcal.rig.display import undistort
-from handcal.rig.fit import clustered_covariance
-from handcal.rig.viewpoint import board_pose
-from handcal.rig.views import ViewsError
+from handcal.rig.displays.display import undistort
+from handcal.rig.lens.fit import clustered_covariance
+from handcal.rig.lens.viewpoint import board_pose
 
 MIN_DEPTH_VIEWS = 5
 _LEAST_SPREAD = 1.3

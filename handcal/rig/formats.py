@@ -20,13 +20,13 @@ from handcal.core.errors import FileError, HandcalError
 from handcal.core.geometry import camera_matrix, is_rigid, rigid
 from handcal.core.types import CameraIdentity, Float64, Intrinsics
 from handcal.io.files import read_json, read_limited, write_atomic, write_json
-from handcal.rig.camera import CameraCalibration
+from handcal.rig.boards.views import WorstView
 from handcal.rig.check import check_intrinsics, identity_from_json, require
-from handcal.rig.lens import Camera, FisheyeIntrinsics, as_pinhole
-from handcal.rig.stereo import StereoCalibration
+from handcal.rig.lens.camera import CameraCalibration
+from handcal.rig.lens.lens import Camera, FisheyeIntrinsics, as_pinhole
+from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
-from handcal.rig.views import WorstView
 
 CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
 CALIBRATION_FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")

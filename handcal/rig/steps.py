@@ -12,8 +12,9 @@ from handcal.core.errors import HandcalError
 from handcal.core.rig_types import Rig
 from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics
 from handcal.rig.assemble import screen_of
-from handcal.rig.camera import CameraSettings, LensChoice
-from handcal.rig.display import (
+from handcal.rig.boards.tracked_file import read_tracked
+from handcal.rig.boards.views import BoardImage, used
+from handcal.rig.displays.display import (
     DisplayCalibration,
     DisplaySettings,
     Screen,
@@ -21,12 +22,11 @@ from handcal.rig.display import (
     fit_homography,
     pixel_size_m,
 )
+from handcal.rig.displays.grid import GridView, grid_on, on_display
 from handcal.rig.formats import read_camera, read_identity, read_intrinsics, read_pose, read_stereo
-from handcal.rig.grid import GridView, grid_on, on_display
-from handcal.rig.stereo import StereoCalibration, StereoSettings, calibrate_stereo
-from handcal.rig.tracked_file import read_tracked
-from handcal.rig.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
-from handcal.rig.views import BoardImage, used
+from handcal.rig.lens.camera import CameraSettings, LensChoice
+from handcal.rig.lens.stereo import StereoCalibration, StereoSettings, calibrate_stereo
+from handcal.rig.lens.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
 
 
 @dataclass(frozen=True, slots=True)

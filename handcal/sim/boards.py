@@ -10,8 +10,8 @@ import numpy as np
 
 from handcal.core.geometry import camera_matrix, image_points, invert, rigid, transform
 from handcal.core.types import Float32, Float64, Intrinsics, UInt8
-from handcal.rig.board import Board, BoardView, corners_m
-from handcal.rig.board_print import draw_board
+from handcal.rig.boards.board import Board, BoardView, corners_m
+from handcal.rig.boards.printing import draw_board
 
 _SQUARE_PX = 64  # of the texture
 BLACK, WHITE, WALL = 30.0, 215.0, 120.0

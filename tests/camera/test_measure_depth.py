@@ -14,8 +14,8 @@ from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
 from handcal.core.progress import Progress
 from handcal.core.rig_types import DepthCheck
 from handcal.core.types import Frame
-from handcal.rig.board import Board
-from handcal.rig.views import ViewsError
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.views import ViewsError
 from handcal.sim.boards import BoardPainter, PictureSettings
 from tests.board_frames import BOARD, COLOR, frames, poses
 

@@ -26,10 +26,10 @@ from handcal.core.progress import Progress
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8
 from handcal.io.closable import Closable
 from handcal.io.images import read_image
-from handcal.rig.board import Board
-from handcal.rig.choose import ChooseSettings
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.choose import ChooseSettings
+from handcal.rig.boards.views import image_files, pair_views, read_views
 from handcal.rig.formats import read_identity, read_intrinsics, read_pose
-from handcal.rig.views import image_files, pair_views, read_views
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 
 BOARD = Board(squares=(7, 5), square_m=0.035, marker_m=0.025)

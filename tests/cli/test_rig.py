@@ -16,8 +16,8 @@ from handcal.cli.main import main
 from handcal.core.geometry import rigid
 from handcal.core.types import Float64, Intrinsics
 from handcal.io.images import read_image
-from handcal.rig.board import Board
-from handcal.rig.board_finder import find_board
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.finder import find_board
 from handcal.rig.formats import read_intrinsics, read_pose, write_intrinsics, write_pose
 from handcal.sim.boards import BoardPainter, board_poses
 

@@ -8,8 +8,8 @@ import pytest
 from handcal.core.errors import FileError
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Intrinsics
-from handcal.rig.board import Board
-from handcal.rig.camera import calibrate_camera
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.views import BoardImage
 from handcal.rig.formats import (
     CALIBRATION_FORMATS,
     CalibrationFormat,
@@ -22,9 +22,9 @@ from handcal.rig.formats import (
     write_intrinsics,
     write_pose,
 )
-from handcal.rig.stereo import calibrate_stereo
+from handcal.rig.lens.camera import calibrate_camera
+from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.rig.storage import MAX_STORAGE_BYTES
-from handcal.rig.views import BoardImage
 from handcal.sim.boards import board_poses, board_view
 
 FIVE = (0.1, -0.2, 1 / 3 * 1e-3, 0.002, 0.03)

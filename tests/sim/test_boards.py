@@ -2,7 +2,7 @@ import numpy as np
 
 from handcal.core.geometry import image_points, rigid, transform
 from handcal.core.types import Intrinsics
-from handcal.rig.board import Board, corners_m
+from handcal.rig.boards.board import Board, corners_m
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses, board_view
 
 BOARD = Board(kind="checkerboard")

@@ -19,9 +19,9 @@ from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
 from handcal.lab.bench.trials import Measured
 from handcal.report.statistics import MeanInterval
 from handcal.rig.assemble import screen_of, with_display, with_stereo
-from handcal.rig.board import Board
-from handcal.rig.camera import calibrate_camera
-from handcal.rig.display import (
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.views import BoardImage, board_image
+from handcal.rig.displays.display import (
     DisplayHomography,
     DisplaySettings,
     calibrate_display,
@@ -29,11 +29,11 @@ from handcal.rig.display import (
     pixel_size_m,
     undistort,
 )
+from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
-from handcal.rig.grid import Grid, GridView, draw_grid, find_grid
-from handcal.rig.stereo import calibrate_stereo
-from handcal.rig.viewpoint import viewpoint_from_stereo
-from handcal.rig.views import BoardImage, board_image
+from handcal.rig.lens.camera import calibrate_camera
+from handcal.rig.lens.stereo import calibrate_stereo
+from handcal.rig.lens.viewpoint import viewpoint_from_stereo
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 

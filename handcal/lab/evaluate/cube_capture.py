@@ -22,10 +22,10 @@ from handcal.lab.evaluate.cube_folder import (
     PlannedCapture,
     missing_captures,
 )
-from handcal.rig.board import BoardError
-from handcal.rig.board_finder import find_board
-from handcal.rig.cube import Cube, CubeError, find_cube
-from handcal.rig.grid import Grid
+from handcal.rig.boards.board import BoardError
+from handcal.rig.boards.finder import find_board
+from handcal.rig.cube.cube import Cube, CubeError, find_cube
+from handcal.rig.displays.grid import Grid
 
 # Images buffered by the camera were taken before the operator was ready.
 _STALE_IMAGES = 5

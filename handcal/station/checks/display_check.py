@@ -17,7 +17,7 @@ from handcal.core.progress import Progress
 from handcal.core.rig_types import DisplayCheck, Rig
 from handcal.core.types import EYES, Eye, HeadsetIdentity, UInt8
 from handcal.link.server import HeadsetServer
-from handcal.rig.display_check import (
+from handcal.rig.displays.display_check import (
     PROBES,
     Probe,
     Shown,

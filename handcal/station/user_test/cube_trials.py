@@ -26,9 +26,9 @@ from handcal.core.types import EYES, Eye, Float64
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
 from handcal.register.results import read_rendered_shift_m
-from handcal.rig.cube import Cube
-from handcal.rig.cube_file import read_cube
-from handcal.rig.cube_track import TrackedCube, facing_corners_m
+from handcal.rig.cube.cube import Cube
+from handcal.rig.cube.cube_file import read_cube
+from handcal.rig.cube.track import TrackedCube, facing_corners_m
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial
 from handcal.sim.cube_bench import simulated_wearer

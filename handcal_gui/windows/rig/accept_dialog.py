@@ -13,8 +13,8 @@ from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye
 from handcal.io.images import IMAGE_SUFFIXES
-from handcal.rig.accept import FEWEST_VIEWS, LIMIT_ARCMIN
-from handcal.rig.acceptance import (
+from handcal.rig.acceptance.accept import FEWEST_VIEWS, LIMIT_ARCMIN
+from handcal.rig.acceptance.acceptance import (
     Acceptance,
     AcceptanceSettings,
     passed_words,
@@ -22,9 +22,9 @@ from handcal.rig.acceptance import (
     view_rows,
 )
 from handcal.rig.assemble import screen_of
-from handcal.rig.board import Board
-from handcal.rig.choose import ALIKE, ChooseSettings
-from handcal.rig.grid import grid_on
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.choose import ALIKE, ChooseSettings
+from handcal.rig.displays.grid import grid_on
 from handcal.rig.rig_file import write_rig
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX

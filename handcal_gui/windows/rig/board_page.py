@@ -19,10 +19,10 @@ from handcal.core.rig_types import PART_NAMES, Rig
 from handcal.core.types import UInt8
 from handcal.io.images import write_png
 from handcal.io.resources import resource_path
-from handcal.rig.board import DICTIONARIES, Board, BoardKind
-from handcal.rig.board_print import draw_board, write_board_pdf
+from handcal.rig.boards.board import DICTIONARIES, Board, BoardKind
+from handcal.rig.boards.print_page import Paper
+from handcal.rig.boards.printing import draw_board, write_board_pdf
 from handcal.rig.compare import compare_rigs
-from handcal.rig.print_page import Paper
 from handcal.rig.rig_file import read_rig
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob

@@ -8,7 +8,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from handcal.rig.views import Coverage
+from handcal.rig.boards.views import Coverage
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr
 

@@ -12,8 +12,8 @@ from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import Eye
 from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
-from handcal.rig.choose import ALIKE
-from handcal.rig.grid import Grid, draw_grid, grid_on
+from handcal.rig.boards.choose import ALIKE
+from handcal.rig.displays.grid import Grid, draw_grid, grid_on
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm

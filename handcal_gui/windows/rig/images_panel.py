@@ -10,8 +10,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
 
 from handcal.io.files import user_path
-from handcal.rig.board import Board
-from handcal.rig.views import coverage
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.views import coverage
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QComboBox
 
-from handcal.rig.camera import LensChoice
+from handcal.rig.lens.camera import LensChoice
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField

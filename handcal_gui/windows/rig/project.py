@@ -15,7 +15,7 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.rig_types import Rig
 from handcal.io.files import read_json, user_path
-from handcal.rig.board import Board
+from handcal.rig.boards.board import Board
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal_gui.translation import tr

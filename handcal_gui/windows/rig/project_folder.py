@@ -14,9 +14,9 @@ from handcal.core.rig_types import Rig
 from handcal.io.files import make_folder, read_json, user_path, write_json
 from handcal.io.resources import resource_path
 from handcal.io.settings import read_settings, settings_json
-from handcal.rig.board import Board
-from handcal.rig.camera import LensChoice
-from handcal.rig.print_page import Paper
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.print_page import Paper
+from handcal.rig.lens.camera import LensChoice
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.steps import DisplayInputs
 from handcal_gui.translation import tr

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from handcal.core.rig_types import Rig
 from handcal.core.types import EYES, Eye, Float64
 from handcal.rig.assemble import STEREO_PARAMETERS
-from handcal.rig.camera import CameraCalibration
 from handcal.rig.compare import compare_rigs
-from handcal.rig.display import DISPLAY_PARAMETERS, DisplayCalibration
-from handcal.rig.stereo import StereoCalibration
+from handcal.rig.displays.display import DISPLAY_PARAMETERS, DisplayCalibration
+from handcal.rig.lens.camera import CameraCalibration
+from handcal.rig.lens.stereo import StereoCalibration
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.number_table import Row

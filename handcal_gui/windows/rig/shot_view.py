@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.core.errors import FileError
 from handcal.core.types import UInt8
-from handcal.rig.board import BoardView
-from handcal.rig.views import BoardImage
+from handcal.rig.boards.board import BoardView
+from handcal.rig.boards.views import BoardImage
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX, colors
 from handcal_gui.translation import tr

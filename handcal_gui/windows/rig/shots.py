@@ -13,8 +13,8 @@ from handcal.core.errors import FileError
 from handcal.core.progress import Progress
 from handcal.core.types import UInt8
 from handcal.io.images import read_image
-from handcal.rig.board import Board
-from handcal.rig.views import BoardImage, image_files, pair_views, read_views
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.views import BoardImage, image_files, pair_views, read_views
 from handcal_gui.translation import tr
 
 _SMALL_PX = 96

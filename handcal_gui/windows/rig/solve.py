@@ -12,9 +12,11 @@ from handcal.core.rig_types import Rig
 from handcal.core.types import Eye
 from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
-from handcal.rig.camera import CameraSettings, calibrate_camera, tilt
+from handcal.rig.boards.views import BoardImage, WorstView
 from handcal.rig.formats import camera_json, read_intrinsics
-from handcal.rig.lens import Camera, first_pose
+from handcal.rig.lens.camera import CameraSettings, calibrate_camera, tilt
+from handcal.rig.lens.lens import Camera, first_pose
+from handcal.rig.lens.uncertainty import ProjectionUncertainty
 from handcal.rig.steps import (
     calibrate_depth_camera,
     calibrate_eye_display,
@@ -23,9 +25,7 @@ from handcal.rig.steps import (
     intrinsics_in,
     pose_in,
 )
-from handcal.rig.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
-from handcal.rig.views import BoardImage, WorstView
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.project_folder import (

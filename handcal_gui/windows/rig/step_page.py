@@ -11,9 +11,9 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QGridLayout, QTabWidget, QWidget
 
 from handcal.core.rig_types import Origin
-from handcal.rig.board import Board
-from handcal.rig.choose import ChooseSettings
-from handcal.rig.views import ASKED_VIEWS
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.choose import ChooseSettings
+from handcal.rig.boards.views import ASKED_VIEWS
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip

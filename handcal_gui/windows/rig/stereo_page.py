@@ -8,7 +8,7 @@ from functools import partial
 from PySide6.QtWidgets import QWidget
 
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
-from handcal.rig.views import ASKED_VIEWS
+from handcal.rig.boards.views import ASKED_VIEWS
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField

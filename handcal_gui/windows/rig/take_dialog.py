@@ -16,9 +16,9 @@ from handcal.camera.take_board import are_kept, keep_imager, keep_images, see_bo
 from handcal.camera.view_source import open_view_source
 from handcal.camera.viewpoint import ViewpointCamera, list_viewpoints
 from handcal.core.progress import Progress
-from handcal.rig.board import Board, BoardView
-from handcal.rig.choose import ChooseSettings, ViewSelector, variety
-from handcal.rig.views import ASKED_VIEWS, BoardImage, board_image, coverage
+from handcal.rig.boards.board import Board, BoardView
+from handcal.rig.boards.choose import ChooseSettings, ViewSelector, variety
+from handcal.rig.boards.views import ASKED_VIEWS, BoardImage, board_image, coverage
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.engine.latest_job import LatestJob
 from handcal_gui.theme import SPACING_PX

@@ -6,7 +6,7 @@ import numpy as np
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QPainter
 
-from handcal.rig.uncertainty import GRID, ProjectionUncertainty
+from handcal.rig.lens.uncertainty import GRID, ProjectionUncertainty
 from handcal_gui.translation import tr
 from handcal_gui.windows.rig.coverage_map import CellMap, shade
 

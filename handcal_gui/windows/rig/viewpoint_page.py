@@ -7,7 +7,7 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
-from handcal.rig.views import ASKED_VIEWS
+from handcal.rig.boards.views import ASKED_VIEWS
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm

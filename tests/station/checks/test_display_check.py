@@ -16,7 +16,7 @@ from handcal.core.rig_types import DisplayCheck
 from handcal.core.types import Eye, HeadsetIdentity
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
-from handcal.rig.display_check import Probe
+from handcal.rig.displays.display_check import Probe
 from handcal.rig.example import example_rig
 from handcal.rig.report import display_finding, report_rig
 from handcal.rig.rig_file import read_rig, write_rig

@@ -15,8 +15,8 @@ from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Float64, Intrinsics, UInt8
-from handcal.rig import board_finder
-from handcal.rig.board import Board, Int64
+from handcal.rig.boards import finder as board_finder
+from handcal.rig.boards.board import Board, Int64
 from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_photographs
 from handcal_gui.windows.rig.project_folder import (

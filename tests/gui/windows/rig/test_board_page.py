@@ -20,7 +20,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.rig_types import Origin
-from handcal.rig.board import Board
+from handcal.rig.boards.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal_gui.widgets.image_view import ImageView

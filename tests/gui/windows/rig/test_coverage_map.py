@@ -2,7 +2,7 @@ import numpy as np
 from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
-from handcal.rig.views import Coverage
+from handcal.rig.boards.views import Coverage
 from handcal_gui.windows.rig.coverage_map import CoverageMap
 
 

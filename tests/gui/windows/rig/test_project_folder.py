@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handcal.core.errors import FileError
-from handcal.rig.board import Board
+from handcal.rig.boards.board import Board
 from handcal.rig.example import example_rig
 from handcal_gui.windows.rig.project_folder import (
     DisplayEntries,

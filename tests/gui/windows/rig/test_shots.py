@@ -7,7 +7,7 @@ import pytest
 from handcal.camera.take_board import keep_images
 from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
-from handcal.rig.views import ViewsError
+from handcal.rig.boards.views import ViewsError
 from handcal_gui.windows.rig.shots import excluding, look
 
 

@@ -26,7 +26,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import RealSenseSettings
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.errors import CameraError
-from handcal.rig.choose import ALIKE, ChooseSettings
+from handcal.rig.boards.choose import ALIKE, ChooseSettings
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_cameras import LiveCameras

@@ -1,0 +1,221 @@
+"""Lens models: OpenCV's pinhole with 0 to 14 coefficients, and the fisheye of Kannala and Brandt.
+
+Parameters are in the order fx, fy, cx, cy, coefficients. The fisheye is OpenCV's, after "A generic
+camera model and calibration method for conventional, wide-angle, and fish-eye lenses", 2006: the
+distance from the image's middle is a polynomial in the angle from the axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import cv2
+import numpy as np
+
+from handcal.core.errors import HandcalError
+from handcal.core.geometry import rigid
+from handcal.core.types import Float64, Intrinsics
+from handcal.rig.boards.board import BoardView
+
+LensModel: TypeAlias = Literal["none", "radial", "full", "rational", "prism", "tilted", "fisheye"]
+# The number of coefficients in a result, and which of them are solved for.
+_COEFFICIENTS: dict[LensModel, tuple[int, tuple[int, ...]]] = {
+    "none": (0, ()),
+    "radial": (5, (0, 1)),
+    "full": (5, tuple(range(5))),
+    "rational": (8, tuple(range(8))),
+    "prism": (12, tuple(range(12))),
+    "tilted": (14, tuple(range(14))),
+    "fisheye": (4, tuple(range(4))),
+}
+# Corners farther from the axis are not used for a first pose: z = 1 magnifies their errors.
+_MAX_TANGENT = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class FisheyeIntrinsics:
+    """A fisheye camera in pixels, with OpenCV's four coefficients of `cv2.fisheye`.
+
+    A type of its own, because to project with it as with a pinhole would be silently wrong.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, ...] = (0.0,) * 4
+
+
+Camera: TypeAlias = Intrinsics | FisheyeIntrinsics
+
+
+def undistorted_camera(lens: LensModel, size: tuple[int, int], focal_px: float) -> Camera:
+    """Return a camera of a lens model with all coefficients 0, its axis in the image's middle."""
+    width, height = size
+    kind = FisheyeIntrinsics if lens == "fisheye" else Intrinsics
+    middle = (width - 1) / 2, (height - 1) / 2
+    return kind(width, height, focal_px, focal_px, *middle, (0.0,) * _COEFFICIENTS[lens][0])
+
+
+def as_lens(camera: Camera, lens: LensModel) -> Camera:
+    """Return a camera with the coefficients of a richer or poorer model of the same kind."""
+    count, solved = _COEFFICIENTS[lens]
+    padded = [*camera.distortion, *[0.0] * count]
+    coefficients = tuple(padded[n] if n in solved else 0.0 for n in range(count))
+    return replace(camera, distortion=coefficients)
+
+
+def solved_parameters(lens: LensModel) -> list[int]:
+    """Return which parameters a lens model solves for."""
+    return [*range(4), *(4 + number for number in _COEFFICIENTS[lens][1])]
+
+
+def parameters(camera: Camera) -> Float64:
+    """Return fx, fy, cx, cy and the coefficients."""
+    return np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion])
+
+
+def with_parameters(camera: Camera, values: Float64) -> Camera:
+    """Return the camera with other parameters."""
+    fx, fy, cx, cy, *coefficients = (float(one) for one in values)
+    return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=tuple(coefficients))
+
+
+def predict(points_m: Float64, pose: Float64, camera: Camera) -> tuple[Float64, Float64]:
+    """Return pixels (N, 2) of points in a board's frame, and their derivatives.
+
+    Parameters
+    ----------
+    points_m : (N, 3) float64
+    pose : (6,) float64
+        Rotation vector and translation of the board in the camera's frame.
+    camera : Camera
+
+    Returns
+    -------
+    pixels : (N, 2) float64
+    derivatives : (2 N, 6 + parameters) float64
+        By the pose and by the camera's parameters.
+    """
+    K = camera_matrix_of(camera)
+    if isinstance(camera, FisheyeIntrinsics):
+        pixels, by = cv2.fisheye.projectPoints(
+            points_m[:, None], pose[:3], pose[3:], K, np.array(camera.distortion)
+        )
+        # Columns of cv2.fisheye: f, c, coefficients, pose, skew.
+        by = np.hstack([by[:, 8:14], by[:, :8]])
+        return np.asarray(pixels, np.float64).reshape(-1, 2), np.asarray(by, np.float64)
+    # Without coefficients OpenCV gives derivatives by five of them.
+    pixels, by = cv2.projectPoints(
+        points_m, pose[:3], pose[3:], K, np.array(camera.distortion or (0.0,) * 5)
+    )
+    by = np.asarray(by, np.float64)[:, : 10 + len(camera.distortion)]
+    return np.asarray(pixels, np.float64).reshape(-1, 2), by
+
+
+def pixels_of(points_m: Float64, pose: Float64, camera: Camera) -> Float64:
+    """Return the pixels that `predict` returns, without derivatives, in a fraction of the time."""
+    project = cv2.fisheye if isinstance(camera, FisheyeIntrinsics) else cv2
+    coefficients = np.array(camera.distortion or (0.0,) * 5)
+    pixels, _ = project.projectPoints(
+        points_m[:, None], pose[:3], pose[3:], camera_matrix_of(camera), coefficients
+    )
+    return np.asarray(pixels, np.float64).reshape(-1, 2)
+
+
+def derivatives_at(points_m: Float64, camera: Camera) -> tuple[Float64, Float64, Float64]:
+    """Return pixels of points in the camera's frame, and their derivatives.
+
+    Up to eight coefficients it takes a fraction of the time of `predict`; otherwise it is that.
+
+    Returns
+    -------
+    pixels : (N, 2) float64
+    by_point : (2 N, 3) float64
+    by_parameters : (2 N, parameters) float64
+        In the order of `parameters`.
+    """
+    count = len(camera.distortion)
+    if isinstance(camera, FisheyeIntrinsics) or count > 8:
+        pixels, by = predict(points_m, np.zeros(6), camera)
+        return pixels, by[:, 3:6], by[:, 6:]
+    k1, k2, p1, p2, k3, k4, k5, k6 = [*camera.distortion, *[0.0] * (8 - count)]
+    depth_m = points_m[:, 2]
+    x, y = points_m[:, 0] / depth_m, points_m[:, 1] / depth_m
+    xx, yy, xy = x * x, y * y, x * y
+    r2 = xx + yy
+    r4, r6 = r2 * r2, r2 * r2 * r2
+    below = 1.0 / (1.0 + k4 * r2 + k5 * r4 + k6 * r6)
+    radial = (1.0 + k1 * r2 + k2 * r4 + k3 * r6) * below
+    by_r2 = (k1 + 2.0 * k2 * r2 + 3.0 * k3 * r4) * below
+    by_r2 -= radial * below * (k4 + 2.0 * k5 * r2 + 3.0 * k6 * r4)
+    bent_x, bent_y = r2 + 2.0 * xx, r2 + 2.0 * yy
+    seen_x = x * radial + 2.0 * p1 * xy + p2 * bent_x
+    seen_y = y * radial + p1 * bent_y + 2.0 * p2 * xy
+    # Derivatives of the distorted place by the undistorted one; the mixed ones are equal.
+    xx_by = camera.fx * (radial + 2.0 * xx * by_r2 + 2.0 * p1 * y + 6.0 * p2 * x)
+    yy_by = camera.fy * (radial + 2.0 * yy * by_r2 + 6.0 * p1 * y + 2.0 * p2 * x)
+    mixed = 2.0 * (xy * by_r2 + p1 * x + p2 * y)
+    by_point = np.empty((len(x), 2, 3))
+    for row, by_x, by_y in ((0, xx_by, camera.fx * mixed), (1, camera.fy * mixed, yy_by)):
+        by_point[:, row, 0] = by_x / depth_m
+        by_point[:, row, 1] = by_y / depth_m
+        by_point[:, row, 2] = -(by_x * x + by_y * y) / depth_m
+    by_parameters = np.zeros((len(x), 2, 4 + count))
+    for row, focal, along, seen, tangential in (
+        (0, camera.fx, x, seen_x, (2.0 * xy, bent_x)),
+        (1, camera.fy, y, seen_y, (bent_y, 2.0 * xy)),
+    ):
+        by_parameters[:, row, row] = seen
+        by_parameters[:, row, 2 + row] = 1.0
+        above = focal * along * below
+        radially = (above * r2, above * r4, focal * tangential[0], focal * tangential[1])
+        beyond = (above * r6, *(-radial * above * power for power in (r2, r4, r6)))
+        for number, column in enumerate((*radially, *beyond)[:count]):
+            by_parameters[:, row, 4 + number] = column
+    pixels = np.column_stack([camera.fx * seen_x + camera.cx, camera.fy * seen_y + camera.cy])
+    return pixels, by_point.reshape(-1, 3), by_parameters.reshape(-1, 4 + count)
+
+
+def camera_matrix_of(camera: Camera) -> Float64:
+    """Return the (3, 3) camera matrix K."""
+    return np.array([[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
+
+
+def to_plane(pixels: Float64, camera: Camera) -> Float64:
+    """Return the points (N, 2) at z = 1 that pixels (N, 2) show."""
+    K, coefficients = camera_matrix_of(camera), np.array(camera.distortion)
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
+    undistort = cv2.fisheye if isinstance(camera, FisheyeIntrinsics) else cv2
+    plane = undistort.undistortPoints(pixels[:, None], K, coefficients, criteria=criteria)
+    return np.asarray(plane, np.float64).reshape(-1, 2)
+
+
+def first_pose(seen: BoardView, camera: Camera) -> Float64 | None:
+    """Return ``T_camera_board`` (4, 4) by PnP, not refined; None without a solution."""
+    plane = to_plane(seen.pixels, camera)
+    usable = np.linalg.norm(plane, axis=1) < _MAX_TANGENT
+    if usable.sum() < 4:
+        return None
+    try:
+        found, rotations, translations, _ = cv2.solvePnPGeneric(
+            seen.points_m[usable], plane[usable], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+        )
+    except cv2.error:
+        return None
+    if not found or not np.isfinite(rotations[0]).all():
+        return None
+    return rigid(cv2.Rodrigues(rotations[0])[0], translations[0].ravel())
+
+
+def as_pinhole(camera: Camera, which: str) -> Intrinsics:
+    """Return a pinhole camera; HandcalError for a fisheye, naming `which` camera it is."""
+    if isinstance(camera, FisheyeIntrinsics):
+        raise HandcalError(
+            f"{which} has a fisheye lens, which is not possible here: use the lens model rational, "
+            "or undistort its images first"
+        )
+    return camera

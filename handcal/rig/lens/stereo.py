@@ -1,0 +1,360 @@
+"""The depth camera's pose in the headset's, from pairs of views of one board (paper: 0.52 px).
+
+Each pair alone gives the pose; the one nearest to the others starts a bundle adjustment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from handcal.core.frozen import freeze
+from handcal.core.types import Float64
+from handcal.rig.boards.board import BoardView
+from handcal.rig.boards.views import (
+    ASKED_VIEWS,
+    BoardImage,
+    ViewsError,
+    WorstView,
+    check_moved,
+    worst_view,
+)
+from handcal.rig.lens.bundle import Adjusted, adjust
+from handcal.rig.lens.camera import (
+    CameraCalibration,
+    CameraSettings,
+    calibrate_camera,
+    normal_spread,
+    tilt,
+)
+from handcal.rig.lens.fit import rms
+from handcal.rig.lens.lens import Camera, LensModel
+from handcal.rig.lens.reprojection import Setup, Sighting, as_transform, as_vector
+from handcal.rig.lens.stereo_pairs import (
+    SWAPPED,
+    Alone,
+    Pair,
+    check_sizes,
+    differences,
+    each_alone,
+    found_by_both,
+    middle,
+    why_apart,
+)
+from handcal.rig.lens.uncertainty import next_pair
+from handcal.rig.verdict import CalibrationVerdict
+
+
+@dataclass(frozen=True, slots=True)
+class StereoSettings:
+    """Limits of a good pose between two cameras."""
+
+    camera: CameraSettings = field(default_factory=CameraSettings)
+    """For intrinsics that are not given."""
+    good_pairs: int = 10
+    good_spread_rad: float = 0.15
+    """Least spread of the boards' normals about their mean, RMS."""
+    max_rms_px: float = 1.0
+    max_angle_sigma_rad: float = 1e-3
+    max_shift_sigma_m: float = 3e-4
+    """Standard deviation of the rotation and the translation, each along its worst axis."""
+    max_shift_m: float = 0.5
+    """Maximum distance between two cameras on one headset."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StereoCalibration:
+    """The pose of the depth camera, with its uncertainty."""
+
+    T_H_D: Float64
+    """(4, 4); from the depth camera (or its colour imager) to the headset's."""
+    covariance: Float64 | None
+    """(6, 6); of T_H_D's rotation vector (rad) and translation (m), with the uncertainty of
+    intrinsics that were solved, not of given ones. None if not determined."""
+    depth: Camera
+    headset: Camera
+    """Given or solved."""
+    rms_px: float
+    """Over both images of all pairs, without `left_out`."""
+    residuals_px: Mapping[str, float]
+    """For each pair, by the name of the depth camera's image."""
+    spread_rad: float
+    spread_m: float
+    """RMS difference between T_H_D and the poses from single pairs."""
+    dropped: tuple[str, ...]
+    """Pairs excluded by the user."""
+    worst: WorstView
+    verdict: CalibrationVerdict
+    left_out: int = 0
+    """Number of single corners that contradict those beside them."""
+    solved: tuple[CameraCalibration | None, CameraCalibration | None] = (None, None)
+    """The depth and the headset camera, each by its own images; None if given."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "T_H_D", np.float64, 4, 4)
+        freeze(self, "covariance", np.float64, 6, 6)
+        object.__setattr__(self, "residuals_px", MappingProxyType(dict(self.residuals_px)))
+
+
+def calibrate_stereo(
+    pairs: Sequence[tuple[BoardImage, BoardImage]],
+    depth: Camera | None = None,
+    headset: Camera | None = None,
+    settings: StereoSettings | None = None,
+) -> StereoCalibration:
+    """Solve T_H_D from pairs of views, taken at the same moments, of one board.
+
+    Parameters
+    ----------
+    pairs : sequence of (BoardImage, BoardImage)
+        The depth camera's and the headset camera's. A pair with either dropped is left out.
+    depth, headset : Camera, optional
+        If not given, solved from the same views, which then must be more and better.
+    settings : StereoSettings, optional
+
+    Raises
+    ------
+    ViewsError
+        If too few pairs show the board to both cameras, the images are of mixed resolutions or not
+        of the size of given intrinsics, the cameras are swapped, one's images are mirrored, both's
+        are the same, the board hardly moved, or nothing can be solved.
+    """
+    settings = settings or StereoSettings()
+    both = found_by_both(pairs)
+    check_sizes(both, depth, headset)
+    check_moved({name: pair.depth for name, pair in both.items()})
+    lenses: list[LensModel | None] = [None, None]
+    are_given = depth is not None and headset is not None
+    of_depth = of_headset = None
+    if depth is None:
+        of_depth = _solved([first for first, _ in pairs], "depth", settings.camera)
+        depth, lenses[0] = of_depth.intrinsics, of_depth.lens
+    if headset is None:
+        of_headset = _solved([second for _, second in pairs], "headset", settings.camera)
+        headset, lenses[1] = of_headset.intrinsics, of_headset.lens
+    if of_depth is None or of_headset is None:
+        alone = each_alone(both, depth, headset)
+    else:
+        alone = _as_solved(pairs, both, of_depth, of_headset)
+    fit = _fit(both, alone, (depth, headset), lenses)
+    if fit.rms_px > settings.max_rms_px:
+        # Pairs that contradict each other bend intrinsics that are free until nothing is sound.
+        lenses = [None, None]
+        fit = _fit(both, alone, (depth, headset), lenses)
+        _check_not_swapped(both, (depth, headset), fit.rms_px, are_given)
+        _check_not_mirrored(both, (depth, headset), fit.rms_px)
+    depth, headset = fit.setup.cameras
+    if fit.setup.place is None:
+        raise ValueError("a fit of two cameras has their pose")
+    T_H_D = as_transform(fit.setup.place)
+    T_D_B = {name: as_transform(pose) for name, pose in zip(both, fit.setup.poses, strict=True)}
+    off_px = [off[kept] for off, kept in zip(fit.off_px, fit.kept, strict=True)]
+    residuals_px = {
+        name: rms(np.vstack(off_px[2 * number : 2 * number + 2]))
+        for number, name in enumerate(both)
+    }
+    if not are_given:
+        alone = each_alone(both, depth, headset, alone)
+    worst = _worst(both, fit, T_H_D, T_D_B)
+    apart = differences(T_H_D, alone.T_H_D)
+    covariance = fit.covariance()
+    return StereoCalibration(
+        T_H_D=T_H_D,
+        covariance=None if covariance is None else covariance[:6, :6],
+        depth=depth,
+        headset=headset,
+        rms_px=fit.rms_px,
+        residuals_px=residuals_px,
+        spread_rad=float(np.sqrt(np.mean(apart[:, 0] ** 2))),
+        spread_m=float(np.sqrt(np.mean(apart[:, 1] ** 2))),
+        dropped=tuple(first.name for first, second in pairs if first.dropped or second.dropped),
+        worst=worst,
+        verdict=_judge(
+            fit,
+            covariance,
+            lenses,
+            T_D_B,
+            max((pair.depth.points_m for pair in both.values()), key=len),
+            why_apart(both, alone, np.array(list(residuals_px.values()))),
+            worst,
+            settings,
+        ),
+        left_out=fit.left_out,
+        solved=(of_depth, of_headset),
+    )
+
+
+def _solved(views: Sequence[BoardImage], which: str, settings: CameraSettings) -> CameraCalibration:
+    try:
+        calibration = calibrate_camera(views, settings)
+    except ViewsError as error:
+        raise ViewsError(f"{which} camera: {error}") from error
+    if calibration.verdict.name == "bad":
+        raise ViewsError(f"{which} camera: {calibration.verdict.reason}")
+    return calibration
+
+
+def _as_solved(
+    pairs: Sequence[tuple[BoardImage, BoardImage]],
+    both: Mapping[str, Pair],
+    depth: CameraCalibration,
+    headset: CameraCalibration,
+) -> Alone:
+    """Return the board's poses in the images as the solutions of the cameras have them."""
+    names = [(first.name, second.name) for first, second in pairs if first.name in both]
+    residuals_px = [(depth.residuals_px[a], headset.residuals_px[b]) for a, b in names]
+    return Alone(
+        np.stack([depth.T_C_B[name] for name, _ in names]),
+        np.stack([headset.T_C_B[name] for _, name in names]),
+        np.sqrt(np.mean(np.square(residuals_px), axis=1)),
+    )
+
+
+def _fit(
+    both: Mapping[str, Pair],
+    alone: Alone,
+    cameras: tuple[Camera, Camera],
+    lenses: Sequence[LensModel | None],
+) -> Adjusted:
+    """Adjust the cameras' pose, the board's in each pair, and intrinsics that are not given."""
+    T_H_D = alone.T_H_D
+    place = as_vector(T_H_D[middle(T_H_D)])
+    poses = tuple(as_vector(T) for T in alone.T_D_B)
+    sightings = [
+        Sighting(number, camera, seen)
+        for number, pair in enumerate(both.values())
+        for camera, seen in enumerate((pair.depth, pair.headset))
+    ]
+    return adjust(sightings, Setup(cameras, poses, place), lenses)
+
+
+def _rms_px(both: Mapping[str, Pair], cameras: tuple[Camera, Camera]) -> float:
+    """Return the residual with given intrinsics; infinite if there is no solution."""
+    try:
+        return _fit(both, each_alone(both, *cameras), cameras, (None, None)).rms_px
+    except ViewsError:
+        return np.inf
+
+
+def _check_not_swapped(
+    both: Mapping[str, Pair], cameras: tuple[Camera, Camera], rms_px: float, are_given: bool
+) -> None:
+    depth, headset = cameras
+    same_size = (depth.width, depth.height) == (headset.width, headset.height)
+    if are_given and same_size and _rms_px(both, (headset, depth)) < rms_px / 2:
+        raise ViewsError(SWAPPED)
+
+
+def _check_not_mirrored(
+    both: Mapping[str, Pair], cameras: tuple[Camera, Camera], rms_px: float
+) -> None:
+    """Raise ViewsError if the pairs fit far better with one camera's images mirrored."""
+    if any(_rms_px(*trial) < rms_px / 2 for trial in _unmirrored(both, *cameras)):
+        raise ViewsError(
+            "one camera's images are mirrored, the other's not: switch that off in the camera "
+            "(letters in its images, or a ChArUco board, show which)"
+        )
+
+
+def _unmirrored(
+    both: Mapping[str, Pair], depth: Camera, headset: Camera
+) -> Iterator[tuple[dict[str, Pair], tuple[Camera, Camera]]]:
+    """Yield the pairs as they would be if the headset's images were not mirrored.
+
+    A mirrored checkerboard was numbered with its rows or its columns reversed; intrinsics solved
+    from mirrored images are mirrored, given ones are not.
+    """
+    for camera in (headset, replace(headset, cx=headset.width - 1 - headset.cx)):
+        for axis in (0, 1):
+            pairs = {
+                name: replace(pair, headset=_mirror(pair.headset, axis))
+                for name, pair in both.items()
+            }
+            yield pairs, (depth, camera)
+
+
+def _mirror(seen: BoardView, axis: int) -> BoardView:
+    """Mirror a view of a whole checkerboard, its corners numbered the other way along an axis."""
+    pixels = seen.pixels.copy()
+    pixels[:, 0] = seen.size[0] - 1 - pixels[:, 0]
+    place_m = seen.points_m.copy()
+    place_m[:, axis] = place_m[:, axis].min() + place_m[:, axis].max() - place_m[:, axis]
+    # The points stay in the order that both cameras share.
+    order = np.lexsort((place_m[:, 0].round(6), place_m[:, 1].round(6)))
+    return replace(seen, pixels=pixels[order])
+
+
+def _worst(
+    both: Mapping[str, Pair], fit: Adjusted, T_H_D: Float64, T_D_B: Mapping[str, Float64]
+) -> WorstView:
+    """Return the worst image of either camera."""
+    found: dict[str, BoardView] = {}
+    off_px, tilts = {}, {}
+    residuals = iter(zip(fit.off_px, fit.kept, strict=True))
+    for name, pair in both.items():
+        poses = T_D_B[name], T_H_D @ T_D_B[name]
+        for which, seen, T_C_B in zip(
+            ("depth", "headset"), (pair.depth, pair.headset), poses, strict=True
+        ):
+            image = f"{which} camera's of {name}"
+            off, kept = next(residuals)
+            found[image], off_px[image] = seen.only(kept), off[kept]
+            tilts[image] = tilt(T_C_B, seen)
+    return worst_view(found, off_px, tilts)
+
+
+def _judge(
+    fit: Adjusted,
+    covariance: Float64 | None,
+    lenses: Sequence[LensModel | None],
+    T_D_B: Mapping[str, Float64],
+    points_m: Float64,
+    apart: tuple[str, bool],
+    worst: WorstView,
+    settings: StereoSettings,
+) -> CalibrationVerdict:
+    rms_px = fit.rms_px
+    why, is_few = apart
+    if rms_px > settings.max_rms_px or (why and not is_few):
+        trouble = why or f"drop the worst image, {worst.name}: {worst.why}"
+        limit = f", more than {settings.max_rms_px:g}" if rms_px > settings.max_rms_px else ""
+        return CalibrationVerdict("bad", f"corners are {rms_px:.2f} px off{limit}: {trouble}")
+    spread_rad = normal_spread(T_D_B)
+    if covariance is None or spread_rad < settings.good_spread_rad / 4:
+        return CalibrationVerdict(
+            "bad",
+            "all pairs show the board at nearly one angle: tilt it by 20° to 45° in all directions",
+        )
+    place = np.zeros(6) if fit.setup.place is None else fit.setup.place
+    shift_m = float(np.linalg.norm(place[3:]))
+    if shift_m > settings.max_shift_m:
+        return CalibrationVerdict(
+            "bad",
+            f"the cameras come out {1e3 * shift_m:.0f} mm apart: is the squares' side right, and "
+            "are both on the headset?",
+        )
+    angle_sigma, shift_sigma = (
+        float(np.sqrt(np.linalg.eigvalsh(part).max()))
+        for part in (covariance[:3, :3], covariance[3:6, 3:6])
+    )
+    known = f"± {np.degrees(angle_sigma):.3f}°, ± {1e3 * shift_sigma:.2f} mm"
+    wanting = [why] if why else []
+    if len(T_D_B) < settings.good_pairs:
+        wanting.append(f"{len(T_D_B)} pairs, {max(ASKED_VIEWS, settings.good_pairs)} are better")
+    if spread_rad < settings.good_spread_rad:
+        wanting.append(f"the board was tilted by {np.degrees(spread_rad):.0f}° only")
+    if angle_sigma > settings.max_angle_sigma_rad or shift_sigma > settings.max_shift_sigma_m:
+        wanting.append(f"the pose is known to {known} only")
+    if wanting:
+        limits = settings.max_angle_sigma_rad, settings.max_shift_sigma_m
+        add = next_pair(fit.setup, lenses, covariance, points_m, rms_px / np.sqrt(2), limits)
+        if add is not None:
+            wanting.append(f"next, the board {add.words} (in the depth camera's image)")
+        return CalibrationVerdict("needs more views", "; ".join(wanting))
+    return CalibrationVerdict(
+        "good",
+        f"corners are {rms_px:.2f} px off in {len(T_D_B)} pairs; the pose is known to {known}",
+    )

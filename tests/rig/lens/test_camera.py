@@ -1,0 +1,133 @@
+import dataclasses
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handcal.core.geometry import camera_matrix, rigid
+from handcal.core.types import Intrinsics
+from handcal.rig.boards.board import Board
+from handcal.rig.boards.views import BoardImage, ViewsError, board_image, drop, read_views
+from handcal.rig.lens.camera import CameraSettings, calibrate_camera
+from handcal.sim.boards import BoardPainter, board_poses, board_view
+
+BOARD = Board()
+CAMERA = Intrinsics(640, 480, 532.0, 531.0, 325.0, 238.0, (-0.25, 0.08, 0.0008, -0.0005, -0.01))
+NOISE_PX = 0.1
+
+
+def _views(count: int = 15, seed: int = 1, noise_px: float = NOISE_PX) -> tuple[BoardImage, ...]:
+    rng = np.random.default_rng(seed)
+    poses = board_poses(BOARD, CAMERA, count, rng)
+    return tuple(
+        BoardImage(f"{number}.png", board_view(BOARD, T, CAMERA, rng, noise_px))
+        for number, T in enumerate(poses)
+    )
+
+
+def test_without_noise_the_camera_comes_back() -> None:
+    result = calibrate_camera(_views(noise_px=0.0))
+    np.testing.assert_allclose(
+        camera_matrix(result.pinhole), camera_matrix(CAMERA), atol=0.01, rtol=1e-5
+    )
+    np.testing.assert_allclose(result.intrinsics.distortion[:4], CAMERA.distortion[:4], atol=1e-3)
+    assert result.rms_px < 1e-3
+    assert result.verdict.name == "good"
+    assert result.arcmin_per_px == pytest.approx(np.degrees(1 / 532.0) * 60, rel=1e-3)
+
+
+def test_the_covariance_is_as_the_errors_are() -> None:
+    errors = []
+    for seed in range(8):
+        result = calibrate_camera(_views(seed=seed))
+        found = result.intrinsics
+        off = np.array([found.fx, found.fy, found.cx, found.cy]) - [532.0, 531.0, 325.0, 238.0]
+        errors.append(off / result.sigma[:4])
+        assert result.rms_px == pytest.approx(NOISE_PX * np.sqrt(2), rel=0.15)
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
+
+
+def test_the_covariance_is_as_opencv_has_it() -> None:
+    views = _views()
+    found = [one.found for one in views if one.found]
+    *_, deviations, _, _ = cv2.calibrateCameraExtended(
+        [seen.points_m.astype(np.float32) for seen in found],
+        [seen.pixels.astype(np.float32) for seen in found],
+        (640, 480),
+        np.eye(3),
+        np.zeros(5),
+    )
+    sigma = calibrate_camera(views).sigma
+    np.testing.assert_allclose(sigma, np.ravel(deviations)[:9], rtol=0.05)
+
+
+@pytest.mark.parametrize(("lens", "count"), [("none", 0), ("radial", 5), ("rational", 8)])
+def test_each_lens_model_solves_its_coefficients(lens: str, count: int) -> None:
+    result = calibrate_camera(_views(), CameraSettings(lens=lens))  # type: ignore[arg-type]
+    assert len(result.intrinsics.distortion) == count
+    assert (result.verdict.name == "bad") == (lens == "none")
+    if lens == "radial":
+        assert result.intrinsics.distortion[2:] == (0.0, 0.0, 0.0)
+
+
+def test_images_of_a_board_give_the_camera_to_three_thousandths() -> None:
+    rng = np.random.default_rng(3)
+    painter = BoardPainter(BOARD, CAMERA)
+    poses = board_poses(BOARD, CAMERA, 10, rng)
+    views = [
+        board_image(f"{number}", painter.paint(T, rng), BOARD) for number, T in enumerate(poses)
+    ]
+    result = calibrate_camera(views)
+    assert abs(result.intrinsics.fx / CAMERA.fx - 1) < 0.003
+    assert abs(result.intrinsics.fy / CAMERA.fy - 1) < 0.003
+    assert abs(result.intrinsics.cx - CAMERA.cx) < 0.003 * CAMERA.fx
+    assert abs(result.intrinsics.cy - CAMERA.cy) < 0.003 * CAMERA.fy
+
+
+def test_few_views_are_not_enough() -> None:
+    result = calibrate_camera(_views(5))
+    assert result.verdict.name == "needs more views"
+    assert "5 views, 20 are better" in result.verdict.reason
+    with pytest.raises(ViewsError, match="2 of 2 images used, at least 3"):
+        calibrate_camera(_views(2))
+
+
+def test_views_at_one_angle_are_bad() -> None:
+    rng = np.random.default_rng(1)
+    views = []
+    for number in range(12):
+        T_C_B = rigid([0.0, 0.0, 0.1 * number], [*rng.uniform(-0.1, 0.0, 2), 0.5])
+        views.append(BoardImage(f"{number}", board_view(BOARD, T_C_B, CAMERA, rng, NOISE_PX)))
+    result = calibrate_camera(views)
+    assert result.verdict.name == "bad"
+    assert "one angle" in result.verdict.reason
+
+
+def test_a_bad_image_is_named_and_may_be_dropped() -> None:
+    views = list(_views())
+    spoilt = views[4].found
+    assert spoilt is not None
+    pixels = spoilt.pixels + np.random.default_rng(1).normal(scale=8.0, size=spoilt.pixels.shape)
+    views[4] = BoardImage("4.png", dataclasses.replace(spoilt, pixels=pixels))
+    result = calibrate_camera(views)
+    assert result.verdict.name == "bad"
+    assert result.worst.name == "4.png"
+    assert "drop the worst image, 4.png" in result.verdict.reason
+    again = calibrate_camera(drop(views, ["4.png"]))
+    assert again.verdict.name == "good"
+    assert again.dropped == ("4.png",)
+    assert "4.png" not in again.residuals_px
+
+
+@pytest.mark.parametrize(("side", "opencv_px"), [("left", 0.41), ("right", 0.46)])
+def test_photographs_fit_better_than_by_plain_opencv(
+    shared_data: Path, side: str, opencv_px: float
+) -> None:
+    files = sorted((shared_data / "boards" / "opencv_stereo").glob(f"{side}*.jpg"))
+    board = Board(kind="checkerboard", squares=(10, 7))
+    result = calibrate_camera(read_views(files, board))
+    assert len(result.residuals_px) == 13
+    assert result.rms_px < opencv_px / 2
+    assert result.verdict.name == "good"
+    assert result.worst.name in result.residuals_px
