@@ -13,7 +13,7 @@ trap 'rm -rf "$scratch"' EXIT
 # take FOLDER WIDTH HEIGHT THEME SCALE: pictures of a window that fills a screen of so many pixels.
 take() {
     local folder=$1 width=$2 height=$3 theme=$4 scale=$5
-    echo "{\"theme\": \"$theme\"}" >"$scratch/preferences.json"
+    echo "{\"version\": 4, \"theme\": \"$theme\"}" >"$scratch/preferences.json"
     QT_SCALE_FACTOR=$scale xvfb-run --auto-servernum \
         --server-args="-screen 0 ${width}x${height}x24" \
         handcal-gui --screenshots "$folder" --output "$scratch/output" \

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import logging
 import os
-import shutil
 from contextlib import suppress
-from copy import deepcopy
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Literal, Self, TypeAlias, get_type_hints
+from typing import Any, Literal, Self, TypeAlias
 
 from PySide6.QtCore import QObject, QStandardPaths, Signal
 
@@ -29,17 +27,11 @@ _LOG = logging.getLogger(__name__)
 
 Theme: TypeAlias = Literal["system", "light", "dark", "contrast"]
 PREFERENCES_VERSION = 4
-"""Version 1 had no number; version 2 had the verifications of a plan as checks, and up to version 3
-there were at most three."""
 MOST_RECENT = 8
 """Number of sessions that are remembered, and listed on the start page."""
 HIDDEN_LAYERS = ("pairs", "solved-cursor")
 """Layers that the hand cloud leaves out at first: the cursor of a finished alignment would cover
 residuals."""
-_OLD_ERROR_MAX_ARCMIN = 15.0
-"""Default of version 1, which nobody chose."""
-_OLD_VERIFICATIONS = 3
-"""Default of versions 1 to 3, which nobody could change."""
 
 
 def _default_station() -> StationSettings:
@@ -104,23 +96,18 @@ class PreferencesFile:
     def load(self) -> tuple[Preferences, str]:
         """Return the preferences and a message for the user, empty if nothing went wrong.
 
-        Those of older versions are upgraded. A file that cannot be read is renamed to end in
-        ``.bad``; one of a newer version is copied to end in ``.newer``, and read as far as known.
+        A file that cannot be read, or of another version, is renamed to end in ``.bad``.
         """
         if not os.path.exists(self.path):
             return Preferences(), ""
         try:
             data = read_json(self.path)
-            version = data.pop("version", 1)
-            data.pop("wearers", None)  # names of wearers are only in the sessions
-            if type(version) is not int or version < 1:
-                raise FileError(f"preferences.version must be a whole number, not {version!r:.40}")
-            said = ""
-            if version > PREFERENCES_VERSION:
-                data, said = _known(Preferences, data), self._keep_newer()
-            elif version < PREFERENCES_VERSION:
-                data = _upgraded(data)
-            return read_settings(Preferences, data, "preferences"), said
+            version = data.pop("version", None)
+            if type(version) is not int or version != PREFERENCES_VERSION:
+                raise FileError(
+                    f"preferences.version is {version!r:.40}, not {PREFERENCES_VERSION}"
+                )
+            return read_settings(Preferences, data, "preferences"), ""
         except FileError as error:
             bad = self.path.with_name(f"{self.path.name}.bad")
             with suppress(OSError):
@@ -136,16 +123,6 @@ class PreferencesFile:
         """Write the preferences, or raise FileError."""
         make_folder(self.path.parent)
         write_json(self.path, {"version": PREFERENCES_VERSION, **settings_json(preferences)})
-
-    def _keep_newer(self) -> str:
-        """Copy the file, which the next change replaces; return a message for the user."""
-        kept = self.path.with_name(f"{self.path.name}.newer")
-        with suppress(OSError):
-            shutil.copyfile(self.path, kept)
-        return tr(
-            "The preferences are from a newer version of handcal. Settings that this version "
-            "does not know are ignored; they are kept in {}."
-        ).format(kept)
 
     def pairings(self) -> Pairings:
         """Return the paired headsets, with a key for the next one.
@@ -244,45 +221,3 @@ class CurrentPreferences(QObject):
 def _default_path() -> Path:
     config = QStandardPaths.StandardLocation.AppConfigLocation
     return Path(QStandardPaths.writableLocation(config)) / "preferences.json"
-
-
-def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
-    """Return preferences of an older version with today's names.
-
-    A lab's own limit of the expected error becomes its target. The solver's settings, which the
-    program never offered to change, take their present defaults.
-    """
-    upgraded = deepcopy(data)
-    placement = _part(upgraded, "station", "plan", "placement")
-    if "checks" in placement:
-        placement["verifications"] = placement.pop("checks")
-    if placement.get("verifications") == _OLD_VERIFICATIONS:
-        del placement["verifications"]
-    solve = _part(upgraded, "station", "calibration", "solve")
-    fuse, verdict = solve.get("fuse"), solve.get("verdict")
-    if isinstance(fuse, dict) and "eye_box_sigma_m" in fuse:
-        del solve["fuse"]
-    if isinstance(verdict, dict) and "error_max_arcmin" in verdict:
-        limit_arcmin = verdict.pop("error_max_arcmin")
-        if limit_arcmin != _OLD_ERROR_MAX_ARCMIN:
-            verdict.setdefault("target_arcmin", limit_arcmin)
-    return upgraded
-
-
-def _part(data: Any, *names: str) -> dict[str, Any]:
-    """Return the object inside objects that the names lead to; an empty one if there is none."""
-    for name in names:
-        data = data.get(name) if isinstance(data, dict) else None
-    return data if isinstance(data, dict) else {}
-
-
-def _known(kind: Any, data: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings in `data` that a dataclass has, also in the dataclasses inside it."""
-    hints = get_type_hints(kind)
-    return {
-        name: _known(hints[name], value)
-        if is_dataclass(hints[name]) and isinstance(value, dict)
-        else value
-        for name, value in data.items()
-        if name in hints
-    }

@@ -34,7 +34,6 @@ from handcal.core.geometry import rigid
 from handcal.core.types import Intrinsics
 from handcal.export.clouds import read_cloud
 from handcal.io.resources import resource_path
-from handcal.io.settings import settings_json
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
@@ -111,9 +110,9 @@ def _make_seeds(seeds: Path) -> None:
     boxes = {"color.jpg": [[10.0, 10.0, 100.0, 100.0]]}
     (seeds / "boxes.json").write_text(json.dumps(boxes))
     with contextlib.suppress(ImportError):
-        from handcal_gui.preferences import Preferences
+        from handcal_gui.preferences import Preferences, PreferencesFile
 
-        (seeds / "preferences.json").write_text(json.dumps(settings_json(Preferences()), indent=1))
+        PreferencesFile(seeds / "preferences.json").save(Preferences())
 
 
 def _cases(seeds: Path) -> Iterable[tuple[str, Case]]:

@@ -15,7 +15,6 @@ from handcal.core.errors import FileError
 from handcal.export.export import ExportSettings
 from handcal.lab.settings import MethodComparisonSettings, NoiseStudySettings
 from handcal.register.guard import GuardSettings
-from handcal.register.placement import PlacementSettings
 from handcal.station.settings import StationSettings
 from handcal_gui.evaluation_entries import CubeEntries, EvaluationEntries, UserEntries
 from handcal_gui.preferences import (
@@ -69,61 +68,12 @@ def test_preferences_come_back(file: PreferencesFile) -> None:
     assert file.load() == (CHANGED, "")
 
 
-def test_a_file_of_version_1_is_upgraded(file: PreferencesFile) -> None:
-    """Read a file that handcal wrote before preferences had a version."""
-    file.path.parent.mkdir()
-    stored = Path(__file__).parents[1] / "data" / "preferences_1.json"
-    file.path.write_bytes(stored.read_bytes())
-    preferences, said = file.load()
-    assert said == ""
-    assert preferences.theme == "dark"
-    assert not hasattr(preferences, "wearers"), "names of wearers are only in the sessions"
-    assert preferences.station.port == 50_000
-    assert preferences.sessions == ("/data/sessions/one",)
-    solve = preferences.station.calibration.solve
-    assert solve.verdict.target_arcmin == 12.0
-    assert solve.fuse == CalibrationSettings().solve.fuse
-    file.save(preferences)
-    assert json.loads(file.path.read_text())["version"] == PREFERENCES_VERSION
-    assert file.load() == (preferences, "")
-    assert [one.name for one in file.path.parent.iterdir()] == [file.path.name]
-
-
-def test_checks_of_version_2_are_verifications(file: PreferencesFile) -> None:
-    plan = replace(CHANGED.station.plan, placement=PlacementSettings(verifications=5))
-    changed = replace(CHANGED, station=replace(CHANGED.station, plan=plan))
-    file.save(changed)
-    data = json.loads(file.path.read_text()) | {"version": 2}
-    placement = data["station"]["plan"]["placement"]
-    placement["checks"] = placement.pop("verifications")
-    file.path.write_text(json.dumps(data))
-    assert file.load() == (changed, "")
-
-
-def test_the_old_number_of_verifications_is_no_choice(file: PreferencesFile) -> None:
-    file.path.parent.mkdir()
-    plan = {"placement": {"verifications": 3, "most": 5}}
-    file.path.write_text(json.dumps({"version": 3, "station": {"plan": plan}}))
-    preferences, said = file.load()
-    assert said == ""
-    assert preferences.station.plan.placement == PlacementSettings(most=5)
-
-
-def test_the_old_default_of_a_limit_is_no_choice(file: PreferencesFile) -> None:
-    file.path.parent.mkdir()
-    verdict = {"error_max_arcmin": 15.0}
-    file.path.write_text(json.dumps({"station": {"calibration": {"solve": {"verdict": verdict}}}}))
-    preferences, said = file.load()
-    assert said == ""
-    assert preferences.station.calibration == CalibrationSettings()
-
-
 @pytest.mark.parametrize("station", [3, None, {"calibration": []}, {"calibration": {"solve": 1}}])
-def test_a_strange_file_of_version_1_is_kept(
+def test_a_strange_value_is_kept_and_named_in_the_log(
     file: PreferencesFile, station: object, caplog: pytest.LogCaptureFixture
 ) -> None:
     file.path.parent.mkdir()
-    file.path.write_text(json.dumps({"station": station}))
+    file.path.write_text(json.dumps({"version": PREFERENCES_VERSION, "station": station}))
     preferences, said = file.load()
     assert preferences == Preferences()
     assert "were reset: check the start page and Preferences" in said
@@ -132,31 +82,22 @@ def test_a_strange_file_of_version_1_is_kept(
     assert "preferences.station" in caplog.text
 
 
-def test_a_newer_file_is_read_as_far_as_known_and_kept(file: PreferencesFile) -> None:
+@pytest.mark.parametrize("version", [0, 3, 5, "4", True, 4.0, None])
+def test_another_version_is_refused_and_kept(
+    file: PreferencesFile, version: object, caplog: pytest.LogCaptureFixture
+) -> None:
     file.save(CHANGED)
-    data = json.loads(file.path.read_text())
-    data |= {"version": PREFERENCES_VERSION + 1, "tomorrow": 1}
-    data["station"]["calibration"]["tomorrow"] = 2
-    newer = json.dumps(data)
-    file.path.write_text(newer)
+    stored = json.dumps(json.loads(file.path.read_text()) | {"version": version})
+    file.path.write_text(stored)
     preferences, said = file.load()
-    assert preferences == CHANGED
-    assert "newer version of handcal" in said
-    file.save(preferences)
-    assert file.path.with_name("preferences.json.newer").read_text() == newer
-    assert file.load() == (CHANGED, "")
+    assert preferences == Preferences()
+    assert "were reset: check the start page and Preferences" in said
+    assert "\n" not in said
+    assert f"preferences.version is {version!r}, not 4" in caplog.text
+    assert file.path.with_name("preferences.json.bad").read_text() == stored
 
 
-@pytest.mark.parametrize("version", [0, -1, "2", True, 1.0, None])
-def test_a_strange_version_is_no_version(file: PreferencesFile, version: object) -> None:
-    file.path.parent.mkdir()
-    file.path.write_text(json.dumps({"version": version}))
-    assert file.load()[0] == Preferences()
-    assert file.path.with_name("preferences.json.bad").exists()
-
-
-def test_evaluations_entered_before_are_read(file: PreferencesFile) -> None:
-    """Read preferences as they were written while the window had entries of its own."""
+def test_entries_of_evaluations_that_are_not_given_have_defaults(file: PreferencesFile) -> None:
     file.path.parent.mkdir()
     study = {"seed": 3, "processes": 2, "scheduler": "tcp://host:1"}
     evaluation = {
@@ -178,7 +119,7 @@ def test_evaluations_entered_before_are_read(file: PreferencesFile) -> None:
         },
         "users": {"sessions": "/sessions", "output": "/u"},
     }
-    file.path.write_text(json.dumps({"theme": "dark", "evaluation": evaluation}))
+    file.path.write_text(json.dumps({"version": 4, "evaluation": evaluation}))
     preferences, problem = file.load()
     assert problem == ""
     assert preferences.evaluation == EvaluationEntries(
@@ -203,12 +144,12 @@ def test_evaluations_entered_before_are_read(file: PreferencesFile) -> None:
         b"\xff\xfe",
         b"[]",
         b"[" * 100_000,
-        b'{"theme": "pink"}',
-        b'{"sessions": [1]}',
-        b'{"export": {"formats": []}}',
-        b'{"station": {"port": 1.5}}',
-        b'{"later_version": 1}',
-        b'{"": 1}',
+        b'{"version": 4, "theme": "pink"}',
+        b'{"version": 4, "sessions": [1]}',
+        b'{"version": 4, "export": {"formats": []}}',
+        b'{"version": 4, "station": {"port": 1.5}}',
+        b'{"version": 4, "later_version": 1}',
+        b'{"version": 4, "": 1}',
         b" " * (16 * 2**20 + 1),
     ],
 )
@@ -246,16 +187,6 @@ def test_sessions_are_remembered_newest_first(tmp_path: Path) -> None:
         preferences = preferences.with_session(tmp_path / str(number))
     assert len(preferences.sessions) == 8
     assert preferences.sessions[0] == str(tmp_path / "29")
-
-
-def test_names_of_wearers_that_were_stored_once_are_forgotten(file: PreferencesFile) -> None:
-    file.save(CHANGED)
-    stored = json.loads(file.path.read_text())
-    file.path.write_text(json.dumps({**stored, "wearers": ["Ada"]}))
-    preferences, complaint = file.load()
-    assert (preferences, complaint) == (CHANGED, "")
-    file.save(preferences)
-    assert "Ada" not in file.path.read_text()
 
 
 def test_the_pairing_key_is_made_once_and_apart(file: PreferencesFile, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from handcal.core.types import EYES, UInt8
 from handcal.io.closable import Closable
 from handcal.session.session import Session, SessionRecord
 from handcal_gui.pages.start.session_entries import find_sessions
+from handcal_gui.preferences import PREFERENCES_VERSION
 from tests.helpers import ROOT, Patience, output_of, write_small_rig
 
 ARTEFACTS = ROOT / "artefacts"
@@ -155,6 +156,7 @@ def preferences(tmp_path: Path) -> Path:
     path.write_text(
         json.dumps(
             {
+                "version": PREFERENCES_VERSION,
                 "station": station,
                 "export": export,
                 "export_folder": str(tmp_path / "out"),

@@ -55,7 +55,10 @@ class SupportSettings:
 def default_settings() -> SupportSettings:
     """Return the settings for this user's log, with the session folder of the preferences."""
     folder = configuration_folder()
-    station = _preferences(folder).get("station")
+    try:
+        station = read_json(folder / "preferences.json").get("station")
+    except FileError:
+        station = None
     named = station.get("sessions") if isinstance(station, dict) else None
     return SupportSettings(folder, Path(named) if isinstance(named, str) and named else None)
 
@@ -115,16 +118,14 @@ def run_support(
 
 
 def known_names(settings: SupportSettings) -> frozenset[str]:
-    """Return the wearers' names in the preferences and in the journals of all sessions.
+    """Return the wearers' names in the journals of all sessions, and those of the settings.
 
     Raises
     ------
     FileError
         If one of `sessions` is missing or holds no session.
     """
-    wearers = _preferences(settings.log_folder).get("wearers")
-    names = {one for one in wearers if isinstance(one, str)} if isinstance(wearers, list) else set()
-    names |= set(settings.names)
+    names = set(settings.names)
     own = (settings.session_folder,) if settings.session_folder else ()
     for folder in (*own, *settings.sessions):
         entries = (*read_library(folder), *read_library(folder / DELETED))
@@ -169,13 +170,6 @@ def _versions() -> Iterator[str]:
         if one.metadata["Name"]
     }
     return (f"{name} {found[name]}" for name in sorted(found, key=str.casefold))
-
-
-def _preferences(folder: Path) -> dict[str, object]:
-    try:
-        return read_json(folder / "preferences.json")
-    except FileError:
-        return {}
 
 
 def _frames(source: Path | None) -> Sequence[tuple[Path, str]]:

@@ -14,7 +14,7 @@ from handcal.session.session import Session
 from handcal.station.settings import StationSettings
 from handcal_gui.autopilot import autopilot, demonstration, tour
 from handcal_gui.autopilot.demonstration import Demonstration
-from handcal_gui.preferences import PreferencesFile
+from handcal_gui.preferences import PREFERENCES_VERSION, PreferencesFile
 from handcal_gui.program import Program
 from tests.helpers import Patience, slow_simulator, write_small_rig
 
@@ -35,7 +35,8 @@ def test_a_demonstration_calibrates_exports_and_takes_pictures(
     monkeypatch.setattr(tour, "_LOOK_MS", 60)
     slow_simulator(monkeypatch)
     preferences = tmp_path / "preferences.json"
-    preferences.write_text(json.dumps({"export": {"formats": ["report", "csv"]}}))
+    export = {"formats": ["report", "csv"]}
+    preferences.write_text(json.dumps({"version": PREFERENCES_VERSION, "export": export}))
     program = Program(PreferencesFile(preferences), remembers=False)
     qtbot.addWidget(program.window)
     program.window.show()

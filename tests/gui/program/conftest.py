@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.preferences import PreferencesFile
+from handcal_gui.preferences import PREFERENCES_VERSION, PreferencesFile
 from handcal_gui.program import Program
 from handcal_gui.theme import use_theme
 from tests.gui.program.technician import KEY, Technician
@@ -22,7 +22,8 @@ def file(tmp_path: Path) -> PreferencesFile:
     path = tmp_path / "config" / "preferences.json"
     path.parent.mkdir()
     station = {"sessions": str(tmp_path / "sessions")}
-    path.write_text(json.dumps({"station": station, "runs_itself": False}))
+    chosen = {"version": PREFERENCES_VERSION, "station": station, "runs_itself": False}
+    path.write_text(json.dumps(chosen))
     path.with_name("pairing.key").write_text(KEY)
     return PreferencesFile(path)
 

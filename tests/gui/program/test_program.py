@@ -33,7 +33,7 @@ from handcal.session.session import Session, SessionRecord
 from handcal.station.station import Station
 from handcal_gui.control.conditions import Conditions
 from handcal_gui.pages.wizard.view import Action
-from handcal_gui.preferences import PreferencesFile
+from handcal_gui.preferences import PREFERENCES_VERSION, PreferencesFile
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child, text
 from tests.gui.panels.fine_tune.controls import fields_mm
@@ -78,7 +78,7 @@ def test_the_dialogs_of_the_menus_end_with_the_program(
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     station = {"sessions": str(file.path.parent), "host": "127.0.0.1", "port": port}
-    file.path.write_text(json.dumps({"station": station}))
+    file.path.write_text(json.dumps({"version": PREFERENCES_VERSION, "station": station}))
     technician = open_program()
     program = technician.program
     first = program.windows.connect_headset()

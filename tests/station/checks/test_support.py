@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,12 @@ from handcal.session.library import delete_session
 from handcal.session.session import Session
 from handcal.station.checks import support
 from handcal.station.checks.doctor import Finding, Health
-from handcal.station.checks.support import SupportSettings, run_support, without_names
+from handcal.station.checks.support import (
+    SupportSettings,
+    default_settings,
+    run_support,
+    without_names,
+)
 
 WEARERS = ("Ada Lovelace", "P-07", "Zoë")
 
@@ -31,10 +35,10 @@ def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SupportSettings
     (folder / "handcal.log").write_text(
         f"WARNING cannot read {home}/sessions/p-07/journal.jsonl\nADA LOVELACE Zoë P-071\n"
     )
-    (folder / "preferences.json").write_text(json.dumps({"wearers": [WEARERS[0]]}))
     (folder / "pairing.key").write_text("a secret of the tests")
     with Session.create(tmp_path / "sessions", example_rig(), {}, wearer=WEARERS[1]) as one:
         one.correct_wearer("P-08")  # the log may hold either name
+    Session.create(tmp_path / "sessions", example_rig(), {}, wearer=WEARERS[0]).close()
     return SupportSettings(folder, tmp_path / "sessions", names=(WEARERS[2],))
 
 
@@ -133,13 +137,14 @@ def test_nothing_stays_of_a_cancelled_bundle(tmp_path: Path, settings: SupportSe
 
 
 def test_a_damaged_log_or_preferences_is_no_obstacle(
-    tmp_path: Path, settings: SupportSettings
+    tmp_path: Path, settings: SupportSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (settings.log_folder / "preferences.json").write_bytes(b"\xff{")
+    monkeypatch.setattr(support, "configuration_folder", lambda: settings.log_folder)
+    for content in (b"\xff{", b'{"station": []}', b'{"station": {"sessions": 3}}'):
+        (settings.log_folder / "preferences.json").write_bytes(content)
+        assert default_settings() == SupportSettings(settings.log_folder)
     (settings.log_folder / "handcal.log").write_bytes(b"\xff\x00 torn")
     assert "handcal.log" in run_support(tmp_path / "bundle.zip", settings)
-    (settings.log_folder / "preferences.json").write_text('{"wearers": 3, "station": []}')
-    assert run_support(tmp_path / "bundle.zip", settings)
 
 
 def test_longer_names_go_first() -> None:
