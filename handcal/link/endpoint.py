@@ -189,8 +189,6 @@ class Endpoint(Closable):
     def _sort(self, datagram: bytes, address: Address) -> Rejection | None:
         """Handle a datagram; return the reason if it is dropped."""
         packet = wire.read(datagram)
-        if packet is Rejection.WRONG_VERSION:
-            self._take_other_version(datagram, address)
         if isinstance(packet, Rejection):
             return packet
         if packet.session == HANDSHAKE_SESSION:
@@ -206,9 +204,6 @@ class Endpoint(Closable):
         self._received["bytes"] += len(datagram)
         self._accept(channel, packet)
         return None
-
-    def _take_other_version(self, datagram: bytes, address: Address) -> None:
-        """Handle a datagram of another version."""
 
     def _accept(self, channel: Channel, packet: Packet) -> None:
         channel.heard_s = time.monotonic()

@@ -131,7 +131,7 @@ class Pairings:
 
     @classmethod
     def read(cls, path: Path) -> Pairings:
-        """Read a file: JSON, or a bare key as version 1 wrote it. A missing file means no pairing.
+        """Read a file (JSON); a missing one means no pairing.
 
         Raises
         ------
@@ -290,10 +290,7 @@ def _read(path: Path) -> tuple[Pairing, ...]:
         return ()
     content = read_limited(path, _MAX_FILE_BYTES).strip()
     try:
-        text = content.decode()
-        if not text.startswith("{"):
-            return (Pairing(text),)
-        devices = json.loads(text)["devices"]
+        devices = json.loads(content.decode())["devices"]
         if not isinstance(devices, list) or len(devices) > MAX_DEVICES:
             raise ValueError(f"more than {MAX_DEVICES} devices")
         return tuple(Pairing(**device) for device in devices)

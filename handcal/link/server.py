@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 from handcal.core.errors import FileError, PosePendingError
 from handcal.core.types import Float64, HeadsetIdentity
-from handcal.link import greetings, messages, nudges, version1, wire
+from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.clock import ClockEstimator
 from handcal.link.endpoint import Channel
 from handcal.link.exchange import Exchange, new_digits
 from handcal.link.fields import MalformedError
 from handcal.link.greetings import Refusal
-from handcal.link.handshake import Caller, Limiter, Reception
+from handcal.link.handshake import Caller, Reception
 from handcal.link.invitation import Invitation, new_code
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum
@@ -35,8 +35,6 @@ _MAX_CONFIRMATIONS = 64
 _NOTICE_S = 5.0
 _RESTART_S = 0.5
 _REFRESH_S = 1.0
-_VERSION_1_HZ = 20.0
-_VERSION_1_NOTICES_HZ = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,8 +111,6 @@ class HeadsetServer(Sender):
         self._device: HeadsetIdentity | None = None
         self._shown = Owner()
         self._notice, self._notice_until_s = "", 0.0
-        self._version_1 = Limiter(_VERSION_1_HZ)
-        self._version_1_notices = Limiter(_VERSION_1_NOTICES_HZ)
         self._clock = ClockEstimator()
         self._poses = PoseBuffer()
         self._confirms: deque[tuple[pb.Confirm, str]] = deque(maxlen=_MAX_CONFIRMATIONS)
@@ -331,19 +327,6 @@ class HeadsetServer(Sender):
 
     def _tell(self, notice: str) -> None:
         self._notice, self._notice_until_s = notice, time.monotonic() + _NOTICE_S
-
-    def _take_other_version(self, datagram: bytes, address: Address) -> None:
-        """Tell PC and headset that a paired headset speaks version 1."""
-        now_s = time.monotonic()
-        if not version1.is_hello(datagram) or not self._version_1.allows(now_s):
-            return
-        for pairing in self._pairings.all:
-            if answer := version1.answer(pairing.key.encode(), datagram):
-                self._tell("this headset speaks protocol 1, update its app")
-                if self._version_1_notices.allows(now_s):
-                    for notice in answer:
-                        self._post(notice, address)
-                return
 
     def _handle(self, envelope: pb.Envelope) -> None:
         match envelope.WhichOneof("body"):

@@ -31,6 +31,7 @@ _MOST_LOST = 0.1
 _MOST_LATENCY_MS = 40.0
 _MOST_CLOCK_MS = 5.0
 _POLL_S = 0.05
+_OTHER_VERSION = f"an app that does not speak protocol {VERSION} tried to; update it, or handcal"
 
 
 def headset_state(device: HeadsetIdentity | None, link: LinkStatistics) -> str:
@@ -55,7 +56,7 @@ def headset_problem(
     if not link.connected:
         return _absence(link)
     if device is None:
-        return "it has not introduced itself; update its app to protocol 2"
+        return "it has not introduced itself; let its app send Device"
     if device.protocol != VERSION:
         return f"its app speaks protocol {device.protocol}, not {VERSION}; update the older one"
     if link.pose_rate_hz <= 0.0:
@@ -98,8 +99,10 @@ def link_problem(link: LinkStatistics, address: tuple[str, int] | None) -> str:
     if address is None:
         return "the virtual headset has not connected yet"
     host, port = address
+    is_other = bool(link.rejected.get(Rejection.WRONG_VERSION, 0))
     return (
         f"no headset is connected; let it connect to {host}, UDP port {port}, with the pairing key"
+        f"{f'; {_OTHER_VERSION}' if is_other else ''}"
     )
 
 
@@ -107,7 +110,7 @@ def _absence(link: LinkStatistics) -> str:
     if link.notice:
         return link.notice
     if link.rejected.get(Rejection.WRONG_VERSION, 0):
-        return "a headset app of another version tries to connect; update it, or handcal"
+        return f"no headset is connected; {_OTHER_VERSION}"
     if link.rejected.get(Rejection.UNPAIRED, 0):
         return "a headset with another pairing key tries to connect; pair it with handcal pair"
     if any(link.rejected.values()):

@@ -24,7 +24,7 @@ def file(tmp_path: Path) -> PreferencesFile:
     station = {"sessions": str(tmp_path / "sessions")}
     chosen = {"version": PREFERENCES_VERSION, "station": station, "runs_itself": False}
     path.write_text(json.dumps(chosen))
-    path.with_name("pairing.key").write_text(KEY)
+    path.with_name("pairing.key").write_text(json.dumps({"devices": [{"key": KEY}]}))
     return PreferencesFile(path)
 
 

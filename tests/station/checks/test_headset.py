@@ -33,6 +33,7 @@ from handcal.station.checks.headset import (
     find_pose_delay,
     headset_problem,
     headset_state,
+    link_problem,
     run_pose_delay,
 )
 
@@ -63,7 +64,11 @@ def test_a_good_headset_is_described_by_name() -> None:
     ("device", "link", "problem"),
     [
         (DEVICE, replace(ABSENT, notice="headset B asks; A is connected"), "B asks"),
-        (DEVICE, replace(ABSENT, rejected={"wrong_version": 1}), "another version"),
+        (
+            DEVICE,
+            replace(ABSENT, rejected={"wrong_version": 1}),
+            "not speak protocol 2 tried to; update it",
+        ),
         (DEVICE, replace(ABSENT, rejected={"unpaired": 3}), "pair it with handcal pair"),
         (DEVICE, replace(ABSENT, rejected={"corrupt": 3}), "not from a headset app"),
         (None, ABSENT, "nothing arrives; check the address"),
@@ -85,6 +90,15 @@ def test_what_is_wrong_is_one_sentence(
     said = headset_problem(device, link, RIG)
     assert problem in said
     assert "\n" not in said
+
+
+def test_an_app_of_another_version_is_named_while_no_headset_is_connected() -> None:
+    other, address = {"wrong_version": 1}, ("10.0.0.2", 50_000)
+    assert link_problem(ABSENT, address).endswith("with the pairing key")
+    said = link_problem(replace(ABSENT, rejected=other), address)
+    assert said.startswith(link_problem(ABSENT, address))
+    assert said.endswith("; an app that does not speak protocol 2 tried to; update it, or handcal")
+    assert link_problem(replace(GOOD, rejected=other), address) == ""
 
 
 def test_another_headset_or_app_than_the_rigs_is_said() -> None:
