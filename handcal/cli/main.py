@@ -124,10 +124,6 @@ _RIG: Mapping[str, Entry] = {
         "Render the images of an offline calibration and of an acceptance, to practise with.",
         "accept",
     ),
-    "migrate": Entry(
-        "Convert a rig file of any known version to the newest, and list what it leaves open.",
-        "rig_files",
-    ),
 }
 
 _SESSION: Mapping[str, Entry] = {

@@ -1,4 +1,4 @@
-"""``handcal rig make, depth, check, compare, migrate``: rig files and the depth camera in them."""
+"""``handcal rig make, depth, check, compare``: rig files and the depth camera in them."""
 
 from __future__ import annotations
 
@@ -121,6 +121,8 @@ def depth(arguments: argparse.Namespace) -> None:
         source = open_source(arguments.source, realsense_of(arguments), keeps_wrapped=True)
         camera = stack.enter_context(source)
         _require_own(rig, camera)
+        if camera.identity.serial_number:
+            rig = replace(rig, depth_camera=camera.identity)
         is_stopped = stack.enter_context(until_interrupted())
         progress = stack.enter_context(show_progress(is_stopped))
         settings = STILLS if arguments.stills else DepthSettings()
@@ -177,38 +179,6 @@ def compare(arguments: argparse.Namespace) -> None:
         shown.add_row(one.name, f"{one.value:.3g} {one.unit}")
     console.print(shown)
     save(arguments.json, {"differences": [asdict(one) for one in differences]})
-
-
-@command(
-    arg("input", type=Path, help="rig file"),
-    file_option("--output", "rig file to write", required=True),
-    arg(
-        "--camera",
-        metavar="SOURCE",
-        help="realsense, or a recording by the rig's depth camera: stores its model, serial number "
-        "and firmware",
-    ),
-    *REALSENSE_OPTIONS,
-)
-def migrate(arguments: argparse.Namespace) -> None:
-    """Convert a rig file of any known version to the newest, and list what it leaves open."""
-    from handcal.rig.report import missing_parts
-
-    rig = rig_or_example(arguments.input)
-    if arguments.camera is not None:
-        rig = _with_identity(rig, arguments)
-    write_rig_file(arguments.output, rig)
-    for line in missing_parts(rig):
-        console.print(f"missing: {line}", markup=False)
-
-
-def _with_identity(rig: Rig, arguments: argparse.Namespace) -> Rig:
-    """Return the rig with the identity of its depth camera; HandcalError if it is another one."""
-    with open_source(arguments.camera, realsense_of(arguments)) as camera:
-        if not camera.identity.serial_number:
-            raise HandcalError(f"{camera.name} reports no serial number; use another source")
-        _require_own(rig, camera)
-        return replace(rig, depth_camera=camera.identity)
 
 
 def _require_own(rig: Rig, camera: Camera) -> None:

@@ -30,8 +30,6 @@ _LARGEST_REACH_M = 0.25
 _LEAST_SEEN = 0.95
 _HAND_DEPTHS_M = (0.4, 0.5, 0.6)
 _LARGEST_BIAS_M = 0.005
-_IDENTIFY = "handcal rig migrate FILE --output NEW --camera realsense"
-_CHECK_DEPTH = "handcal rig depth RECORDING --rig FILE --output NEW"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,40 +57,6 @@ class RigFinding:
 def report_rig(rig: Rig) -> tuple[RigFinding, ...]:
     """Return the findings about a rig that `check_rig` accepts."""
     return tuple(_findings(rig))
-
-
-def missing_parts(rig: Rig) -> tuple[str, ...]:
-    """Return what the rig's file does not say, each in one line that says what to do."""
-    camera = rig.depth_camera
-    unknown = {"model": camera.model, "serial number": camera.serial_number}
-    names = " and ".join(name for name, known in unknown.items() if not known)
-    lines = []
-    if names:
-        verb = "are" if " and " in names else "is"
-        lines.append(
-            f"the depth camera's {names} {verb} not known: connect it and run '{_IDENTIFY}'"
-        )
-    if rig.headset is None:
-        lines.append(
-            "the headset's identity and views are not known: only the headset itself can report "
-            "them; no calibrated part depends on them"
-        )
-    if rig.depth_check is None:
-        lines.append(
-            "the depth of the depth camera has not been checked: record the board at several "
-            f"distances and run '{_CHECK_DEPTH}'"
-        )
-    if rig.display_check is None:
-        lines.append(
-            "nobody has checked that the headset draws what it is sent: run "
-            "'handcal rig display-check --rig FILE --output NEW'"
-        )
-    lines += [
-        f"the origin of {part} is not known: calibrate it again to know its uncertainty"
-        for part in RIG_PARTS
-        if part not in rig.origins
-    ]
-    return tuple(lines)
 
 
 def _findings(rig: Rig) -> Iterator[RigFinding]:

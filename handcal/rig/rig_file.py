@@ -4,15 +4,13 @@ Anything that reads FileStorage reads it. Per eye: the display's size, T_V_H, an
 its parameters; for the depth camera: identity, intrinsics, T_H_D and the check of its depth; the
 headset's identity and views; and how each part was calibrated. Numbers survive exactly.
 
-Version 1 has no origins. Version 2 has no identities, no depth check, and an unnamed display model.
-Both can be read; files are always written as version 3. Unknown fields are ignored.
+Unknown fields are ignored.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -43,7 +41,7 @@ _CAMERA_TEXTS = ("model", "serial_number", "firmware")
 
 
 def write_rig(path: str | PathLike[str], rig: Rig) -> None:
-    """Write a rig file, version 3, atomically.
+    """Write a rig file, atomically.
 
     Parameters
     ----------
@@ -90,7 +88,7 @@ def write_rig(path: str | PathLike[str], rig: Rig) -> None:
 
 
 def read_rig(path: str | PathLike[str]) -> Rig:
-    """Read and check a rig file, version 1, 2 or 3.
+    """Read and check a rig file.
 
     Parameters
     ----------
@@ -106,7 +104,7 @@ def read_rig(path: str | PathLike[str]) -> Rig:
     Raises
     ------
     FileError
-        If the file cannot be read, is not a rig file or of an unknown version, or a field is
+        If the file cannot be read, is not a rig file or of another version, or a field is
         missing or implausible; the text names the field and what is expected.
 
     Examples
@@ -233,32 +231,29 @@ def _write_origins(storage: cv2.FileStorage, origins: Mapping[RigPart, Origin]) 
 def _parse(root: Fields) -> Rig:
     version = root.integer("handcal_rig")
     require(
-        1 <= version <= RIG_VERSION,
-        f"rig version {version} is unknown; versions 1 to {RIG_VERSION} can be read",
+        version == RIG_VERSION,
+        f"the rig's version is {version}, not {RIG_VERSION}: use the handcal that wrote this file, "
+        "or calibrate the rig again",
     )
     depth_camera = root.section("depth_camera")
     rig = Rig(
         name=root.text("name"),
-        eyes={eye: _parse_display(root.section(eye), version) for eye in EYES},
+        eyes={eye: _parse_display(root.section(eye)) for eye in EYES},
         T_H_D=root.matrix("T_H_D", 4, 4),
         depth_intrinsics=_parse_intrinsics(depth_camera),
         origins=_parse_origins(root),
+        depth_camera=CameraIdentity(*map(depth_camera.text, _CAMERA_TEXTS)),
+        headset=_parse_headset(root),
+        depth_check=_parse_depth_check(root),
+        display_check=_parse_display_check(root),
     )
-    if version >= 3:
-        rig = replace(
-            rig,
-            depth_camera=CameraIdentity(*map(depth_camera.text, _CAMERA_TEXTS)),
-            headset=_parse_headset(root),
-            depth_check=_parse_depth_check(root),
-            display_check=_parse_display_check(root),
-        )
     check_rig(rig)
     return rig
 
 
-def _parse_display(fields: Fields, version: int) -> EyeDisplay:
-    model = fields.section("model") if version >= 3 else fields
-    name = model.text("name") if version >= 3 else DISPLAY_MODEL
+def _parse_display(fields: Fields) -> EyeDisplay:
+    model = fields.section("model")
+    name = model.text("name")
     require(
         name == DISPLAY_MODEL,
         f"the display model {name[:40]!r} is not known, only {DISPLAY_MODEL!r}: use the version "

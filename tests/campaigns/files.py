@@ -156,10 +156,6 @@ def _cases(seeds: Path) -> Iterable[tuple[str, Case]]:
 
     headset = ["headset", "--port", "9", "--duration-s", "0", "--key-file"]
     yield "rig file", one("rig.yaml", "text", lambda path: ["rig", "check", path])
-    yield (
-        "rig file migrated",
-        one("rig.yaml", "text", lambda path: ["rig", "migrate", path, "--output", "new.yaml"]),
-    )
     for name, kind in (("opencv.yml", "text"), ("ros.yaml", "text"), ("camera.json", "json")):
         yield (
             f"intrinsics, {name}",

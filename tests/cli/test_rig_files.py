@@ -21,7 +21,6 @@ from handcal.sim.ahat import ahat_rays
 from handcal.sim.boards import BoardPainter, PictureSettings
 from tests import board_frames
 from tests.camera.hl2ss_server import Hl2ssServer, calibration_of
-from tests.helpers import DATA
 
 RIG = example_rig()
 PICTURES = PictureSettings(samples=1)
@@ -46,49 +45,26 @@ def test_a_rig_in_doubt_fails_the_check(tmp_path: Path, capsys: pytest.CaptureFi
     assert "left and right are exchanged" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("version", "missing"), [(1, 7), (2, 4), (3, 7)])
-def test_migrating_a_rig_file_reports_missing_parts(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], version: int, missing: int
-) -> None:
-    old = DATA / f"rig-v{version}.yaml"
-    if version == 3:
-        old = tmp_path / "old.yaml"
-        write_rig(old, RIG)
-    assert f"handcal_rig: {version}\n" in old.read_text()
-    run("migrate", old, "--output", tmp_path / "new.yaml")
-    assert "handcal_rig: 3\n" in (tmp_path / "new.yaml").read_text()
-    assert read_rig(tmp_path / "new.yaml").name == read_rig(old).name
-    lines = capsys.readouterr().out.split("missing: ")[1:]
-    assert len(lines) == missing
-    assert "serial number are not known: connect it" in " ".join(lines[0].split())
-
-
 def recorded(folder: Path, identity: CameraIdentity, camera: Intrinsics) -> Path:
     depth = np.zeros((camera.height, camera.width), np.uint16)
     record_folder(folder, [Frame(1, 1, 0, depth, 1e-3, camera)], identity)
     return folder
 
 
-def test_the_serial_number_is_taken_from_the_rig_s_own_camera_only(tmp_path: Path) -> None:
-    old, new = DATA / "rig-v2.yaml", tmp_path / "new.yaml"
-    lens, d415 = read_rig(old).depth_intrinsics, CameraIdentity("Intel RealSense D415", "123", "5")
-    own = recorded(tmp_path / "own", d415, lens)
-    run("migrate", old, "--output", new, "--camera", own)
-    assert read_rig(new).depth_camera == d415
-    run("migrate", new, "--output", new, "--camera", own)
-    nameless = recorded(tmp_path / "nameless", CameraIdentity(), lens)
+def test_the_depth_of_another_camera_than_the_rig_s_is_not_checked(tmp_path: Path) -> None:
+    rig, new = tmp_path / "rig.yaml", tmp_path / "new.yaml"
+    lens, d415 = RIG.depth_intrinsics, CameraIdentity("Intel RealSense D415", "123", "5")
+    write_rig(rig, replace(RIG, depth_camera=d415))
     other = recorded(tmp_path / "other", replace(d415, serial_number="456"), lens)
     longer = recorded(tmp_path / "longer", d415, replace(lens, fx=1.04 * lens.fx))
-    before = new.read_bytes()
-    for rig, source, problem in (
-        (old, nameless, "reports no serial number"),
-        (new, other, "another serial number: 456, not 123"),
-        (old, longer, "focal length 4.0 % longer"),
-        (old, tmp_path / "nothing", "there is no recording"),
+    for source, problem in (
+        (other, "another serial number: 456, not 123"),
+        (longer, "focal length 4.0 % longer"),
+        (tmp_path / "nothing", "there is no recording"),
     ):
         with pytest.raises(HandcalError, match=problem):
-            run("migrate", rig, "--output", new, "--camera", source)
-    assert new.read_bytes() == before
+            run("depth", source, "--stills", "--rig", rig, "--output", new)
+    assert not new.exists()
 
 
 def test_the_depth_camera_is_checked_and_the_rig_file_keeps_it(
@@ -99,11 +75,13 @@ def test_the_depth_camera_is_checked_and_the_rig_file_keeps_it(
     made = board_frames.frames(
         board_frames.poses(6, rng, 0.33, 0.52), rng, offset_m=0.01, painter=painter
     )
-    record_folder(tmp_path / "take", made)
+    d415 = CameraIdentity("Intel RealSense D415", "123", "5")
+    record_folder(tmp_path / "take", made, d415)
     rig, new = tmp_path / "rig.yaml", tmp_path / "new.yaml"
     write_rig(rig, replace(RIG, depth_intrinsics=board_frames.DEPTH))
     board = ("--squares", 8, 6, "--square-mm", 30, "--marker-mm", 22)
     run("depth", tmp_path / "take", "--stills", *board, "--rig", rig, "--output", new)
+    assert read_rig(new).depth_camera == d415
     check = read_rig(new).depth_check
     assert check is not None
     assert check.views == 6

@@ -66,7 +66,6 @@ COMMANDS = {
     "rig check": "RIG --json OUTPUT/checked.json",
     "rig compare": "RIG RIG",
     "rig display-check": "--headset virtual --rig RIG --output OUTPUT/rig.yaml",
-    "rig migrate": "RIG --output OUTPUT/rig.yaml",
     "rig simulate": "OUTPUT/images --views 3",
     "evaluate cube net": "--pdf OUTPUT/net.pdf --cube OUTPUT/cube.json",
     "evaluate cube simulate": "OUTPUT/captures --poses 1",

@@ -6,7 +6,7 @@ from handcal.core.geometry import rigid
 from handcal.core.rig_types import PART_NAMES, RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
 from handcal.core.types import EYES, CameraIdentity, Eye, HeadsetIdentity
 from handcal.rig.example import example_rig
-from handcal.rig.report import RigFinding, display_finding, missing_parts, report_rig
+from handcal.rig.report import RigFinding, display_finding, report_rig
 
 RIG = example_rig()
 
@@ -80,26 +80,6 @@ def test_the_devices_and_a_small_bias_of_depth_are_told() -> None:
 def test_a_depth_that_may_be_biased_is_in_doubt() -> None:
     for check in (depth_check(0.01), depth_check(-0.01), depth_check(0.003, sigma_m=0.002)):
         assert set(doubtful(replace(RIG, depth_check=check))) == {"Depth check"}
-
-
-def test_missing_parts_are_told_one_line_each() -> None:
-    lines = missing_parts(RIG)
-    assert len(lines) == 7
-    assert all("\n" not in line for line in lines)
-    assert "model and serial number are not known: connect it and run 'handcal rig" in lines[0]
-    model = replace(RIG, depth_camera=CameraIdentity("Intel RealSense D415"))
-    assert "depth camera's serial number is not known" in missing_parts(model)[0]
-    origin = Origin("grid", "today", 3, 0.2, "good", "so it is", ("x_m",), np.eye(1))
-    whole = replace(
-        RIG,
-        depth_camera=CameraIdentity("Intel RealSense D415", "123"),
-        headset=HeadsetIdentity("0a1b"),
-        depth_check=depth_check(0.0),
-        display_check=DisplayCheck("today", "wearer", "0a1b", "", "", {"left": ""}),
-        origins={"left": origin, "right": origin, "T_H_D": origin},
-    )
-    assert missing_parts(whole) == ()
-    assert len(missing_parts(replace(whole, origins={"left": origin}))) == 2
 
 
 def test_what_the_file_does_not_tell_is_neither_fine_nor_doubtful() -> None:
