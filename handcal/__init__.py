@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from handcal.core.conventions import to_opengl, to_openxr, to_unity
     from handcal.core.display import projections, update_matrix
     from handcal.core.errors import HandcalError, HandError
-    from handcal.core.rig_types import Rig
-    from handcal.core.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud
+    from handcal.core.types import Alignment, EyeDistance, EyeShift, Frame, HandCloud, Rig
     from handcal.export.clouds import read_cloud
     from handcal.hand.shipped import segment
     from handcal.register.guard import rotation_between

@@ -16,8 +16,7 @@ from handcal.camera.clock import INFORM_NS
 from handcal.core.display import view_of_eye
 from handcal.core.errors import HandError, PoseError, PosePendingError
 from handcal.core.geometry import invert
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Alignment, Eye, Float64
+from handcal.core.types import EYES, Alignment, Eye, Float64, Rig
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.shape import ShapeChange, change_text

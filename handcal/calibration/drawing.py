@@ -8,8 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from handcal.core.display import projection_matrix
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64, Projection
+from handcal.core.types import EYES, Eye, Float64, Projection, Rig
 from handcal.link.drawn import drawn_digest
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer

@@ -16,8 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handcal.core.geometry import invert
-from handcal.core.rig_types import Rig
-from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt16
+from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, Rig, UInt16
 from handcal.rig.compare import compare_camera
 from handcal.rig.report import depth_finding, display_finding
 

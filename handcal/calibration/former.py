@@ -16,8 +16,7 @@ import numpy as np
 from handcal.calibration.lab_prior import rig_numbers
 from handcal.calibration.solve_again import solve_again, stored_solve_settings
 from handcal.core.errors import FileError
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.register.prior import LearnedPrior, posterior, widened
 from handcal.session.session import Session
 

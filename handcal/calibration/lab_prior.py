@@ -12,8 +12,7 @@ import numpy as np
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, EyeDistance, Float64
+from handcal.core.types import EYES, EyeDistance, Float64, Rig
 from handcal.io.files import modified_s
 from handcal.register.prior import (
     LearnedPrior,

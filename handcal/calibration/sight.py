@@ -11,8 +11,7 @@ from handcal.calibration.states import CalibrationSettings, Observation, State
 from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import HandError, PoseError
-from handcal.core.rig_types import Rig
-from handcal.core.types import CameraIdentity, Frame, HandCloud
+from handcal.core.types import CameraIdentity, Frame, HandCloud, Rig
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
 

@@ -18,8 +18,7 @@ from handcal.calibration.hands import PlacedHand, RecentHands
 from handcal.core.display import view_of_eye
 from handcal.core.errors import HandError
 from handcal.core.geometry import invert, transform
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import EYES, Eye, Float64, Verification
+from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Rig, Verification
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.server import Nudge
 from handcal.register.nudge import nudged_shift_m

@@ -9,8 +9,7 @@ from handcal.camera.camera import Camera
 from handcal.camera.take_board import see_board
 from handcal.core.errors import CameraEndError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import DepthCheck
-from handcal.core.types import Frame
+from handcal.core.types import DepthCheck, Frame
 from handcal.rig.boards.board import Board, BoardError
 from handcal.rig.boards.choose import ChooseSettings, ViewSelector
 from handcal.rig.boards.views import MAX_VIEWS, ViewsError

@@ -9,8 +9,7 @@ from handcal.cli.boards import BOARD_OPTIONS, GRID_OPTION, board_of
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, file_option, folder_option, number, seed, value
 from handcal.core.errors import HandcalError
-from handcal.core.rig_types import RigPart
-from handcal.core.types import EYES
+from handcal.core.types import EYES, RigPart
 from handcal.io.files import make_folder
 
 _DISPLAY = "handcal rig display; handcal rig compare shows what has changed"

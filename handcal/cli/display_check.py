@@ -15,8 +15,7 @@ from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
-    from handcal.core.rig_types import Rig
-    from handcal.core.types import Eye
+    from handcal.core.types import Eye, Rig
     from handcal.link.server import HeadsetServer
     from handcal.rig.displays.display_check import Probe
     from handcal.station.checks.display_check import Answer, Observe, Show

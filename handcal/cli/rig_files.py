@@ -18,7 +18,7 @@ from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
-    from handcal.core.rig_types import Rig
+    from handcal.core.types import Rig
 
 RIG_AND_OUTPUT = (
     file_option("--rig", "rig file to start from (default: the shipped example)"),

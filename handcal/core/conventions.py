@@ -25,8 +25,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.display import projections
 from handcal.core.frozen import brief, freeze
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye, Float64, Projection, Solved
+from handcal.core.types import Eye, Float64, Projection, Rig, Solved
 
 # Each is its own inverse.
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])

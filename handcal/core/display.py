@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 
 from handcal.core.frozen import readonly
 from handcal.core.geometry import invert, project, rigid, transform
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import EYES, Eye, Float64, Solved
+from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Rig, Solved
 
 TARGET_SIDE_M = 0.08
 TARGET_DEPTHS_M = (0.4, 0.5, 0.6)

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from handcal.core.display import eye_projection
 from handcal.core.geometry import project, transform
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import EYES, Alignment, Eye, EyeShift, Float64
+from handcal.core.types import EYES, Alignment, Eye, EyeDisplay, EyeShift, Float64
 from handcal.export.outcome import SessionOutcome
 from handcal.register.results import Results
 from handcal.session.trial import Trial

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handcal.core.geometry import invert, transform
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Eye, Float64
+from handcal.core.types import Eye, EyeDisplay, Float64
 from handcal.export.outcome import SessionOutcome
 
 

@@ -23,8 +23,7 @@ from handcal.calibration.states import Observation
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName
+from handcal.core.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName, Rig
 from handcal.register.prior import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig

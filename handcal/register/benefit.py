@@ -26,8 +26,7 @@ from handcal.core.display import (
     target_corners_m,
 )
 from handcal.core.geometry import project
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import EyeShift, Float64
+from handcal.core.types import EyeDisplay, EyeShift, Float64
 
 WORKING_DISTANCE_M = TARGET_DEPTHS_M[1]
 """Distance at which the error in depth is expected."""

@@ -33,15 +33,16 @@ from scipy.special import softmax
 
 from handcal.core.display import eye_projection
 from handcal.core.geometry import project, transform
-from handcal.core.rig_types import EyeDisplay, Rig
 from handcal.core.types import (
     EYES,
     Alignment,
     Bool,
     Eye,
+    EyeDisplay,
     EyeDistance,
     EyeShift,
     Float64,
+    Rig,
     Verification,
 )
 from handcal.register.prior import (

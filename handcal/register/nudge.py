@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 
 
 def nudged_shift_m(

@@ -17,8 +17,7 @@ import numpy as np
 
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import image_points, invert, project, transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Bool, Eye, Float64, PlanName, Verification
+from handcal.core.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
 from handcal.register.benefit import expected_arcmin
 from handcal.register.fuse import Observation, seen_by
 from handcal.register.prior import EyePrior, eye_prior, eye_slice, posterior

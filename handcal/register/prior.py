@@ -19,8 +19,7 @@ import numpy as np
 
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, transform
-from handcal.core.rig_types import DepthCheck, EyeDisplay, Rig
-from handcal.core.types import EYES, Eye, EyeDistance, Float64
+from handcal.core.types import EYES, DepthCheck, Eye, EyeDisplay, EyeDistance, Float64, Rig
 
 MIN_SESSIONS = 10
 """Fewer sessions than this do not make a prior."""

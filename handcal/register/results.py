@@ -12,7 +12,6 @@ import numpy as np
 
 from handcal.core.frozen import html_table
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
 from handcal.core.types import (
     EYES,
     Alignment,
@@ -22,6 +21,7 @@ from handcal.core.types import (
     Float64,
     Method,
     PlanName,
+    Rig,
     Verdict,
     VerdictName,
     Verification,

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.core.geometry import is_rigid, transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method
+from handcal.core.types import METHODS, Alignment, Bool, Eye, EyeShift, Float64, Method, Rig
 from handcal.register.consistent import fit_match, match_hands
 from handcal.register.model import cursor_displacement, design
 from handcal.register.rcicp import (

@@ -14,8 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, EyeShift, PlanName, Verdict, Verification
+from handcal.core.types import EYES, Eye, EyeShift, PlanName, Rig, Verdict, Verification
 from handcal.register.benefit import (
     Benefit,
     benefit,

@@ -12,8 +12,7 @@ from textwrap import shorten
 
 import numpy as np
 
-from handcal.core.rig_types import Origin, Rig, RigPart
-from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics
+from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics, Origin, Rig, RigPart
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.check import MAX_TEXT
 from handcal.rig.displays.display import DISPLAY_PARAMETERS, DisplayCalibration, Screen

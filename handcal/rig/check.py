@@ -8,8 +8,19 @@ from string import hexdigits
 import numpy as np
 
 from handcal.core.geometry import is_rigid
-from handcal.core.rig_types import RIG_PARTS, DepthCheck, DisplayCheck, EyeDisplay, Origin, Rig
-from handcal.core.types import EYES, CameraIdentity, Float64, HeadsetIdentity, Intrinsics
+from handcal.core.types import (
+    EYES,
+    RIG_PARTS,
+    CameraIdentity,
+    DepthCheck,
+    DisplayCheck,
+    EyeDisplay,
+    Float64,
+    HeadsetIdentity,
+    Intrinsics,
+    Origin,
+    Rig,
+)
 
 MAX_DEVICE_SIDE_PX = 16384
 MAX_NAME, MAX_TEXT = 200, 500

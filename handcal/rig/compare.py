@@ -15,8 +15,7 @@ from handcal.core.display import (
     view_of_eye,
 )
 from handcal.core.geometry import image_points, invert, project, transform
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import EYES, CameraIdentity, Eye, Float64, Intrinsics
+from handcal.core.types import EYES, CameraIdentity, Eye, EyeDisplay, Float64, Intrinsics, Rig
 
 # Room for intrinsics that were solved from images. At 0.5 m, 0.1 m beside the axis, the first moves
 # a point by 0.5 mm, the second by 1.5 mm. Another camera of the same model may lie within both.

@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 
 from handcal.core.geometry import image_points, invert, transform
-from handcal.core.rig_types import DepthCheck
-from handcal.core.types import Float64, Frame
+from handcal.core.types import DepthCheck, Float64, Frame
 from handcal.report.cells import signed
 from handcal.rig.boards.board import BoardError, BoardView
 from handcal.rig.boards.views import ViewsError

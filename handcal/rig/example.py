@@ -6,8 +6,7 @@ import numpy as np
 
 from handcal.core.display import update_matrix
 from handcal.core.geometry import invert, rigid
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import Intrinsics
+from handcal.core.types import EyeDisplay, Intrinsics, Rig
 
 WIDTH_PX, HEIGHT_PX = 1268, 720
 FOCAL_PX = 2456.0

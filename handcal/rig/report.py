@@ -9,16 +9,18 @@ import numpy as np
 
 from handcal.core.display import arcmin_from_px, view_of_eye
 from handcal.core.geometry import image_points, invert, transform
-from handcal.core.rig_types import (
+from handcal.core.types import (
+    EYES,
     PART_NAMES,
     RIG_PARTS,
     DepthCheck,
     DisplayCheck,
+    Eye,
     EyeDisplay,
+    Float64,
     Rig,
     RigPart,
 )
-from handcal.core.types import EYES, Eye, Float64
 from handcal.report.cells import signed
 
 _EYE_DISTANCE_M = 0.050, 0.075

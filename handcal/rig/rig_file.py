@@ -18,16 +18,20 @@ import cv2
 import numpy as np
 
 from handcal.core.errors import FileError
-from handcal.core.rig_types import (
+from handcal.core.types import (
+    EYES,
     RIG_PARTS,
+    CameraIdentity,
     DepthCheck,
     DisplayCheck,
     EyeDisplay,
+    HeadsetIdentity,
+    HeadsetView,
+    Intrinsics,
     Origin,
     Rig,
     RigPart,
 )
-from handcal.core.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
 from handcal.io.files import read_limited, write_atomic
 from handcal.rig.check import MAX_RANGES, check_rig, require
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage

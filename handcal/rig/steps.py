@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from handcal.core.errors import HandcalError
-from handcal.core.rig_types import Rig
-from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics
+from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics, Rig
 from handcal.rig.assemble import screen_of
 from handcal.rig.boards.tracked_file import read_tracked
 from handcal.rig.boards.views import BoardImage, used

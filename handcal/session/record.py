@@ -10,8 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from handcal.core.errors import FileError
-from handcal.core.rig_types import Rig
-from handcal.core.types import Alignment, Eye, Float64
+from handcal.core.types import Alignment, Eye, Float64, Rig
 from handcal.io.files import read_json, read_limited
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.alignment_file import decode_alignment

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from handcal.core.errors import FileError
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
 from handcal.rig.rig_file import write_rig
 from handcal.session.journal import JOURNAL, Damage, Event, happens_now, journal_line

@@ -31,8 +31,7 @@ from numpy.typing import ArrayLike
 
 from handcal.core.display import as_shifts
 from handcal.core.errors import FileError
-from handcal.core.rig_types import Rig
-from handcal.core.types import Alignment, Eye
+from handcal.core.types import Alignment, Eye, Rig
 from handcal.io.closable import Closable
 from handcal.io.files import (
     make_folder,

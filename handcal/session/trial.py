@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 from handcal.core.display import arcmin_from_px, eye_projection, target_corners_m
 from handcal.core.frozen import freeze
 from handcal.core.geometry import project
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, EyeDisplay, Float64
 from handcal.report import statistics
 from handcal.report.statistics import Summary
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES
+from handcal.core.types import EYES, Rig
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.rig.boards.tracked_file import write_tracked

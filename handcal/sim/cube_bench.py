@@ -13,8 +13,7 @@ from scipy.spatial import KDTree
 from handcal.core.display import arcmin_from_px, eye_projection, view_of_eye
 from handcal.core.errors import CameraTimeoutError, LinkError
 from handcal.core.geometry import invert, project, rigid, transform
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import CameraIdentity, Eye, Float64, Frame, HeadsetIdentity
+from handcal.core.types import CameraIdentity, Eye, EyeDisplay, Float64, Frame, HeadsetIdentity, Rig
 from handcal.io.closable import Closable
 from handcal.link.client import HeadsetClient
 from handcal.link.pairing import new_device_id, new_pairing_key

@@ -22,8 +22,7 @@ from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.errors import FileError
 from handcal.core.geometry import image_points, invert, project, rigid, transform
 from handcal.core.progress import Progress
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import Eye, Float64, Intrinsics, UInt8
+from handcal.core.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, UInt8
 from handcal.io.files import make_folder, sync_folder, write_json
 from handcal.io.images import write_png
 from handcal.register.fuse import FuseSettings

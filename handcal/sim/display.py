@@ -11,8 +11,7 @@ import numpy as np
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.display import projection_matrix
 from handcal.core.geometry import project, rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye, Float64, Projection, UInt8
+from handcal.core.types import Eye, Float64, Projection, Rig, UInt8
 from handcal.link.client import HeadsetClient
 from handcal.sim.boards import PictureSettings
 from handcal.sim.photographs import VIEWPOINT_CAMERA

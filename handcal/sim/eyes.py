@@ -12,8 +12,7 @@ import numpy as np
 
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import camera_matrix, invert, rigid
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import Eye, Float64, Intrinsics, UInt8
+from handcal.core.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, UInt8
 from handcal.sim.render import World, render
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings

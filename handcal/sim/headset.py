@@ -23,8 +23,7 @@ import numpy as np
 from handcal.core.display import projection_matrix
 from handcal.core.errors import LinkError
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView
+from handcal.core.types import EYES, Eye, EyeDisplay, Float64, HeadsetIdentity, HeadsetView, Rig
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.endpoint import Channel
 from handcal.link.impair import UNIMPAIRED, Impairment

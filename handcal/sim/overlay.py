@@ -9,8 +9,7 @@ import numpy as np
 from handcal.core.display import projection_matrix, view_of_eye
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, rigid, transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Alignment, Bool, Eye, Float64
+from handcal.core.types import EYES, Alignment, Bool, Eye, Float64, Rig
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import PlacementError, apply_placement_error, overlay_hand, view_through
 from handcal.sim.raster import visible_points

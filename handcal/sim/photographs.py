@@ -8,8 +8,7 @@ import numpy as np
 
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Intrinsics, UInt8
+from handcal.core.types import EYES, Intrinsics, Rig, UInt8
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.rig.boards.board import Board

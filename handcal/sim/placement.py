@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import invert, project, rigid, transform
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 from handcal.sim.hand import HandModel
 
 _MATCH_ITERATIONS = 30

@@ -16,8 +16,7 @@ from scipy.spatial import KDTree
 
 from handcal.core.display import arcmin_from_px, eye_projection, view_of_eye
 from handcal.core.geometry import invert, project, transform
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.sim.hand import HandModel
 

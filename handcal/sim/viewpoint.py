@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.core.display import eye_projection
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64, Intrinsics, UInt8
+from handcal.core.types import EyeDisplay, Float64, Intrinsics, UInt8
 from handcal.sim.boards import PictureSettings, pixel_rays
 
 _BLACK, _WHITE = 12.0, 190.0  # a display only adds light, and black is not quite dark

@@ -14,8 +14,7 @@ import numpy as np
 
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import interpolate_pose, invert, rigid, transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, LOOK_AROUND, Eye, Float64
+from handcal.core.types import EYES, LOOK_AROUND, Eye, Float64, Rig
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import (

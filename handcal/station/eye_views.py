@@ -12,8 +12,7 @@ from handcal.calibration.hands import PlacedHand
 from handcal.calibration.procedure import Calibration
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.scene import SceneState
 from handcal.sim.simulation import Simulation

@@ -16,8 +16,7 @@ from handcal.camera.live import open_hololens2, open_live
 from handcal.camera.realsense import RealSenseCamera
 from handcal.camera.recordings import open_recording
 from handcal.core.errors import CameraError, FileError
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, PlanName
+from handcal.core.types import EYES, PlanName, Rig
 from handcal.io.settings import settings_json
 from handcal.register.prior import PriorSettings
 from handcal.rig.rig_file import read_rig

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from handcal.core.display import arcmin_from_px, eye_projection
 from handcal.core.frozen import freeze
 from handcal.core.geometry import project
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Eye, Float64, UInt8
+from handcal.core.types import Eye, EyeDisplay, Float64, UInt8
 
 _NEAREST_M = 0.05
 _NO_TARGET_M = np.empty((0, 3))

@@ -10,8 +10,7 @@ from PySide6.QtWidgets import QCheckBox, QDialog, QLabel, QWidget
 
 from handcal.core.errors import LinkError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye
+from handcal.core.types import EYES, Eye, Rig
 from handcal.link.discovery import Announcement
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import OFFER_S

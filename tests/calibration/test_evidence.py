@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from handcal.calibration.evidence import FROZEN_FRAMES, Contradiction, Evidence
-from handcal.core.rig_types import DepthCheck
-from handcal.core.types import CameraIdentity, Frame
+from handcal.core.types import CameraIdentity, DepthCheck, Frame
 from handcal.rig.example import example_rig
 
 RIG = example_rig()

@@ -13,8 +13,7 @@ import pytest
 from handcal.calibration import lab_prior
 from handcal.calibration.lab_prior import run_learn_prior
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Alignment, EyeDistance
+from handcal.core.types import EYES, Alignment, EyeDistance, Rig
 from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_position_m, eye_prior
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig

@@ -12,8 +12,7 @@ import pytest
 from handcal.camera.folder import FolderCamera, record_folder
 from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
 from handcal.core.progress import Progress
-from handcal.core.rig_types import DepthCheck
-from handcal.core.types import Frame
+from handcal.core.types import DepthCheck, Frame
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import ViewsError
 from handcal.sim.boards import BoardPainter, PictureSettings

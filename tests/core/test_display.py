@@ -17,8 +17,7 @@ from handcal.core.display import (
     view_of_eye,
 )
 from handcal.core.geometry import project, rigid, transform
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 from handcal.rig.example import example_rig
 
 DISPLAY = example_rig().eyes["right"]

@@ -5,8 +5,7 @@ import pytest
 
 from handcal.core.frozen import readonly
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import Alignment, Eye, Frame, Intrinsics, Projection
+from handcal.core.types import Alignment, Eye, Frame, Intrinsics, Projection, Rig
 from handcal.rig.example import example_rig
 
 INTRINSICS = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from handcal.core.conventions import opengl_projection, openxr_view, unity_world_to_camera
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye
+from handcal.core.types import EYES, Eye, Rig
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
 from handcal.session.session import SessionRecord

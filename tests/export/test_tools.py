@@ -17,8 +17,7 @@ from handcal.cli.main import main
 from handcal.core.conventions import opengl_transform, slicer_points_mm
 from handcal.core.errors import FileError
 from handcal.core.geometry import invert, project, transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.tools import write_northstar, write_openxr, write_slicer, write_unity

@@ -26,7 +26,6 @@ from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.display import view_of_eye
 from handcal.core.errors import CameraError, CameraTimeoutError
 from handcal.core.geometry import rigid, transform
-from handcal.core.rig_types import Rig
 from handcal.core.types import (
     EYES,
     Alignment,
@@ -35,6 +34,7 @@ from handcal.core.types import (
     Float64,
     Frame,
     HeadsetIdentity,
+    Rig,
     UInt8,
     Verification,
 )

@@ -6,8 +6,16 @@ import pytest
 
 from handcal.core.display import projection_matrix, view_of_eye
 from handcal.core.geometry import invert, rigid, transform
-from handcal.core.rig_types import DepthCheck
-from handcal.core.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verification
+from handcal.core.types import (
+    EYES,
+    Alignment,
+    DepthCheck,
+    Eye,
+    EyeDistance,
+    EyeShift,
+    Float64,
+    Verification,
+)
 from handcal.lab.bench.trials import trial_hand
 from handcal.register.fuse import (
     Fused,

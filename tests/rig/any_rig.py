@@ -6,8 +6,18 @@ import numpy as np
 from hypothesis import strategies as st
 
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import RIG_PARTS, DepthCheck, EyeDisplay, Origin, Rig
-from handcal.core.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView, Intrinsics
+from handcal.core.types import (
+    EYES,
+    RIG_PARTS,
+    CameraIdentity,
+    DepthCheck,
+    EyeDisplay,
+    HeadsetIdentity,
+    HeadsetView,
+    Intrinsics,
+    Origin,
+    Rig,
+)
 
 FOCAL = st.floats(1.0, 1e5)
 OFFSET = st.floats(-0.05, 0.05)

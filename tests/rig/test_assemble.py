@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import DepthCheck
-from handcal.core.types import CameraIdentity, Intrinsics
+from handcal.core.types import CameraIdentity, DepthCheck, Intrinsics
 from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.boards.views import ViewsError, WorstView
 from handcal.rig.displays.display import DisplayCalibration, DisplayHomography

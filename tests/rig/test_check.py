@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import Float64
+from handcal.core.types import Float64, Rig
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 

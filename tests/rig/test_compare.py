@@ -6,8 +6,7 @@ import pytest
 
 from handcal.camera.recordings import open_recording
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import CameraIdentity
+from handcal.core.types import CameraIdentity, Rig
 from handcal.rig.compare import compare_camera, compare_rigs
 from handcal.rig.example import example_rig
 

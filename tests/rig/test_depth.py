@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import DepthCheck
-from handcal.core.types import Float64
+from handcal.core.types import DepthCheck, Float64
 from handcal.rig.boards.board import BoardError
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.depth import DepthView, depth_view, explain_depth, fit_depth

@@ -3,8 +3,18 @@ from dataclasses import replace
 import numpy as np
 
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import PART_NAMES, RIG_PARTS, DepthCheck, DisplayCheck, Origin, Rig
-from handcal.core.types import EYES, CameraIdentity, Eye, HeadsetIdentity
+from handcal.core.types import (
+    EYES,
+    PART_NAMES,
+    RIG_PARTS,
+    CameraIdentity,
+    DepthCheck,
+    DisplayCheck,
+    Eye,
+    HeadsetIdentity,
+    Origin,
+    Rig,
+)
 from handcal.rig.example import example_rig
 from handcal.rig.report import RigFinding, display_finding, report_rig
 

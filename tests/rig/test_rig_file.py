@@ -11,8 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handcal.core.errors import FileError
-from handcal.core.rig_types import RIG_PARTS, DepthCheck, Origin, Rig
-from handcal.core.types import EYES, CameraIdentity, HeadsetIdentity, HeadsetView
+from handcal.core.types import (
+    EYES,
+    RIG_PARTS,
+    CameraIdentity,
+    DepthCheck,
+    HeadsetIdentity,
+    HeadsetView,
+    Origin,
+    Rig,
+)
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig

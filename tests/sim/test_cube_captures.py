@@ -10,8 +10,7 @@ from handcal.core.display import eye_projection
 from handcal.core.errors import CancelledError, FileError
 from handcal.core.geometry import project, transform
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import Float64, Intrinsics
+from handcal.core.types import Float64, Intrinsics, Rig
 from handcal.io.files import read_json
 from handcal.lab.evaluate.cube_test import judge_captures
 from handcal.register.fuse import FuseSettings

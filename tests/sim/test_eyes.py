@@ -5,8 +5,7 @@ import pytest
 
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import project, rigid, transform
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import EYES, Eye
+from handcal.core.types import EYES, Eye, EyeDisplay, Rig
 from handcal.rig.example import example_rig
 from handcal.sim.eyes import TrueEyes
 from handcal.sim.hand import make_hand

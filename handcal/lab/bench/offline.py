@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import image_points, invert, rigid
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64, Intrinsics
+from handcal.core.types import EYES, Eye, Float64, Intrinsics, Rig
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers

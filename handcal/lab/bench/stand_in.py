@@ -6,8 +6,7 @@ import numpy as np
 
 from handcal.core.display import reprojection_arcmin
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Float64
+from handcal.core.types import EYES, Float64, Rig
 from handcal.lab.bench.trials import run_trials, trial_hand
 from handcal.register.guard import GuardSettings
 from handcal.register.solve import solve_alignment

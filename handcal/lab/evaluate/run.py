@@ -10,7 +10,7 @@ from typing import Any
 
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 from handcal.io.files import make_folder, require_suffix, user_path

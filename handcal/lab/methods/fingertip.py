@@ -16,8 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 from handcal.lab.methods.points import check_pairs
 
 FEWEST_ALIGNMENTS = 2

@@ -19,8 +19,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.display import arcmin_from_px
 from handcal.core.errors import FileError
 from handcal.core.geometry import project
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 from handcal.lab.methods.fingertip import solve_eye_from_points
 from handcal.lab.methods.indica import solve_indica_full, solve_indica_recycled, split_projection
 from handcal.lab.methods.spaam import solve_spaam

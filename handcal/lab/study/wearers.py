@@ -13,8 +13,7 @@ import numpy as np
 
 from handcal.core.display import TARGET_SIDE_M, eye_projection, projection_matrix, view_of_eye
 from handcal.core.geometry import invert, project, rigid, transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Alignment, Eye, Float64
+from handcal.core.types import EYES, Alignment, Eye, Float64, Rig
 from handcal.lab.study.trials import study_hand
 from handcal.register.guard import GuardSettings
 from handcal.rig.example import example_rig

@@ -26,8 +26,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.display import arcmin_from_px, eye_projection, view_of_eye
 from handcal.core.frozen import freeze
 from handcal.core.geometry import invert, project, rigid, transform
-from handcal.core.rig_types import EyeDisplay, Rig, RigPart
-from handcal.core.types import Eye, Float64, Intrinsics
+from handcal.core.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, RigPart
 from handcal.rig.boards.board import BoardView
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.displays.display import DisplayHomography, undistort

@@ -11,8 +11,7 @@ import cv2
 
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import EyeDisplay, Rig
-from handcal.core.types import EYES, Eye, Intrinsics
+from handcal.core.types import EYES, Eye, EyeDisplay, Intrinsics, Rig
 from handcal.io.images import read_image
 from handcal.report.document import Column, Report, Section, Table, facts
 from handcal.report.provenance import made_with

@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.frozen import freeze
 from handcal.core.geometry import camera_matrix, invert
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64, Intrinsics
+from handcal.core.types import EyeDisplay, Float64, Intrinsics
 from handcal.rig.boards.views import ViewsError, require_size
 from handcal.rig.check import MAX_DEVICE_SIDE_PX
 from handcal.rig.displays.grid import GridView

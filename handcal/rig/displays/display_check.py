@@ -19,8 +19,7 @@ import numpy as np
 
 from handcal.core.display import projection_matrix
 from handcal.core.geometry import project
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye, Float64, Projection, UInt8
+from handcal.core.types import Eye, Float64, Projection, Rig, UInt8
 from handcal.link.shapes import Target
 
 Probe: TypeAlias = Literal["control", "shift", "eye shift", "other eye"]

@@ -14,8 +14,7 @@ from handcal.calibration.drawing import rig_name
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.errors import CameraError, HandcalError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import DisplayCheck, Rig
-from handcal.core.types import EYES, Eye, HeadsetIdentity, UInt8
+from handcal.core.types import EYES, DisplayCheck, Eye, HeadsetIdentity, Rig, UInt8
 from handcal.link.server import HeadsetServer
 from handcal.rig.displays.display_check import (
     PROBES,

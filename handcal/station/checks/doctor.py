@@ -21,8 +21,7 @@ from handcal.camera.sdk_devices import Device, devices_by_child
 from handcal.camera.usb import explain_absence
 from handcal.core.errors import CancelledError, HandcalError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import CameraIdentity, Intrinsics
+from handcal.core.types import CameraIdentity, Intrinsics, Rig
 from handcal.hand.shipped import load_detector
 from handcal.io.resources import resource_path
 from handcal.io.x_display import x_server_answers

@@ -18,8 +18,7 @@ from handcal.core.errors import (
 )
 from handcal.core.geometry import transform
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Float64, HeadsetIdentity
+from handcal.core.types import EYES, Float64, HeadsetIdentity, Rig
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer

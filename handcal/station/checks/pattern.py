@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from handcal.core.display import projection_matrix, target_corners_m
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye, Projection
+from handcal.core.types import Eye, Projection, Rig
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target

@@ -21,8 +21,7 @@ from handcal.core.display import TARGET_DEPTHS_M, view_of_eye
 from handcal.core.errors import FileError, HandcalError, PoseError
 from handcal.core.geometry import transform
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
 from handcal.register.results import read_rendered_shift_m

@@ -5,8 +5,7 @@ from __future__ import annotations
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.display import target_corners_m
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye, Float64
+from handcal.core.types import Eye, Float64, Rig
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target
 from handcal.session.session import Session

@@ -21,8 +21,7 @@ from PySide6.QtWidgets import (
 
 from handcal.calibration.states import MAX_HAND_SET_SHIFT_M
 from handcal.core.display import TARGET_DEPTHS_M, DrawnMove, effect_at
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye
+from handcal.core.types import EYES, Eye, Rig
 from handcal.register.results import read_rendered_shift_m
 from handcal.station.snapshot import Snapshot
 from handcal_gui.keys import add_action

@@ -15,8 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.core.errors import FileError, HandcalError
-from handcal.core.rig_types import PART_NAMES, Rig
-from handcal.core.types import UInt8
+from handcal.core.types import PART_NAMES, Rig, UInt8
 from handcal.io.images import write_png
 from handcal.io.resources import resource_path
 from handcal.rig.boards.board import DICTIONARIES, Board, BoardKind

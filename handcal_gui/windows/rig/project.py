@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.errors import FileError, HandcalError
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.io.files import read_json, user_path
 from handcal.rig.boards.board import Board
 from handcal.rig.formats import read_intrinsics

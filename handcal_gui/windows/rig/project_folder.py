@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from handcal.core.errors import FileError
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.io.files import make_folder, read_json, user_path, write_json
 from handcal.io.resources import resource_path
 from handcal.io.settings import read_settings, settings_json

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.core.errors import FileError, HandcalError
-from handcal.core.rig_types import PART_NAMES, RIG_PARTS, Rig
+from handcal.core.types import PART_NAMES, RIG_PARTS, Rig
 from handcal.io.files import user_path
 from handcal.rig.check import MAX_NAME
 from handcal.rig.report import RigFinding, report_rig

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.rig.assemble import STEREO_PARAMETERS
 from handcal.rig.compare import compare_rigs
 from handcal.rig.displays.display import DISPLAY_PARAMETERS, DisplayCalibration

@@ -8,8 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from handcal.core.errors import HandcalError
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye
+from handcal.core.types import Eye, Rig
 from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.boards.views import BoardImage, WorstView

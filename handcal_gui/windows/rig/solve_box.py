@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Origin
+from handcal.core.types import Origin
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.translation import tr

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QGridLayout, QTabWidget, QWidget
 
-from handcal.core.rig_types import Origin
+from handcal.core.types import Origin
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.choose import ChooseSettings
 from handcal.rig.boards.views import ASKED_VIEWS

@@ -19,8 +19,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.core.rig_types import Rig
-from handcal.core.types import HeadsetIdentity
+from handcal.core.types import HeadsetIdentity, Rig
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings

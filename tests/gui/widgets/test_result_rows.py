@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Verdict
+from handcal.core.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Rig, Verdict
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.judged_trials import EyeTrials, eye_trials

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.session.session import Session
 from handcal_gui.widgets.times import local_time, session_time
 

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.session.session import SessionRecord
 from handcal.session.trial import make_trial
 from handcal_gui.program import Program

@@ -10,8 +10,7 @@ import pytest
 from handcal.core.display import TARGET_DEPTHS_M
 from handcal.core.errors import CancelledError, FileError, HandcalError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES
+from handcal.core.types import EYES, Rig
 from handcal.io.images import write_png
 from handcal.lab.evaluate.run import run_cube_test, run_user_test
 from handcal.lab.settings import CubeTestSettings, NoiseStudySettings, UserTestSettings

@@ -6,8 +6,7 @@ import pytest
 
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import invert, rigid
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.rig.acceptance.accept import (
     CameraMove,
     EyeAcceptance,

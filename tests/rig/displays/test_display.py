@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import image_points, invert, project, rigid
-from handcal.core.rig_types import EyeDisplay
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.displays.display import (
     DisplayCalibration,

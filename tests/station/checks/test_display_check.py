@@ -12,8 +12,7 @@ import pytest
 from handcal.calibration.evidence import Evidence
 from handcal.core.errors import CancelledError, HandcalError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import DisplayCheck
-from handcal.core.types import Eye, HeadsetIdentity
+from handcal.core.types import DisplayCheck, Eye, HeadsetIdentity
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.rig.displays.display_check import Probe

@@ -14,8 +14,14 @@ import pytest
 
 from handcal.core.errors import HandcalError, PoseError
 from handcal.core.geometry import invert, rigid, transform
-from handcal.core.rig_types import DisplayCheck
-from handcal.core.types import Float64, Frame, HeadsetIdentity, HeadsetView, Intrinsics
+from handcal.core.types import (
+    DisplayCheck,
+    Float64,
+    Frame,
+    HeadsetIdentity,
+    HeadsetView,
+    Intrinsics,
+)
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.link.statistics import LinkStatistics

@@ -14,8 +14,7 @@ from PySide6.QtWidgets import QApplication, QToolButton
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Verdict
+from handcal.core.types import EYES, Rig, Verdict
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.pages.wizard.picture import GuidePicture

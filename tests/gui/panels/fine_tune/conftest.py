@@ -10,7 +10,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.fine_tune.history import Shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel

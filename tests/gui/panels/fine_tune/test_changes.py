@@ -11,8 +11,7 @@ from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Verdict
+from handcal.core.types import EYES, Rig, Verdict
 from handcal.register.results import Results
 from handcal_gui.panels.fine_tune.history import Shifts, same_shifts
 from handcal_gui.panels.fine_tune.panel import FineTunePanel

@@ -25,8 +25,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import MAX_HAND_SET_SHIFT_M, State
 from handcal.core.display import DrawnMove, effect_at
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES
+from handcal.core.types import EYES, Rig
 from handcal.register.results import Results, results_json
 from handcal.session.record import SessionRecord
 from handcal.session.state import WENT_BACK, SessionEvent

@@ -14,8 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
 from handcal.core.geometry import transform
-from handcal.core.rig_types import Rig
-from handcal.core.types import EYES, Alignment, Verdict, VerdictName
+from handcal.core.types import EYES, Alignment, Rig, Verdict, VerdictName
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot

@@ -18,8 +18,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.core.rig_types import Rig
-from handcal.core.types import EyeDistance
+from handcal.core.types import EyeDistance, Rig
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye
+from handcal.core.types import Eye, Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal_gui.panels.trials.panel import TrialsPanel

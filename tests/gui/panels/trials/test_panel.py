@@ -19,8 +19,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye, EyeShift
+from handcal.core.types import Eye, EyeShift, Rig
 from handcal.register.results import Results
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial

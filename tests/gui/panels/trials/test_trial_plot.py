@@ -7,8 +7,7 @@ from PySide6.QtWidgets import (
     QTabWidget,
 )
 
-from handcal.core.rig_types import Rig
-from handcal.core.types import Eye
+from handcal.core.types import Eye, Rig
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal_gui.panels.trials.panel import TrialsPanel

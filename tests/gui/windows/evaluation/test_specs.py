@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
-from handcal.core.rig_types import Rig
+from handcal.core.types import Rig
 from handcal.lab.evaluate.cube_folder import CapturePlan
 from handcal.lab.settings import (
     MethodComparisonSettings,

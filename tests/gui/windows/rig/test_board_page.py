@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.core.rig_types import Origin
+from handcal.core.types import Origin
 from handcal.rig.boards.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QTre
 from pytestqt.qtbot import QtBot
 
 from handcal.camera.settings import RealSenseSettings
-from handcal.core.rig_types import RIG_PARTS, Origin
+from handcal.core.types import RIG_PARTS, Origin
 from handcal.rig.example import example_rig
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.project_folder import ProjectFolder

@@ -25,7 +25,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from handcal.core.rig_types import Origin
+from handcal.core.types import Origin
 from handcal.rig.boards.board import Board
 from handcal.rig.example import example_rig
 from handcal.rig.formats import write_intrinsics

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 
 from handcal.core.geometry import rigid
-from handcal.core.rig_types import Origin
+from handcal.core.types import Origin
 from handcal.rig.assemble import STEREO_PARAMETERS
 from handcal.rig.example import example_rig
 from handcal_gui.windows.rig.rows import difference_rows, rig_rows
