@@ -57,20 +57,19 @@ __all__ = [
 ]
 
 _HOMES = {
+    "calibration.solve_again": ("solve",),
     "camera.images": ("read_frame",),
-    "conventions": ("to_opengl", "to_openxr", "to_unity"),
-    "display": ("projections", "update_matrix"),
-    "errors": ("HandError", "HandcalError"),
+    "core.conventions": ("to_opengl", "to_openxr", "to_unity"),
+    "core.display": ("projections", "update_matrix"),
+    "core.errors": ("HandError", "HandcalError"),
+    "core.types": ("Alignment", "EyeDistance", "EyeShift", "Frame", "HandCloud", "Rig"),
     "export.clouds": ("read_cloud",),
     "hand.shipped": ("segment",),
     "register.guard": ("rotation_between",),
     "register.results": ("Results",),
     "register.solve": ("solve_eye_shift",),
     "rig.rig_file": ("read_rig", "write_rig"),
-    "rig_types": ("Rig",),
     "session.session": ("open_session",),
-    "station.solve_again": ("solve",),
-    "types": ("Alignment", "EyeDistance", "EyeShift", "Frame", "HandCloud"),
 }
 _HOME_OF = {name: f"handcal.{home}" for home, names in _HOMES.items() for name in names}
 

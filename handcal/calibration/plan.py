@@ -81,7 +81,7 @@ _BY_STATE = {
 _JUDGED = ("accept", "keep")
 _FAULTY = ("contradicted", "implausible")
 _PAUSE_NS: Mapping[PlanName, int] = {"paper": 1_200_000_000, "recommended": 0}
-"""How long a step must have been next before it begins automatically. In the paper's plan the
+"""Time for which a step must have been next before it begins automatically. In the paper's plan the
 wearer lowers the hand and raises it again in between, and should see what comes."""
 _FEW = 2
 """Most further alignments of the paper's plan that are begun without asking."""
@@ -99,7 +99,7 @@ class NextStep:
     planned: Planned | None = None
     """The place of the cursor, if the plan chooses it."""
     awaited: StepName | None = None
-    """What follows once the hand is raised, or the projections are acknowledged."""
+    """The step that follows once the hand is raised, or the projections are acknowledged."""
     is_requested: bool = False
     """True if a person has asked for it."""
 

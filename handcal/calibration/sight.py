@@ -1,4 +1,4 @@
-"""What the camera sees: the hand in each frame, placed in the world, and what forbids a frame."""
+"""The hand in each frame, found and placed in the world, and the evidence against a frame."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ def replay(path: Path) -> Replayed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedSession:
-    """What `SessionRecord` is made of; a session that is written to keeps it up to date."""
+    """The parts that `SessionRecord` is made of; a session that is written to keeps it up to date."""
 
     path: Path
     rig: Rig

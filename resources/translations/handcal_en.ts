@@ -52,6 +52,10 @@
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>choose the eyes</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>The trial is not recorded yet: {}</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1461,15 +1465,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Keep the alignments &amp;so far</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Raise one bare hand {}, palm toward you and fingers a little apart; hold it still.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Next</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1493,11 +1489,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Solve for the positions of the eyes; the hand stays up.</source>
+        <source>Keeping offline…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Keeping offline…</source>
+        <source>{} The wearer may lower the hand.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1506,6 +1502,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Deletes the last alignment; the session panel can restore it</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>For {}: {}</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1537,6 +1537,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Solve for the positions of the eyes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>a fine-tuned φ</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1554,6 +1558,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Reset φ in Fine-tune to return.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{} eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1709,10 +1717,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Raise one bare hand {}, palm toward you and fingers a little apart.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Close the {} eye. </source>
         <translation type="unfinished"></translation>
     </message>
@@ -1742,14 +1746,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Turned {:.1f}°: {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>{} confirmed</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The wearer may lower the hand. Solve for the positions of the eyes.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1813,10 +1809,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Everything is already saved. The session finishes by itself; Hold keeps it open.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Everything is already saved. Finish the session when you are done.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1845,14 +1837,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Next, align {}.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Align {}</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Fini&amp;sh with one eye</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1873,27 +1857,11 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Not accepted yet: align {} again, or finish as it is.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The wearer has verified and corrected the result. Finish, or add an alignment.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>&amp;Skip</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Add alignment</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The wearer looks at the raised hand: the outline should lie on it. If it does not, add an alignment or fine-tune φ.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>It fits</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2029,19 +1997,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>make cursor</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>confirm</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>solve</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>apply</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2050,10 +2006,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>redo</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>verify the eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2070,6 +2022,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>take the next step</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>align the left eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>align the right eye</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2145,15 +2105,7 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Green: alignments made, or eyes verified. Blue: time until the step runs by itself</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>The wearer confirms in the headset, or you:</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Runs by itself, or:</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2174,6 +2126,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Hold (H)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Alignments made, or eyes verified</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3542,10 +3498,6 @@ of the trials above and below it, but not below 0. A single trial has no SD.</so
     </message>
     <message>
         <source>The preferences could not be read and were reset: check the start page and Preferences (Ctrl+,) before you start. The old file is {}; the log beside it says what was wrong.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>The preferences are from a newer version of handcal. Settings that this version does not know are ignored; they are kept in {}.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

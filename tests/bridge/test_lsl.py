@@ -45,10 +45,13 @@ def test_pylsl_receives_events_with_their_times(
             later(
                 state=State.SOLVED,
                 refusal="no hand",
-                alignments={1: simulated(1)},
                 results=results,
             ),
-            record=replace(snapshot.record, events=(*snapshot.record.events, refused)),
+            record=replace(
+                snapshot.record,
+                events=(*snapshot.record.events, refused),
+                alignments={1: simulated(1)},
+            ),
         )
         bridge(now)
         received = [inlet.pull_sample(timeout=5.0) for _ in range(7)]

@@ -124,7 +124,7 @@ def test_a_clock_that_was_set_back_is_forgiven_when_no_cookie_is_left(desk: Desk
 
 @pytest.mark.parametrize("later_s", [0.01, PERIOD_S, 2 * PERIOD_S])
 def test_hellos_are_remembered_while_a_cookie_may_be_left(desk: Desk, later_s: float) -> None:
-    """Who recorded a hello with its cookie may send it as long as the cookie is valid."""
+    """A recorded hello with its cookie could be sent again as long as the cookie is valid."""
     cookie = desk.cookie(1)
     admitted = desk.hello(2, cookie)
     assert isinstance(desk.hear(admitted), Caller)

@@ -1,1 +1,1 @@
-"""When a frame was exposed: the camera's delay, measured while the head moves."""
+"""The time of an exposure: the camera's delay, measured while the head moves."""
