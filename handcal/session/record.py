@@ -160,7 +160,7 @@ def replay(path: Path) -> Replayed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedSession:
-    """The parts that `SessionRecord` is made of; a session that is written to keeps it up to date."""
+    """The parts of which `SessionRecord` is made, kept up to date by a session in use."""
 
     path: Path
     rig: Rig
