@@ -28,6 +28,7 @@ from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.rig.example import example_rig
 from handcal.session.facts import facts_json
+from handcal.session.journal import read_journal
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
@@ -210,6 +211,21 @@ def test_a_silent_headset_is_reported_and_applying_can_be_repeated(
         assert applied.problem == ""
         process = headset_of(os.getpid())
     assert not Path(f"/proc/{process}").exists()
+
+
+def test_a_session_is_read_once_however_much_is_recorded(
+    settings: StationSettings, begun: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[Path] = []
+    monkeypatch.setattr(
+        "handcal.session.record.read_journal",
+        lambda path: (read.append(path), read_journal(path))[1],
+    )
+    with Station(settings, resume=begun) as station:
+        for number in range(5):
+            station.session.record("refused", reason="of the tests", number=number)
+            assert station.step().record.events[-1].data["number"] == number
+    assert read == [begun / "journal.jsonl"]
 
 
 def test_data_refused_by_a_full_disk_are_reported_and_stored_later(
