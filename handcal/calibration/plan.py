@@ -16,7 +16,7 @@ from enum import StrEnum
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import Observation, ProcedureError, State
 from handcal.core.errors import HandError
-from handcal.core.types import EYES, Eye, EyePlan, PlanName
+from handcal.core.types import EYES, Eye, EyePlan, PlanName, VerdictName
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.verdict import Advice, planned_eyes
 
@@ -79,7 +79,6 @@ _BY_STATE = {
     State.VERIFY: StepName.NUDGE,
 }
 _JUDGED = ("accept", "keep")
-_FAULTY = ("contradicted", "implausible")
 _PAUSE_NS: Mapping[PlanName, int] = {"paper": 1_200_000_000, "recommended": 0}
 """Time for which a step must have been next before it begins automatically. In the paper's plan the
 wearer lowers the hand and raises it again in between, and should see what comes."""
@@ -240,10 +239,12 @@ class Plan:
             raise ProcedureError("there is no verification to skip")
 
     def _next_of_paper(self, unverified: tuple[Eye, ...], is_steady: bool) -> NextStep:
-        if why := self._fault():
+        if why := self._fault("contradicted"):
             return NextStep(StepName.DONE, (), why)
         if self._made(turn := self._turn()) < self.settings.alignments:
             return self._with_hand(StepName.CURSOR, turn, is_steady)
+        if why := self._fault("implausible"):
+            return NextStep(StepName.DONE, (), why)
         if not self.settings.verify:
             return NextStep(StepName.DONE, (), "every alignment is made")
         if unverified:
@@ -256,7 +257,7 @@ class Plan:
 
     def _next_of_recommended(self, unverified: tuple[Eye, ...], is_steady: bool) -> NextStep:
         calibration = self._calibration
-        if why := self._fault() or self._end(unverified):
+        if why := self._fault("contradicted", "implausible") or self._end(unverified):
             return NextStep(StepName.DONE, (), why)
         if not (is_steady or calibration.raised) or not calibration.is_applied:
             name = StepName.WAIT if calibration.raised or is_steady else StepName.RAISE
@@ -340,11 +341,11 @@ class Plan:
         done = {*self._calibration.verifications, *self.skipped}
         return tuple(eye for eye in self.settings.usable_eyes if eye not in done)
 
-    def _fault(self) -> str:
-        """Return why the result must not be used, and no alignment would help; else empty."""
+    def _fault(self, *names: VerdictName) -> str:
+        """Return the reason of the first verdict with one of these names; empty if none has."""
         results = self._calibration.results
         verdicts = () if results is None else results.verdicts.values()
-        return next((one.reason for one in verdicts if one.name in _FAULTY), "")
+        return next((one.reason for one in verdicts if one.name in names), "")
 
     def _end(self, unverified: tuple[Eye, ...]) -> str:
         """Return why the recommended plan ends now; else empty."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from handcal.calibration.plan import NextStep, Plan, PlanSettings, StepName
-from handcal.calibration.states import State
+from handcal.calibration.states import ProcedureError, State
 from handcal.calibration.verifying import skipped_eyes
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import transform
@@ -225,3 +225,106 @@ def test_a_skipped_eye_is_not_verified_by_the_plan(
     planned.until(StepName.DONE)
     assert planned.stage.calibration.verifications == {}
     assert skipped_eyes(Session.open(session.path).events) == {"left"}
+
+
+PAPER = PlanSettings("paper", is_automatic=True, verify=False)
+
+
+def test_the_paper_s_plan_makes_its_alignments_in_turn_and_ends(
+    make: Callable[..., Planned], session: Session
+) -> None:
+    planned = make(replace(PAPER, in_turn=True, alignments=2))
+    for eye in ("left", "right", "left", "right"):
+        assert planned.until(StepName.CURSOR).eyes == (eye,)
+        planned.confirm()
+        planned.until(StepName.APPLY)
+    assert planned.until(StepName.DONE).text == "every alignment is made"
+    eyes = [one.eyes for one in session.contents.alignments.values()]
+    assert eyes == [("left",), ("right",), ("left",), ("right",)]
+
+
+def test_a_wearer_sees_what_comes_before_the_paper_s_plan_begins_it(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make(PAPER)
+    began_ns, step = 0, planned.plan.next_step(is_steady=False)
+    while planned.stage.state() is not State.ALIGN:
+        step = planned.plan.follow(planned.stage.see())
+        if step.name is StepName.CURSOR:
+            began_ns = began_ns or planned.stage.t_ns
+    assert began_ns
+    assert planned.stage.t_ns - began_ns >= 1_200_000_000
+    held = make(replace(PAPER, is_automatic=False))
+    for _ in range(30):
+        step = held.plan.follow(held.stage.see())
+    assert step.name is StepName.CURSOR
+    assert held.stage.state() is State.SHOW_HAND
+
+
+def test_one_more_alignment_is_made_when_a_person_asks_for_it(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make(PAPER)
+    planned.until(StepName.CURSOR)
+    planned.confirm()
+    planned.until(StepName.DONE)
+    planned.plan.request(("right",))
+    step = planned.plan.next_step(is_steady=False)
+    assert (step.name, step.eyes, step.is_requested) == (StepName.RAISE, ("right",), True)
+    planned.plan.withdraw()
+    assert planned.advance().name is StepName.DONE
+    planned.plan.request()
+    assert planned.until(StepName.CURSOR).eyes == EYES
+    planned.stage.calibration.redo()
+    assert planned.until(StepName.CURSOR).is_requested, "until it is made"
+    planned.confirm()
+    planned.until(StepName.DONE)
+    assert len(planned.stage.calibration.alignments) == 2
+
+
+def test_the_eyes_of_the_paper_s_plan_are_chosen_between_alignments(
+    make: Callable[..., Planned], session: Session
+) -> None:
+    planned = make(PAPER)
+    planned.until(StepName.CURSOR)
+    with pytest.raises(ProcedureError, match="the eyes cannot be changed now"):
+        planned.plan.choose("right")
+    assert planned.plan.settings == PAPER
+    planned.confirm()
+    planned.until(StepName.DONE)
+    planned.plan.choose("each")
+    assert session.contents.facts.plan == "each"
+    assert planned.stage.calibration.results is not None, "it is of the same eyes"
+    planned.plan.choose("right")
+    assert session.contents.facts.usable_eyes == ("right",)
+    assert planned.advance().name is StepName.SOLVE, "the verdict is of one eye only now"
+
+
+def test_an_eye_may_be_skipped_before_its_verification_begins(
+    make: Callable[..., Planned], session: Session
+) -> None:
+    planned = make(replace(PAPER, verify=True, placement=ONCE))
+    planned.until(StepName.CURSOR)
+    planned.confirm()
+    for eye in EYES:
+        while (step := planned.plan.next_step(is_steady=True)).name is not StepName.VERIFY:
+            planned.advance()
+            if planned.stage.state() is State.APPLYING:
+                planned.stage.calibration.wait_applied()
+        assert step.eyes == (eye,)
+        planned.plan.skip()
+    planned.until(StepName.DONE)
+    assert skipped_eyes(Session.open(session.path).events) == set(EYES)
+
+
+def test_a_contradicted_result_ends_the_plan(make: Callable[..., Planned]) -> None:
+    planned = make(replace(PAPER, in_turn=True))
+    for _ in range(2):
+        planned.stage.calibration.evidence.drawn_otherwise("other projections")
+    calibration = planned.stage.calibration
+    planned.stage.align(eyes=("left",))
+    for _ in range(2):  # as what the headset confirmed was drawn as sent
+        calibration.evidence.drawn_otherwise("other projections")
+    step = planned.until(StepName.DONE)
+    assert "does not draw what was sent" in step.text
+    assert len(calibration.alignments) == 1

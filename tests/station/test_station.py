@@ -28,7 +28,7 @@ from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.rig.example import example_rig
 from handcal.session.facts import facts_json
-from handcal.session.journal import read_journal
+from handcal.session.journal import JournalContent, read_journal
 from handcal.session.session import Session
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
@@ -217,10 +217,12 @@ def test_a_session_is_read_once_however_much_is_recorded(
     settings: StationSettings, begun: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read: list[Path] = []
-    monkeypatch.setattr(
-        "handcal.session.record.read_journal",
-        lambda path: (read.append(path), read_journal(path))[1],
-    )
+
+    def reads(path: Path) -> JournalContent:
+        read.append(path)
+        return read_journal(path)
+
+    monkeypatch.setattr("handcal.session.record.read_journal", reads)
     with Station(settings, resume=begun) as station:
         for number in range(5):
             station.session.record("refused", reason="of the tests", number=number)
