@@ -393,7 +393,7 @@ def test_a_comparison_is_shown_or_cancelled(
     assert 0.5 in shares  # one of two alignments
 
     solver = Solver()
-    monkeypatch.setattr("handcal_gui.control.compare.solve_session", solver)
+    monkeypatch.setattr("handcal.calibration.solve_again.solve_session", solver)
     start.click()
     assert solver.began.wait(PATIENCE_MS / 1000)
     cancel.click()
@@ -409,7 +409,7 @@ def test_it_can_be_compared_and_closed_at_once(
     program.open_session(record.path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     solver = Solver()
-    monkeypatch.setattr("handcal_gui.control.compare.solve_session", solver)
+    monkeypatch.setattr("handcal.calibration.solve_again.solve_session", solver)
     program.window.panels.results.compare_requested.emit("paper")
     program.window.close()
     assert solver.was_cancelled.is_set()
