@@ -102,7 +102,10 @@ def _live(
 
 
 def _work(library: ctypes.CDLL, folder: Path, chance: random.Random, tell: int) -> str:
-    """Live; return what is wrong at the end. An operation that raises FileError is done again."""
+    """Live; return what is wrong at the end.
+
+    After a FileError, the session writes what it has kept, or the operation is done again.
+    """
     try:
         session = Session.create(folder, life.EXAMPLE.rig, {}, "session", "wearer")
     except FileError:
@@ -118,8 +121,11 @@ def _work(library: ctypes.CDLL, folder: Path, chance: random.Random, tell: int) 
             library.fault_pause(1)  # the fault has been; what looks at the folder meets none
             if problem := life.complaint(session.path, possible):
                 return f"after an error in {operation[0]}: {problem}"
+            done = life.after(model, operation)
+            if operation[0] in life.KEPT and life.found(session.contents) != done:
+                return f"after an error in {operation[0]}: it is not kept in memory"
             session = _again(session, operation)
-            if problem := life.complaint(session.path, {life.after(model, operation)}):
+            if problem := life.complaint(session.path, {done}):
                 return f"after {operation[0]} was done again: {problem}"
         model = life.after(model, operation)
     os.write(tell, b"STEP\n")
@@ -129,13 +135,13 @@ def _work(library: ctypes.CDLL, folder: Path, chance: random.Random, tell: int) 
 
 
 def _again(session: Session, operation: life.Operation) -> Session:
-    """Do an operation again that failed, unless it took effect."""
+    """Have an operation that failed take effect."""
     if operation[0] == "reopen":
         return Session(session.path)
-    try:
-        return life.do(session, operation)
-    except ValueError:  # deleted or restored already
+    if operation[0] in life.KEPT:
+        session.write_waiting()
         return session
+    return life.do(session, operation)
 
 
 def _judge(folder: Path, chance: random.Random, steps: int, has_died: bool) -> str:

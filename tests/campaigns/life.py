@@ -22,6 +22,8 @@ Operation: TypeAlias = tuple[str, Any]
 
 EXAMPLE = Session.open(resource_path("example_session"))
 MOST_ALIGNMENTS = 12
+KEPT = "add", "delete", "restore", "solve", "tune", "plan"
+"""Operations that a session keeps in memory if it cannot write them."""
 _OPERATIONS = "add", "add", "trial", "delete", "restore", "solve", "tune", "notes", "plan", "reopen"
 
 
