@@ -232,11 +232,13 @@ class Plan:
         if calibration.verifying is not None:
             self.skipped.add(calibration.verifying.eye)
             calibration.skip_verification()
-        elif (eye := next(iter(self._unverified()), None) or self._next_verification()) is not None:
-            self.skipped.add(eye)
-            calibration.record_skipped(eye)
-        else:
+            return
+        eye = next(iter(self._unverified()), None) or self._next_verification()
+        # While a verification that has just ended is applied, the other eye's is not meant.
+        if eye is None or calibration.state not in (State.SHOW_HAND, State.APPLIED):
             raise ProcedureError("there is no verification to skip")
+        self.skipped.add(eye)
+        calibration.record_skipped(eye)
 
     def _next_of_paper(self, unverified: tuple[Eye, ...], is_steady: bool) -> NextStep:
         if why := self._fault("contradicted"):

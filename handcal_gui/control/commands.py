@@ -7,7 +7,7 @@ from contextlib import suppress
 from functools import partial
 
 from handcal.calibration.procedure import Calibration
-from handcal.calibration.states import State
+from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError
 from handcal.station.station import Station
 from handcal_gui.docks import Panels
@@ -116,7 +116,7 @@ def _take_step(station: Station) -> None:
 
 def _skip(station: Station) -> None:
     """Skip the verification, which the wearer may have ended already."""
-    with suppress(FileError):
+    with suppress(FileError, ProcedureError):
         station.plan.skip()
 
 

@@ -1525,10 +1525,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Not accepted yet. Raise the hand and hold it still, then add an alignment.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Not accepted yet: verify {} again. Another alignment would change little.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1538,6 +1534,10 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Solve for the positions of the eyes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Not accepted yet. Add an alignment, or finish as it is.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -315,6 +315,22 @@ def test_an_eye_may_be_skipped_before_its_verification_begins(
         planned.plan.skip()
     planned.until(StepName.DONE)
     assert skipped_eyes(Session.open(session.path).events) == set(EYES)
+    with pytest.raises(ProcedureError, match="no verification to skip"):
+        planned.plan.skip()
+
+
+def test_skipping_a_verification_that_has_just_ended_skips_no_other(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make(verifies_first=True)
+    planned.until(StepName.VERIFY)
+    planned.fits("left")
+    while planned.stage.state() is State.VERIFY:
+        planned.stage.see()
+    assert planned.stage.state() is State.APPLYING
+    with pytest.raises(ProcedureError, match="no verification to skip"):
+        planned.plan.skip()
+    assert planned.plan.skipped == set()
 
 
 def test_a_contradicted_result_ends_the_plan(make: Callable[..., Planned]) -> None:

@@ -345,8 +345,8 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
     if falsified := falsified_view(preconditions):
         return falsified
     can_do, usable = is_steady(snapshot), snapshot.plan.usable_eyes
-    text = tr("Not accepted yet. Raise the hand and hold it still, then add an alignment.")
-    main = ButtonSpec(Action.ANOTHER, tr("Add alignment"), can_do)
+    text = tr("Not accepted yet. Add an alignment, or finish as it is.")
+    main = ButtonSpec(Action.ANOTHER, tr("Add alignment"))
     others = [one for one in _more(snapshot) if one.action is not Action.ANOTHER]
     again: list[Eye] = []
     if (results := snapshot.procedure.results) is not None:
