@@ -1,6 +1,6 @@
 """All commands with their options, and all formats: what users' scripts rely on stays there.
 
-After a deliberate change, write the lists anew: ``python -m tests.cli.test_surface``.
+After a deliberate change, write the list again: ``python -m tests.cli.test_surface``.
 """
 
 from __future__ import annotations
