@@ -137,11 +137,15 @@ class Program(QObject):
         recommended = replace(station, plan=replace(station.plan, name="recommended"))
         settings = self._followed(recommended)
         try:
-            wearer = Session.open(path).wearer
+            record = Session.open(path)
         except FileError as error:
             self.window.banner.show_message(str(error))
             return
-        self._run(lambda: Station(settings, wearer, pairings=self._current.pairings, former=path))
+        plan = replace(settings.plan, usable_eyes=record.facts.usable_eyes)
+        settings = replace(settings, plan=plan)
+        self._run(
+            lambda: Station(settings, record.wearer, pairings=self._current.pairings, former=path)
+        )
 
     def open_session(self, path: Path) -> None:
         """Open a stored session for review."""

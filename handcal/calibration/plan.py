@@ -10,13 +10,14 @@ nothing more can be gained; a person may ask for more (`Plan.request`).
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import Observation, ProcedureError, State
-from handcal.core.errors import HandError
-from handcal.core.types import EYES, Eye, EyePlan, PlanName, VerdictName
+from handcal.core.errors import FileError, HandError
+from handcal.core.types import EYES, Eye, EyePlan, PlanName, Verdict, VerdictName
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.verdict import Advice, planned_eyes
 
@@ -183,7 +184,8 @@ class Plan:
                     place_m = None if step.planned is None else step.planned.displacement_W_m
                     calibration.make_cursor(step.eyes, place_m)
                 case StepName.SOLVE:
-                    self._requested = ()
+                    if calibration.state is State.ALIGNED:
+                        self._requested = ()
                     calibration.solve()
                 case StepName.APPLY:
                     calibration.apply(keeps_hand=self.settings.name == "recommended")
@@ -207,15 +209,16 @@ class Plan:
     def choose(self, eyes: EyePlan) -> None:
         """Change the eyes of the paper's plan, and their order.
 
+        What the session cannot write is kept in memory; `Session.write_waiting` says so.
+
         Raises
         ------
         ProcedureError
             While a cursor is shown or projections are being applied.
-        FileError
-            If the session cannot be written.
         """
         chosen = with_eyes(self.settings, eyes)
-        self._calibration.choose_eyes(eyes, chosen.usable_eyes)
+        with suppress(FileError):
+            self._calibration.choose_eyes(eyes, chosen.usable_eyes)
         self.settings, self._requested = chosen, ()
 
     def skip(self) -> None:
@@ -273,11 +276,15 @@ class Plan:
 
     def _is_early(self, step: NextStep, observation: Observation) -> bool:
         """Return True while the wearer is given time to see what comes."""
-        now_ns = 0 if observation.hand is None else observation.hand.t_host_ns
+        pause_ns = _PAUSE_NS[self.settings.name]
+        if pause_ns == 0 or step.name not in (StepName.CURSOR, StepName.VERIFY):
+            self._waiting = None, 0
+            return False
+        if observation.hand is None:  # its pose is still on its way
+            return True
         if self._waiting[0] != (step.name, step.eyes):
-            self._waiting = (step.name, step.eyes), now_ns
-        is_begun = step.name in (StepName.CURSOR, StepName.VERIFY)
-        return is_begun and now_ns - self._waiting[1] < _PAUSE_NS[self.settings.name]
+            self._waiting = (step.name, step.eyes), observation.hand.t_host_ns
+        return observation.hand.t_host_ns - self._waiting[1] < pause_ns
 
     def _turn(self) -> tuple[Eye, ...]:
         """Return whose turn it is in the next alignment."""
@@ -299,7 +306,8 @@ class Plan:
         results = self._calibration.results
         if results is None:
             return None
-        repeated = [eye for eye in results.advice if results.verdicts[eye].name == "repeat"]
+        usable = [eye for eye in results.advice if eye in self.settings.usable_eyes]
+        repeated = [eye for eye in usable if results.verdicts[eye].name == "repeat"]
         worst = max(repeated, key=lambda eye: results.benefits[eye].after_arcmin, default=None)
         return None if worst is None else results.advice[worst]
 
@@ -345,9 +353,13 @@ class Plan:
 
     def _fault(self, *names: VerdictName) -> str:
         """Return the reason of the first verdict with one of these names; empty if none has."""
+        return next((one.reason for one in self._verdicts() if one.name in names), "")
+
+    def _verdicts(self) -> list[Verdict]:
+        """Return the verdicts on the usable eyes; an eye may have been aligned before a choice."""
         results = self._calibration.results
-        verdicts = () if results is None else results.verdicts.values()
-        return next((one.reason for one in verdicts if one.name in names), "")
+        found = {} if results is None else results.verdicts
+        return [one for eye, one in found.items() if eye in self.settings.usable_eyes]
 
     def _end(self, unverified: tuple[Eye, ...]) -> str:
         """Return why the recommended plan ends now; else empty."""
@@ -374,9 +386,8 @@ class Plan:
 
     def _takes(self) -> str:
         """Return what it would take to be accepted."""
-        results = self._calibration.results
-        reasons = [] if results is None else [one.reason for one in results.verdicts.values()]
-        return "; ".join(dict.fromkeys(reasons)) or "nothing more is planned"
+        reasons = dict.fromkeys(one.reason for one in self._verdicts())
+        return "; ".join(reasons) or "nothing more is planned"
 
     def _with_hand(self, name: StepName, eyes: tuple[Eye, ...], is_steady: bool) -> NextStep:
         """Return a step that needs a still hand and acknowledged projections."""

@@ -13,6 +13,8 @@
                           v  |                                       solve
                          VERIFY --the drawing fits-----------------------'
 
+A cursor that is discarded after a result was applied returns to APPLIED.
+
 Between these steps alignments can be deleted and restored, the wearer's eye distance can be set,
 and all can be solved again; φ can be set by hand while no cursor is shown. The procedure only
 combines the other parts: `Sight` finds the hand, `Aligning` and `Verifying` judge what the wearer
@@ -27,7 +29,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -437,7 +439,7 @@ class Calibration:
             self._session.save_facts(eye_distance=eye_distance)
 
     def choose_eyes(self, plan: EyePlan, usable_eyes: tuple[Eye, ...]) -> None:
-        """Record which eyes are aligned in which order; results for other eyes are discarded.
+        """Record which eyes are aligned in which order; the results of other eyes are discarded.
 
         Raises as `set_eye_distance`.
         """
@@ -774,7 +776,12 @@ class Calibration:
         self.evidence.drawn_as_sent()
         self.state = State.ALIGNED
         aligning.refusal = aligning.refused_for = ""
-        self._session.save_alignment(accepted.alignment, accepted.facts)
+        try:
+            self._session.save_alignment(accepted.alignment, accepted.facts)
+        except ValueError as error:
+            self.state = State.ALIGN
+            prompt = f"The alignment cannot be saved: {error}."
+            self._refuse(Refused(prompt, "not saved"), aligning)
 
     def _refuse(self, refused: Refused, aligning: Aligning) -> None:
         aligning.refusal, aligning.refused_for = refused.prompt, refused.was
@@ -816,13 +823,14 @@ class Calibration:
 
         It is new with another device, name, runtime, app or protocol, or once it tells its views or
         an eye distance. What eye tracking changes many times a minute, where the views are and how
-        far apart the eyes, is not recorded again.
+        far apart the eyes, is not recorded again. A finished session stays as it is: the wearer
+        takes the headset off now.
         """
-        device, known = self._link.device, self._session.contents.facts.headset
-        if device is None or device is self._headset:
+        device, record = self._link.device, self._session.contents
+        if device is None or device is self._headset or record.is_finished:
             return
         self._headset = device
-        if known is None or _named(device) != _named(known):
+        if record.facts.headset is None or _is_new(device, record.facts.headset):
             with suppress(FileError):
                 self._session.save_facts(headset=device)
 
@@ -847,7 +855,8 @@ class Calibration:
     def _show_hand_again(self) -> None:
         self._clear_cursor()
         self._drawing.send(self._drawing.shift_m)  # `apply` may have failed for one eye only
-        self.state = State.SHOW_HAND
+        is_applied = self.results is not None and self._session.contents.is_applied
+        self.state = State.APPLIED if is_applied else State.SHOW_HAND
 
     def _begin_verifying(self, verifying: Verifying) -> None:
         self._ask_to_verify(verifying)
@@ -948,10 +957,13 @@ def _moved(hand: PlacedHand, displacement_W_m: ArrayLike) -> PlacedHand:
     )
 
 
-def _named(device: HeadsetIdentity) -> Any:
-    """Return what makes two introductions those of one headset, without what the eyes move."""
-    known = sorted(device.views), device.eye_distance_m is not None
-    return facts_json(replace(device, views={}, eye_distance_m=None)), known
+def _is_new(device: HeadsetIdentity, known: HeadsetIdentity) -> bool:
+    """Return whether a headset is another one, or tells something that it has not told before."""
+    named, known_name = (
+        facts_json(replace(one, views={}, eye_distance_m=None)) for one in (device, known)
+    )
+    tells_distance = device.eye_distance_m is not None and known.eye_distance_m is None
+    return named != known_name or not device.views.keys() <= known.views.keys() or tells_distance
 
 
 def _earlier_evidence(record: SessionRecord) -> list[Contradiction]:

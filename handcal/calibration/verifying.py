@@ -232,7 +232,7 @@ def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Veri
     for event in events:
         if event.name == VERIFYING:
             last = event
-        elif event.name in _ENDS or event.name.startswith("alignment_"):
+        elif event.name in _ENDS or event.name.startswith("alignment_") or _is_result(event):
             last = None
     if last is None:
         return None
@@ -248,6 +248,10 @@ def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Veri
     except (KeyError, TypeError, ValueError):
         return None  # the eye is verified from the start
     return verifying
+
+
+def _is_result(event: Event) -> bool:
+    return event.name == SessionEvent.FACTS_SAVED and "verified" in event.data
 
 
 def skipped_eyes(events: Iterable[Event]) -> set[Eye]:

@@ -62,8 +62,9 @@ class Session(Closable):
     It holds the session's state, which is read from disk once and then follows each event. An event
     of the procedure is in `contents` at once: an alignment, facts, results, φ. If it cannot be
     written, the method raises FileError, and the event is written before the next one, or by
-    `write_waiting`. All other methods have no effect if they raise. When a method returns, its data
-    are on disk. `create` starts a new folder; `open` only reads one.
+    `write_waiting`. All other methods have no effect if they raise, except that `save_notes` may
+    have announced notes that it could not write. When a method returns, its data are on disk.
+    `create` starts a new folder; `open` only reads one.
 
     Parameters
     ----------
@@ -175,11 +176,11 @@ class Session(Closable):
         """The session as it is now; the same object until it changes."""
         if self._contents is None:
             journal = self._require_open()
-            is_unwritten = self._next_number - journal.next_number
+            unwritten = self._next_number - journal.next_number
             self._contents = replace(
                 self._loaded,
                 events=tuple(self._events),
-                unwritten=tuple(self._events[len(self._events) - is_unwritten :]),
+                unwritten=tuple(self._events[len(self._events) - unwritten :]),
                 alignments=self._alignments,
                 notes=self._notes,
                 journal_bytes=journal.complete_bytes,
@@ -215,13 +216,15 @@ class Session(Closable):
         Raises
         ------
         FileError
-            If it cannot be written, is too large, or the session is full.
+            If it cannot be written.
+        ValueError
+            If it is too large, or the session is full.
         """
         if full := self.full("alignment"):
-            raise FileError(full)
+            raise ValueError(full)
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
-            raise FileError(f"an alignment of {len(data):,} bytes is too large to be saved")
+            raise ValueError(f"an alignment of {len(data):,} bytes is too large to be saved")
         number = self._state.alignments.next_number()
         known = {} if facts is None else {"facts": facts_json(facts)}
         saved = {"number": number, "sha256": sha256(data), **known}
@@ -269,9 +272,13 @@ class Session(Closable):
     def save_results(self, results: Mapping[str, Any]) -> None:
         """Replace the results of all alignments; FileError if they cannot be written."""
         data = dict(results)
-        self._keep(
-            SessionEvent.SOLVED, data, after=lambda: write_json(self.path / "results.json", data)
-        )
+        file = self.path / "results.json"
+
+        def replace_file() -> None:
+            write_json(file, data)
+            self._is_sound_again(file)
+
+        self._keep(SessionEvent.SOLVED, data, after=replace_file)
 
     def save_applied(self, shifts_m: Mapping[Eye, ArrayLike]) -> None:
         """Record that the headset renders with the solved φ.
@@ -305,7 +312,8 @@ class Session(Closable):
         before = self._notes_sha256
         # Announced first: a crash leaves notes with the one or the other checksum.
         self._write(SessionEvent.NOTES_SAVED, {"sha256": sha256(data), "before_sha256": before})
-        write_atomic(self.path / "notes.txt", data)
+        write_atomic(file := self.path / "notes.txt", data)
+        self._is_sound_again(file)
         self._notes, self._notes_sha256, self._contents = data.decode(), sha256(data), None
 
     def correct_wearer(self, name: str) -> None:
@@ -389,6 +397,11 @@ class Session(Closable):
         if after is not None:
             self._waiting.append(after)
         self.write_waiting()
+
+    def _is_sound_again(self, file: Path) -> None:
+        """Forget the damage of a file that was replaced."""
+        damaged = tuple(one for one in self._loaded.damaged if one.file != file.name)
+        self._loaded = replace(self._loaded, damaged=damaged)
 
     def _apply(self, event: Event) -> None:
         self._state.apply(event)

@@ -1,4 +1,4 @@
-"""A station led through its plan, for scripts: each step as soon as it can be done."""
+"""A station led through its plan, for scripts: each step runs automatically."""
 
 from __future__ import annotations
 

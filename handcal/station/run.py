@@ -44,7 +44,7 @@ def run_calibration(
     pairings: Pairings | None = None,
     watchers: Iterable[Callable[[Snapshot], object]] = (),
 ) -> dict[str, Any]:
-    """Calibrate one wearer; each step runs automatically as soon as it can.
+    """Calibrate one wearer; each step runs automatically, at the pace of its plan.
 
     The wearer holds the hand still in view of the camera, moves it under the cursor, and confirms.
 

@@ -47,6 +47,7 @@ _PANELS_OF_STEPS = {
 _SLOW_EVERY = 2
 """On a slow computer, panels show only every such snapshot of those that the guide shows."""
 _NO_BRIDGES = BridgeSettings()
+_CHOOSING = tr("choose the eyes")
 _SAVING = tr("save the notes")
 _SAVING_S = 1.0
 """Longest wait for the notes to be saved before a session is left."""
@@ -185,6 +186,8 @@ class CalibrationController(QObject):
                 self._wizard_panel.hold(True)  # or the step would run again
             if action in (Action.NEXT, Action.BACK, Action.FINISH):
                 self._wizard_panel.wizard.move(action)
+                # Before the plan can take another step.
+                self._hold_plan(self._wizard_panel.wizard.holds_plan)
                 self._wizard_panel.show_snapshot(self._snapshot)
             if (command := COMMANDS.get(action)) is not None:
                 self._doing = self._submit(action.value, command)
@@ -209,7 +212,7 @@ class CalibrationController(QObject):
         self._wizard_panel.nudged.connect(self._nudge)
         self._wizard_panel.went_back.connect(self._go_back)
         self._wizard_panel.eyes_chosen.connect(
-            lambda eyes: self._submit(tr("choose the eyes"), lambda s: s.plan.choose(eyes))
+            lambda eyes: self._submit(_CHOOSING, lambda station: station.plan.choose(eyes))
         )
         self._wizard_panel.step_changed.connect(self._on_step)
         for name, dock in self._window.docks.items():
@@ -336,6 +339,8 @@ class CalibrationController(QObject):
             if text == self._notes_problem:  # said before, and perhaps closed
                 return
             self._notes_problem = text
+        if name == _CHOOSING:
+            self._wizard_panel.show_eyes_again()
         self._failed_command = name
         self._failure = text if name in set(Action) else ""
         self._window.banner.show_message(text)

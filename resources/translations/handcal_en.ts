@@ -1521,10 +1521,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>The wearer has verified and corrected the result. Finish, or verify an eye again.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>Not accepted yet: verify {} again. Another alignment would change little.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -1534,6 +1530,14 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>Solve for the positions of the eyes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>The wearer has verified and corrected the result. Finish, or measure more.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Verified; the result is not used for every eye. Finish, or measure more.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -1566,10 +1570,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
     </message>
     <message>
         <source>{}: drawn, saved and exported with {}; the verdict applies to the solved φ.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Verified; the result is not used for every eye. Finish, or verify again.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

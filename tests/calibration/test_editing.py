@@ -30,7 +30,7 @@ def test_redo_gives_up_the_cursor_or_the_last_alignment(stage: Stage, session: S
 
     stage.make_cursor()
     calibration.redo()
-    assert stage.state() is State.SHOW_HAND
+    assert stage.state() is State.APPLIED
     assert calibration.results is applied
     eventually(lambda: stage.shown().cursor_W_m is None)
     with pytest.raises(ProcedureError, match="nothing to redo"):

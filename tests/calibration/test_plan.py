@@ -12,6 +12,7 @@ from handcal.calibration.plan import NextStep, Plan, PlanSettings, StepName
 from handcal.calibration.states import ProcedureError, State
 from handcal.calibration.verifying import skipped_eyes
 from handcal.core.display import view_of_eye
+from handcal.core.errors import FileError
 from handcal.core.geometry import transform
 from handcal.core.types import EYES, Eye
 from handcal.link.client import HeadsetClient
@@ -297,7 +298,7 @@ def test_the_eyes_of_the_paper_s_plan_are_chosen_between_alignments(
     assert planned.stage.calibration.results is not None, "it is of the same eyes"
     planned.plan.choose("right")
     assert session.contents.facts.usable_eyes == ("right",)
-    assert planned.advance().name is StepName.SOLVE, "the verdict is of one eye only now"
+    assert planned.advance().name is StepName.SOLVE, "the advice is for one eye only now"
 
 
 def test_an_eye_may_be_skipped_before_its_verification_begins(
@@ -344,3 +345,52 @@ def test_a_contradicted_result_ends_the_plan(make: Callable[..., Planned]) -> No
     step = planned.until(StepName.DONE)
     assert "does not draw what was sent" in step.text
     assert len(calibration.alignments) == 1
+
+
+def test_eyes_chosen_while_nothing_can_be_written_are_followed(
+    make: Callable[..., Planned], session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned = make(PAPER)
+
+    def refuse(*_: object) -> None:
+        raise FileError("the disk is full")
+
+    with monkeypatch.context() as full:
+        full.setattr("handcal.session.journal.JournalWriter.append", refuse)
+        planned.plan.choose("left")
+    assert planned.plan.settings.usable_eyes == ("left",)
+    assert session.contents.facts.usable_eyes == ("left",)
+    session.write_waiting()
+    assert Session.open(session.path).facts.usable_eyes == ("left",)
+
+
+def test_an_eye_that_is_no_longer_chosen_asks_for_nothing(make: Callable[..., Planned]) -> None:
+    planned = make(PAPER)
+    planned.until(StepName.CURSOR)
+    planned.confirm()
+    planned.until(StepName.DONE)
+    planned.plan.choose("right")
+    planned.until(StepName.DONE)
+    calibration = planned.stage.calibration
+    assert calibration.results is not None
+    for name in ("implausible", "contradicted", "repeat"):
+        left = replace(calibration.results.verdicts["left"], name=name, reason="of the tests")
+        verdicts = {**calibration.results.verdicts, "left": left}
+        calibration.results = replace(calibration.results, verdicts=verdicts)
+        step = planned.plan.next_step(is_steady=True)
+        assert step.name is StepName.DONE
+        assert "of the tests" not in step.text
+        planned.plan.request()
+        assert planned.plan.next_step(is_steady=True).eyes == ("right",)
+        planned.plan.withdraw()
+
+
+def test_the_pause_begins_once_the_hand_is_placed(make: Callable[..., Planned]) -> None:
+    planned = make(PAPER)
+    planned.stage.hold(frames=10)
+    unplaced = replace(planned.stage.see(), hand=None)
+    for _ in range(3):
+        assert planned.plan.follow(unplaced).name is StepName.CURSOR
+        assert planned.stage.state() is State.SHOW_HAND
+    planned.plan.follow(planned.stage.see())
+    assert planned.stage.state() is State.SHOW_HAND

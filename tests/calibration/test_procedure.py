@@ -388,3 +388,45 @@ def test_a_frozen_picture_makes_no_cursor_and_no_alignment(stage: Stage) -> None
         stage.calibration.make_cursor()
     stage.make_cursor()  # the camera is alive again
     assert stage.calibration.evidence.contradictions == ()
+
+
+def test_a_headset_that_is_taken_off_leaves_a_finished_session_alone(
+    server: HeadsetServer, client: HeadsetClient, session: Session
+) -> None:
+    stage = Stage(server, client, session)
+
+    def introduce(identity: HeadsetIdentity) -> None:
+        client.set_identity(identity)
+        eventually(lambda: facts_json(server.device) == facts_json(identity))
+        for _ in range(2):
+            stage.see(None)
+
+    worn = replace(IDENTITY, eye_distance_m=0.063)
+    introduce(worn)
+    introduce(IDENTITY)
+    assert len([name for name, _ in events(session) if name == "facts_saved"]) == 1
+    session.finish()
+    introduce(replace(IDENTITY, app="app 2"))
+    assert Session.open(session.path).is_finished
+    session.record("cursor_made")  # the session goes on
+    stage.see(None)
+    found = Session.open(session.path).facts.headset
+    assert found is not None
+    assert found.app == "app 2"
+
+
+def test_an_alignment_that_the_session_cannot_take_is_refused(
+    stage: Stage, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as small:
+        small.setattr("handcal.session.session.MAX_ALIGNMENT_BYTES", 10)
+        stage.make_cursor()
+        stage.hold()
+        stage.press()
+        eventually(lambda: stage.see() and stage.calibration.refusal)
+    assert "too large" in stage.calibration.refusal
+    assert stage.state() is State.ALIGN
+    assert stage.calibration.alignments == {}
+    stage.press()
+    eventually(lambda: stage.see() and stage.state() is State.ALIGNED)
+    assert list(Session.open(session.path).alignments) == [1]

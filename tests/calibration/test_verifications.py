@@ -250,6 +250,29 @@ def test_a_session_is_resumed_during_a_verification(
     assert last.calibration.verifications == again.calibration.verifications
 
 
+def test_a_verification_stored_by_a_killed_program_is_not_resumed(
+    stage: Stage,
+    server: HeadsetServer,
+    client: HeadsetClient,
+    session: Session,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begin(stage)
+    stage.hold()
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as solving:
+        solving.setattr("handcal.calibration.procedure.solve_contents", killed)
+        with pytest.raises(KeyboardInterrupt):
+            stage.calibration.verified()
+    again = Stage(server, client, session)
+    assert again.state() is State.ALIGNED
+    assert again.calibration.verifying is None
+    assert set(again.calibration.verifications) == {"left"}
+
+
 @pytest.mark.parametrize(
     "damage", [{"eye": "left"}, {"nudge_arcmin": ["a", 1.0]}, {"hand_E_m": [0.0, 0.0, -1.0]}]
 )

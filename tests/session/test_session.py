@@ -91,7 +91,7 @@ def test_too_large_an_alignment_is_not_written(session: Session, alignment: Alig
         0,
         1,
     )
-    with pytest.raises(FileError, match="too large"):
+    with pytest.raises(ValueError, match="too large"):
         session.save_alignment(huge)
     assert Session.open(session.path).alignments == {}
 
@@ -207,7 +207,7 @@ def test_a_session_of_many_alignments_is_full(session: Session, alignment: Align
     session.delete("alignment", session.save_alignment(alignment))
     for _ in range(MAX_ALIGNMENTS):
         session.save_alignment(alignment)
-    with pytest.raises(FileError, match="full: no room for more than 100 alignments"):
+    with pytest.raises(ValueError, match="full: no room for more than 100 alignments"):
         session.save_alignment(alignment)
     with pytest.raises(ValueError, match="no room for more than 100 alignments"):
         session.restore("alignment", 1)

@@ -63,7 +63,7 @@ def doubted_eyes(snapshot: Snapshot) -> list[Eye]:
 
 
 def eyes_accepted(snapshot: Snapshot) -> tuple[Precondition, ...]:
-    """Return the verdict on each solved eye as a precondition."""
+    """Return the verdict on each solved eye that the plan is for, as a precondition."""
     results = snapshot.procedure.results
     if results is None:
         return ()
@@ -74,4 +74,5 @@ def eyes_accepted(snapshot: Snapshot) -> tuple[Precondition, ...]:
             verdict.name,
         )
         for eye, verdict in results.verdicts.items()
+        if eye in snapshot.plan.usable_eyes
     )

@@ -291,6 +291,8 @@ def _wait_view(step: Step, snapshot: Snapshot) -> WizardView:
     is_refused = procedure.is_applied and procedure.state is not State.APPLYING
     if planned is not None and planned.name is StepName.WAIT and is_refused:
         text = f"{sentence(planned.text)}."
+        main = ButtonSpec(Action.TAKE_STEP, tr("Waiting…"), False)
+        return WizardView(step, text, eyes_accepted(snapshot), main, _ways_out(planned, snapshot))
     main = ButtonSpec(Action.TAKE_STEP, _SENDING, False)
     return WizardView(step, text, eyes_accepted(snapshot), main, (_BACK,))
 
@@ -317,12 +319,10 @@ def _done_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
                 "verify an eye again."
             )
         if record.verified_now >= set(usable):
-            text = tr(
-                "The wearer has verified and corrected the result. Finish, or verify an eye again."
-            )
+            text = tr("The wearer has verified and corrected the result. Finish, or measure more.")
             if any(one.verdict == "keep" for one in preconditions):
                 text = tr(
-                    "Verified; the result is not used for every eye. Finish, or verify again."
+                    "Verified; the result is not used for every eye. Finish, or measure more."
                 )
         main = ButtonSpec(Action.FINISH if can_end(snapshot) else Action.NEXT, tr("Finish"))
     if doubt := doubt_sentence(snapshot):
@@ -332,9 +332,9 @@ def _done_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
 
 def _more(snapshot: Snapshot) -> tuple[ButtonSpec, ...]:
     """Return the buttons that measure more after the end of a plan."""
-    usable, verified = snapshot.plan.usable_eyes, snapshot.record.facts.verified
+    usable = snapshot.plan.usable_eyes
     add = ButtonSpec(Action.ANOTHER, tr("&Add alignment"))
-    unverified = [eye for eye in usable if eye not in verified]
+    unverified = [eye for eye in usable if eye not in snapshot.record.verified_now]
     if _keeps_hand(snapshot) or len(usable) == 1:
         return (add, *(VERIFY_AGAIN[eye] for eye in usable))
     return (add, *(VERIFY_AGAIN[eye] for eye in unverified)) if unverified else (add, *_REPEAT)

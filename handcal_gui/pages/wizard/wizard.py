@@ -350,6 +350,10 @@ class WizardPanel(QWidget):
             self._plan.clearFocus()  # otherwise Qt would pass the focus on
         self._plan.setEnabled(can_choose)
 
+    def show_eyes_again(self) -> None:
+        """Show the eyes of the plan with the next snapshot, after a choice that was refused."""
+        self._eyes = None
+
     def _show_eyes(self, plan: PlanSettings) -> None:
         """Show which eyes are aligned, in a plan that leaves it to a person."""
         eyes = plan.eyes if plan.name == "paper" else None

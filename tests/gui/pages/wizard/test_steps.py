@@ -344,6 +344,17 @@ def test_a_hand_is_waited_for_at_the_step_that_needs_it(snapshot: Maker) -> None
     assert Action.SKIP in actions(view), "a wearer who cannot verify is not waited for"
 
 
+def test_a_step_that_is_refused_does_not_pretend_to_send(snapshot: Maker) -> None:
+    waiting = planned_snapshot(snapshot, StepName.WAIT, plan=PAPER)
+    why = "the session is full; start another session"
+    refused = with_next(waiting, text=why, is_requested=True)
+    procedure = replace(refused.procedure, state=State.APPLIED, is_applied=True)
+    view = begun().view(replace(refused, procedure=procedure))
+    assert view.sentence == "The session is full; start another session."
+    assert view.main.label == "Waiting…"
+    assert actions(view) == [Action.WITHDRAW]
+
+
 def test_a_requested_alignment_can_be_withdrawn_and_a_half_done_plan_ended(
     snapshot: Maker,
 ) -> None:
@@ -366,8 +377,7 @@ def test_the_paper_s_plan_offers_each_eye_alone_at_its_end(snapshot: Maker) -> N
         Action.REPEAT_LEFT,
         Action.REPEAT_RIGHT,
     ]
-    facts = replace(done.record.facts, verified={"left": VERIFIED})
-    skipped = replace(done, record=replace(done.record, facts=facts))
+    skipped = replace(done, record=replace(done.record, verified_now=frozenset({"left"})))
     assert actions(begun().view(skipped)) == [Action.ANOTHER, Action.VERIFY_RIGHT]
 
 
