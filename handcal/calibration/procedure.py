@@ -637,8 +637,8 @@ class Calibration:
     def go_back(self, to: Literal["offline", "former"]) -> None:
         """Have the headset draw with the offline calibration, or with φ before the newest one.
 
-        A cursor, a verification and projections not yet acknowledged are dropped; the alignments
-        stay.
+        A cursor and a verification are dropped, and projections that are not acknowledged yet must
+        be applied again; alignments and results stay.
 
         Raises
         ------
@@ -655,7 +655,10 @@ class Calibration:
         self._drawing.shift_m |= back_m
         self._drawing.send(back_m)
         self._former_m = former_m
-        self.state = State.APPLIED if self.state is State.APPLIED else State.SHOW_HAND
+        if self.state is State.APPLYING:
+            self.state = State.SOLVED
+        elif self.state is State.ALIGN:
+            self.state = self._without_cursor()
         with suppress(FileError):  # the φ, recorded next, raises it again
             self._session.record(WENT_BACK, to=to)
         self.record_shift()
@@ -855,8 +858,12 @@ class Calibration:
     def _show_hand_again(self) -> None:
         self._clear_cursor()
         self._drawing.send(self._drawing.shift_m)  # `apply` may have failed for one eye only
+        self.state = self._without_cursor()
+
+    def _without_cursor(self) -> State:
+        """Return the state of a calibration whose cursor was discarded."""
         is_applied = self.results is not None and self._session.contents.is_applied
-        self.state = State.APPLIED if is_applied else State.SHOW_HAND
+        return State.APPLIED if is_applied else State.SHOW_HAND
 
     def _begin_verifying(self, verifying: Verifying) -> None:
         self._ask_to_verify(verifying)
@@ -930,10 +937,13 @@ class Calibration:
         self._end_verifying(verifying.shift_m)
         with suppress(FileError):  # the results, recorded next, raise it again
             self._session.save_facts(verified={verifying.eye: found})
-        self.solve()
-        usable_eyes = self._session.contents.facts.usable_eyes
-        # The other eye follows at once.
-        self.apply(keeps_hand=any(eye not in self.verifications for eye in usable_eyes))
+        try:
+            self.solve()
+        finally:
+            if self.state is State.SOLVED:  # also if the results could not be written
+                usable_eyes = self._session.contents.facts.usable_eyes
+                # The other eye follows at once.
+                self.apply(keeps_hand=any(eye not in self.verifications for eye in usable_eyes))
 
     def _end_verifying(self, shift_m: Float64) -> None:
         """Draw the verified eye with φ, and return to the state before."""

@@ -50,6 +50,9 @@ class SessionEvent(StrEnum):
     FINISHED = "finished"
 
 
+WENT_BACK = "went_back"
+"""The station's event before φ is recorded to which the headset was set back."""
+
 ASIDE = (
     SessionEvent.NOTES_SAVED,
     SessionEvent.WEARER_CORRECTED,
@@ -58,12 +61,10 @@ ASIDE = (
     SessionEvent.TRIAL_DELETED,
     SessionEvent.TRIAL_RESTORED,
     SessionEvent.FINE_TUNED,
+    WENT_BACK,
     COMPARED,
 )
 """Events after which a finished session stays finished: of its user test, and corrections."""
-
-WENT_BACK = "went_back"
-"""The station's event before φ is recorded to which the headset was set back."""
 
 VERIFYING = "verifying"
 """The station's event at the start of a verification and after each nudge."""

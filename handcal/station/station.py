@@ -204,7 +204,8 @@ class Station(Closable):
                     self._next_step = self._follow_plan(observation)
         except LinkError as error:
             self._not_applied = str(error)
-        if self.calibration.state is not State.SOLVED:
+        # An automatic plan sends them again at once; the reason lasts until it has succeeded.
+        if self.calibration.state not in (State.SOLVED, State.APPLYING):
             self._not_applied = ""
         self.trials.follow_procedure()
 

@@ -204,6 +204,7 @@ class CalibrationController(QObject):
 
     def _go_back(self, to: Literal["offline", "former"]) -> None:
         """Have the headset draw with another φ."""
+        self._hold_plan(self._wizard_panel.wizard.holds_plan)  # or it would send the newest again
         self._submit(tr("go back"), calibrating(lambda calibration: calibration.go_back(to)))
 
     def _connect(self) -> None:

@@ -118,3 +118,24 @@ def test_what_is_drawn_follows_the_verdict(stage: Stage, name: str, is_used: boo
     for eye in EYES:
         expected_m = results.eyes[eye].shift_m if is_used else np.zeros(3)
         np.testing.assert_allclose(stage.calibration.applied_shift_m[eye], expected_m)
+
+
+def test_going_back_loses_no_alignment_and_no_result(stage: Stage, session: Session) -> None:
+    calibration = stage.calibration
+    stage.align()
+    calibration.go_back("offline")
+    assert stage.state() is State.ALIGNED
+    calibration.solve()
+    calibration.go_back("offline")
+    assert stage.state() is State.SOLVED
+    calibration.apply()
+    calibration.go_back("offline")
+    assert stage.state() is State.SOLVED
+    calibration.apply()
+    calibration.wait_applied()
+    stage.make_cursor()
+    calibration.go_back("offline")
+    assert stage.state() is State.APPLIED
+    session.finish()
+    calibration.go_back("former")
+    assert Session.open(session.path).is_finished

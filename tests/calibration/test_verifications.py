@@ -9,6 +9,7 @@ import pytest
 
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.display import projection_matrix
+from handcal.core.errors import FileError
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, EyeDistance, Float64
 from handcal.link.client import HeadsetClient
@@ -248,6 +249,24 @@ def test_a_session_is_resumed_during_a_verification(
     assert last.state() is State.APPLIED
     assert last.calibration.verifying is None
     assert last.calibration.verifications == again.calibration.verifications
+
+
+def test_a_verification_that_cannot_be_written_is_sent_all_the_same(
+    stage: Stage, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin(stage)
+    stage.hold()
+
+    def refuse(*_: object) -> None:
+        raise FileError("the disk is full")
+
+    with monkeypatch.context() as full:
+        full.setattr("handcal.session.journal.JournalWriter.append", refuse)
+        with pytest.raises(FileError):
+            stage.calibration.verified()
+    assert stage.state() is State.APPLYING
+    session.write_waiting()
+    assert set(Session.open(session.path).facts.verified) == {"left"}
 
 
 def test_a_verification_stored_by_a_killed_program_is_not_resumed(

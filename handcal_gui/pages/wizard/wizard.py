@@ -374,4 +374,6 @@ def _count(snapshot: Snapshot, view: WizardView) -> tuple[int, int, str]:
     done = len(record.alignments)
     is_in_turn = plan.name == "recommended" or plan.in_turn
     planned = len(plan.usable_eyes) if is_in_turn else 1
+    if plan.name == "paper":
+        planned *= plan.alignments
     return done, max(planned, done + (procedure.state is State.ALIGN)), tr("aligned")
