@@ -14,7 +14,7 @@ from handcal.calibration.verifying import skipped_eyes
 from handcal.core.display import view_of_eye
 from handcal.core.errors import FileError
 from handcal.core.geometry import transform
-from handcal.core.types import EYES, Eye
+from handcal.core.types import EYES, Eye, EyeDistance
 from handcal.link.client import HeadsetClient
 from handcal.link.nudges import NudgeSum
 from handcal.link.server import HeadsetServer
@@ -394,3 +394,16 @@ def test_the_pause_begins_once_the_hand_is_placed(make: Callable[..., Planned]) 
         assert planned.stage.state() is State.SHOW_HAND
     planned.plan.follow(planned.stage.see())
     assert planned.stage.state() is State.SHOW_HAND
+
+
+def test_a_request_outlives_results_that_are_solved_for_another_reason(
+    make: Callable[..., Planned],
+) -> None:
+    planned = make(PAPER)
+    planned.until(StepName.CURSOR)
+    planned.confirm()
+    planned.until(StepName.DONE)
+    planned.plan.request(("right",))
+    planned.stage.calibration.set_eye_distance(EyeDistance(0.063))
+    planned.until(StepName.SOLVE)
+    assert planned.until(StepName.CURSOR).eyes == ("right",)

@@ -356,3 +356,17 @@ def test_it_is_finished_until_something_happens(session: Session) -> None:
     assert Session.open(session.path).is_finished
     session.record("went_on")
     assert not Session.open(session.path).is_finished
+
+
+def test_a_file_that_was_replaced_is_no_longer_damaged(session: Session) -> None:
+    session.save_results({"a": 1})
+    session.save_notes("before")
+    session.close()
+    for name in ("results.json", "notes.txt"):
+        (session.path / name).write_bytes(b"{")
+    with Session(session.path) as again:
+        assert {one.file for one in again.contents.damaged} == {"results.json", "notes.txt"}
+        again.save_notes("after")
+        assert {one.file for one in again.contents.damaged} == {"results.json"}
+        again.save_results({"a": 2})
+        assert again.contents.damaged == ()
