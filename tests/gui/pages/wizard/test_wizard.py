@@ -358,3 +358,31 @@ def test_while_drawings_are_compared_the_guide_asks_for_the_answer(
     panel.show_snapshot(replace(applied, comparing="first"))
     assert not child(panel, "wizardMain").isEnabled()
     assert any(text.startswith("The wearer compares two drawings.") for text in _texts(panel))
+
+
+def test_the_box_shows_the_eyes_of_the_plan_after_a_refused_choice(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    shown = snapshot(plan=PlanSettings("paper"))
+    panel.show_snapshot(shown)
+    box = panel.findChild(QComboBox, "wizardPlan")
+    assert isinstance(box, QComboBox)
+    before = box.currentText()
+    box.setCurrentIndex(box.count() - 1)
+    assert box.currentText() != before
+    panel.show_eyes_again()
+    panel.show_snapshot(shown)
+    assert box.currentText() == before
+
+
+def test_the_ring_counts_all_alignments_of_the_paper_s_plan(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    ring = panel.findChild(ProgressRing)
+    assert isinstance(ring, ProgressRing)
+    for plan, planned in (
+        (PlanSettings("paper", alignments=3), 3),
+        (PlanSettings("paper", alignments=3, in_turn=True), 6),
+    ):
+        panel.show_snapshot(planned_snapshot(snapshot, StepName.RAISE, plan=plan))
+        assert f"/{planned} aligned" in ring.accessibleDescription()
