@@ -286,15 +286,16 @@ def _raise_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
 def _wait_view(step: Step, snapshot: Snapshot) -> WizardView:
     procedure, planned = snapshot.procedure, snapshot.next_step
     text = tr("Waiting for the headset to acknowledge its projections.")
+    doing = _SENDING
+    ways_out: tuple[ButtonSpec, ...] = (_BACK,)
     if _keeps_hand(snapshot):
         text = tr("The hand stays up while the headset receives its projections.")
     is_refused = procedure.is_applied and procedure.state is not State.APPLYING
     if planned is not None and planned.name is StepName.WAIT and is_refused:
-        text = f"{sentence(planned.text)}."
-        main = ButtonSpec(Action.TAKE_STEP, tr("Waiting…"), False)
-        return WizardView(step, text, eyes_accepted(snapshot), main, _ways_out(planned, snapshot))
-    main = ButtonSpec(Action.TAKE_STEP, _SENDING, False)
-    return WizardView(step, text, eyes_accepted(snapshot), main, (_BACK,))
+        text, doing = f"{sentence(planned.text)}.", tr("Waiting…")
+        ways_out = _ways_out(planned, snapshot)
+    main = ButtonSpec(Action.TAKE_STEP, doing, False)
+    return WizardView(step, text, eyes_accepted(snapshot), main, ways_out)
 
 
 def _done_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
