@@ -50,7 +50,11 @@ def pose_of_headset() -> Float64:
 
 def what_to_draw(state: HeadsetState) -> str:
     """Return in words what an app draws, for each eye with its P; the target for one eye only."""
-    cursor = "no cursor" if state.cursor_W_m is None else f"cursor {state.cursor_id}"
+    cursor = (
+        "no cursor"
+        if state.cursor_W_m is None
+        else f"cursor {state.cursor_id} for {' and '.join(state.cursor_eyes)}"
+    )
     hand = (
         "no hand" if state.live_W_m is None else f"{'red' if state.is_over_limit else 'blue'} hand"
     )

@@ -801,7 +801,7 @@ class Calibration:
         outline_m = hand.cloud.contour_m.astype(np.float64)
         marks_m = outline_marks(outline_m, hand.cloud.contour_is_cut)
         drawn_W_m = transform(hand.T_W_D, np.vstack([outline_m, marks_m]))
-        self._sent_cursor = self._link.send_cursor(drawn_W_m, self._cursor_id)
+        self._sent_cursor = self._link.send_cursor(drawn_W_m, self._cursor_id, self.eyes)
 
     def _clear_cursor(self, keeps_hand: bool = False) -> None:
         self._aligning = None

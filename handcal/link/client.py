@@ -38,6 +38,8 @@ class HeadsetState:
 
     cursor_W_m: Float64 | None = None
     cursor_id: int = 0
+    cursor_eyes: tuple[Eye, ...] = EYES
+    """The eyes that draw the cursor."""
     live_W_m: Float64 | None = None
     """(N, 3); the frozen and the live hand, frame W; None if not shown."""
     live_eyes: tuple[Eye, ...] = EYES
@@ -297,6 +299,7 @@ class HeadsetClient(Endpoint):
                     self._state,
                     cursor_W_m=points if len(points) else None,
                     cursor_id=cursor.cursor_id,
+                    cursor_eyes=read_eyes(cursor.eyes) or EYES,
                     cursor_message=cursor,
                 )
             case "live_hand":

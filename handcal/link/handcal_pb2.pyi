@@ -222,12 +222,14 @@ class Points(_message.Message):
     def __init__(self, origin_m: _Optional[_Iterable[float]] = ..., offsets: _Optional[bytes] = ...) -> None: ...
 
 class Cursor(_message.Message):
-    __slots__ = ("cursor_id", "points")
+    __slots__ = ("cursor_id", "points", "eyes")
     CURSOR_ID_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
+    EYES_FIELD_NUMBER: _ClassVar[int]
     cursor_id: int
     points: Points
-    def __init__(self, cursor_id: _Optional[int] = ..., points: _Optional[_Union[Points, _Mapping]] = ...) -> None: ...
+    eyes: _containers.RepeatedScalarFieldContainer[Eye]
+    def __init__(self, cursor_id: _Optional[int] = ..., points: _Optional[_Union[Points, _Mapping]] = ..., eyes: _Optional[_Iterable[_Union[Eye, str]]] = ...) -> None: ...
 
 class LiveHand(_message.Message):
     __slots__ = ("frame", "chunk", "chunk_count", "red", "points", "outline", "eyes")

@@ -128,8 +128,8 @@ def read_device(message: pb.Device, device_id: str) -> tuple[HeadsetIdentity, Ow
     return identity, _owner(message.shown_wearer, message.shown_rig)
 
 
-def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
-    """Make the cursor of (N, 3) points of frame W; no points remove it.
+def cursor(points_W_m: ArrayLike, cursor_id: int, eyes: Sequence[Eye] = EYES) -> pb.Envelope:
+    """Make the cursor of (N, 3) points of frame W, for some eyes; no points remove it.
 
     Raises
     ------
@@ -138,7 +138,8 @@ def cursor(points_W_m: ArrayLike, cursor_id: int) -> pb.Envelope:
     """
     origin_m, offsets = _quantise(points_W_m)
     points = pb.Points(origin_m=origin_m, offsets=offsets.tobytes())
-    return pb.Envelope(cursor=pb.Cursor(cursor_id=cursor_id, points=points))
+    codes = [EYE_CODES[eye] for eye in eyes]
+    return pb.Envelope(cursor=pb.Cursor(cursor_id=cursor_id, points=points, eyes=codes))
 
 
 def live_hand(

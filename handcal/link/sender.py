@@ -32,8 +32,12 @@ class Sender(Endpoint):
         self._is_offline = False
         self._live_frame = 0
 
-    def send_cursor(self, points_W_m: ArrayLike, cursor_id: int) -> Outgoing:
+    def send_cursor(
+        self, points_W_m: ArrayLike, cursor_id: int, eyes: Sequence[Eye] = EYES
+    ) -> Outgoing:
         """Send the frozen hand, (N, 3) of frame W, reliably; no points remove it.
+
+        `eyes` draw it; a headset of an older version draws it for both.
 
         Raises
         ------
@@ -42,7 +46,7 @@ class Sender(Endpoint):
         LinkError
             If the link is closed.
         """
-        message = messages.cursor(points_W_m, cursor_id)
+        message = messages.cursor(points_W_m, cursor_id, eyes)
         with self._changed:
             outgoing = self._send_reliably(Slot.CURSOR, message)
             self._cursor = message.cursor

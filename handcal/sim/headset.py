@@ -199,7 +199,7 @@ def _told(state: HeadsetState) -> str:
     what = [
         f"projections of {state.owner.wearer or 'nobody'}: {' and '.join(state.drawn) or 'none'}",
         "offline calibration" if state.is_offline else "",
-        "" if state.cursor_W_m is None else f"cursor {state.cursor_id}",
+        "" if state.cursor_W_m is None else _cursor_told(state),
         "" if state.live_W_m is None else f"live {'outline' if state.is_outline else 'hand'}",
         "" if state.target is None else f"target for the {state.target.eye} eye",
         "" if state.shape is None else f"shape of {len(state.shape.corners_W_m)} corners",
@@ -208,6 +208,11 @@ def _told(state: HeadsetState) -> str:
         state.prompt,
     ]
     return "; ".join(part for part in what if part)
+
+
+def _cursor_told(state: HeadsetState) -> str:
+    of_eyes = "" if state.cursor_eyes == EYES else f" of the {state.cursor_eyes[0]} eye"
+    return f"cursor {state.cursor_id}{of_eyes}"
 
 
 def _identity(settings: HeadsetSettings, pairing_key: bytes, rig: Rig) -> HeadsetIdentity:
@@ -258,16 +263,19 @@ def _view(state: HeadsetState, rig: Rig, t_s: float) -> DisplayView:
         state.is_outline and state.verify is not None and state.verify.eye in state.live_eyes
     )
 
+    has_cursor = is_ready and state.cursor_W_m is not None
+    seeing = tuple(eye for eye in state.eyes if not has_cursor or eye in state.cursor_eyes)
+
     def rendered(eye: Eye) -> Float64:
         return drawn[eye].P if is_ready else projection_matrix(rig.eyes[eye])
 
     return DisplayView(
         t_s=t_s,
-        cursor_W_m=state.cursor_W_m if is_ready else None,
+        cursor_W_m=state.cursor_W_m if has_cursor and seeing else None,
         cursor_id=state.cursor_id,
         P={eye: rendered(eye) for eye in EYES},
         T_V_H={eye: drawn[eye].T_V_H if is_ready else rig.eyes[eye].T_V_H for eye in EYES},
-        eyes=state.eyes,
+        eyes=seeing,  # an open eye without the cursor has no part in the alignment
         guard_red=state.is_over_limit,
         prompt=state.prompt,
         verify=state.verify if is_ready else None,

@@ -173,7 +173,7 @@ def test_one_eye_at_a_time_finds_each_eye(stage: Stage) -> None:
     right = stage.shown().projections["right"].P
     np.testing.assert_array_equal(right, projection_matrix(RIG.eyes["right"]))
     stage.make_cursor(cursor_for("right", true_m["right"], zero_m), ("right",))
-    assert stage.shown().eyes == ("right",)
+    assert stage.shown().eyes == stage.shown().cursor_eyes == ("right",)
     assert "Close your left eye" in stage.shown().prompt
     stage.see(T_D_HAND)
     stage.press()

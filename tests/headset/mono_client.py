@@ -166,8 +166,9 @@ def _read(told: dict[str, str], before: HeadsetState) -> HeadsetState:
         "verify": None,
     }
     if "cursor" in told:
-        number, points = told["cursor"].split(",")
+        number, eyes, points = told["cursor"].split(",")
         fields |= {"cursor_id": int(number), "cursor_W_m": _points(points)}
+        fields |= {"cursor_eyes": _EYES[int(eyes)]}
     if "live" in told:
         red, outline, eyes, points = told["live"].split(",")
         fields |= {"is_over_limit": red == "1", "is_outline": outline == "1"}

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.conventions import unity_transform
 from handcal.core.display import projection_matrix
 from handcal.core.geometry import project, rigid, transform
-from handcal.core.types import EYES, Float64, Projection
+from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.link.nudges import VerifyRequest
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
@@ -259,6 +259,24 @@ def test_a_view_that_moves_is_said_once(start: Start) -> None:
     told = app.until(lambda told: told["warning"])
     assert "has moved its view by 1" in told["warning"]
     assert "moved" not in told["text"]
+
+
+def test_a_cursor_is_hidden_from_the_other_eye(start: Start, server: HeadsetServer) -> None:
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    send_projections(server)
+    # The third is as from an older PC: for both eyes.
+    shown: list[tuple[Eye, ...]] = [("left",), ("right",), (), EYES]
+    for number, eyes in enumerate(shown, 1):
+        server.send_cursor(number * SQUARE_M, number, eyes)
+        hidden = [bool(eyes) and eye not in eyes for eye in EYES]
+
+        def is_so(told: Mapping[str, str], hidden: list[bool] = hidden) -> bool:
+            found = ["cursor" in told[f"hidden{at}"].split(",") for at in range(2)]
+            return bool(told["cursor"]) and found == hidden
+
+        app.until(is_so)
+    assert faults(app.state()) == []
 
 
 def test_live_hands_of_any_size_are_drawn(start: Start, server: HeadsetServer) -> None:

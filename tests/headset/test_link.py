@@ -73,7 +73,7 @@ def projection(eye: Eye, wearer: str = "Ada", shift: float = 0.0) -> Projection:
 
 def show_everything(server: HeadsetServer, points: int = 3000) -> Float64:
     cloud = np.random.default_rng(3).normal(0.0, 0.1, (points, 3))
-    server.send_cursor(cloud, 7)
+    server.send_cursor(cloud, 7, ("right",))
     server.send_prompt("Close your left eye.", ("right",))
     server.send_projection(projection("left"))
     server.send_projection(projection("right"))
@@ -112,6 +112,7 @@ def test_everything_arrives_and_is_confirmed(
     assert state.cursor_W_m is not None
     np.testing.assert_allclose(state.cursor_W_m, cloud, atol=0.6e-4)
     assert (state.cursor_id, state.prompt, state.eyes) == (7, "Close your left eye.", ("right",))
+    assert state.cursor_eyes == ("right",)
     np.testing.assert_array_equal(state.drawn["left"].P, P)
     np.testing.assert_array_equal(state.drawn["left"].T_V_H, projection("left").T_V_H)
     assert (state.owner.wearer, state.owner.rig) == ("Ada", "rig A")

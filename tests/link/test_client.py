@@ -27,7 +27,7 @@ def headset_clock_ns() -> int:
 def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_key: bytes) -> None:
     with HeadsetClient(server.address, pairing_key, IDENTITY, impairment=BAD) as client:
         sent = [
-            server.send_cursor(hand(), 3),
+            server.send_cursor(hand(), 3, ["right"]),
             server.send_prompt("Cover the outline", ["right"]),
             server.send_projection(projection("left", 1.0)),
             server.send_projection(projection("right", 2.0)),
@@ -39,6 +39,7 @@ def test_everything_gets_through_a_bad_network(server: HeadsetServer, pairing_ke
     assert state.cursor_W_m is not None
     np.testing.assert_allclose(state.cursor_W_m, hand(), atol=5.1e-5)
     assert (state.cursor_id, state.prompt, state.eyes) == (3, "Cover the outline", ("right",))
+    assert state.cursor_eyes == ("right",)
     assert {eye: state.projections[eye].P[0, 0] for eye in EYES} == {"left": 1.0, "right": 2.0}
     assert state.target is not None
     assert state.target.eye == "left"
@@ -117,6 +118,18 @@ def test_a_confirmation_of_stale_drawings_is_found_out(
         server.wait_acked(server.send_cursor(hand(1), 1), 5.0)
         assert "another cursor" in confirmed(server, client, second)
         assert confirmed(server, client, client.state()) == ""
+
+
+def test_a_cursor_of_an_older_pc_is_for_both_eyes(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    with HeadsetClient(server.address, pairing_key, IDENTITY) as client:
+        server.wait_acked(server.send_cursor(hand(), 3, ["right"]), 5.0)
+        right = client.state()
+        server.wait_acked(server.send_cursor(hand(), 3, []), 5.0)
+        assert client.state().cursor_eyes == EYES
+        # A headset that does not know the eyes makes the same digest.
+        assert confirmed(server, client, right) == ""
 
 
 def test_a_lost_datagram_loses_no_pose(server: HeadsetServer, pairing_key: bytes) -> None:

@@ -32,11 +32,13 @@ def test_the_example_draws_confirms_and_ends_with_the_pc(pairing_key: bytes) -> 
         )
         assert process.stdin is not None
         assert process.stdout is not None
-        server.send_cursor(np.zeros((10, 3)), 7)
+        server.send_cursor(np.zeros((10, 3)), 7, ("right",))
         server.send_prompt("Close your left eye.", ("right",))
         server.send_target(Target("right", target_corners_m(0.5)))
         lines = [""]
-        while not all(what in lines[-1] for what in ("cursor 7", "Close", "of the right eye")):
+        while not all(
+            what in lines[-1] for what in ("cursor 7 for right", "Close", "of the right eye")
+        ):
             lines.append(process.stdout.readline())
             assert lines[-1], "the example ended"
         confirmation = _confirm(process.stdin, server)

@@ -25,8 +25,8 @@ def sent(envelope: pb.Envelope) -> pb.Envelope:
 
 @given(CLOUDS)
 def test_a_cursor_is_true_to_half_a_quantum(points: Float64) -> None:
-    cursor = sent(messages.cursor(points, 7)).cursor
-    assert cursor.cursor_id == 7
+    cursor = sent(messages.cursor(points, 7, ["left"])).cursor
+    assert (cursor.cursor_id, list(cursor.eyes)) == (7, [pb.EYE_LEFT])
     np.testing.assert_allclose(
         messages.read_points(cursor.points), points, atol=messages.QUANTUM_M / 2 + 1e-12
     )

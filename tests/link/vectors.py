@@ -47,7 +47,7 @@ def build() -> dict[str, Any]:
     view = HeadsetView(T_V_H, np.array([-0.3, 0.31, -0.17, 0.18]), 1268, 720)
     identity = HeadsetIdentity(DEVICE_ID, "Lab 2", "runtime 1", "app 3", 2, {"left": view}, 0.063)
     points = np.array([[0.0, 0.1, 0.5], [0.01, 0.12, 0.51], [-0.02, 0.08, 0.49]])
-    cursor = messages.cursor(points, 7)
+    cursor = messages.cursor(points, 7, ["right"])
     shifts: dict[Eye, float] = {"left": 0.25, "right": -0.5}
     projections = {
         eye: Projection(eye, P + shift, 1268, 720, T_V_H, P, "P 7", "rig A")

@@ -16,14 +16,15 @@ import pytest
 from handcal.core.display import projection_matrix
 from handcal.core.errors import LinkError
 from handcal.core.geometry import invert, transform
-from handcal.core.types import EYES, Projection
+from handcal.core.types import EYES, Eye, Projection
 from handcal.io.resources import resource_path
+from handcal.link.client import HeadsetState
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.link.reliable import Delivery
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
-from handcal.sim.headset import HeadsetSettings, run_headset
+from handcal.sim.headset import HeadsetSettings, _view, run_headset
 from handcal.sim.scene import SceneReceiver, SceneState
 
 KEY = "a pairing key of the tests"
@@ -131,7 +132,7 @@ def test_a_device_without_a_wearer_shows_and_confirms_on_enter(
     heard: list[Confirmation] = []
     for eye in EYES:
         server.send_projection(Projection(eye, np.eye(3, 4), 9, 8))
-    cursor = server.send_cursor(np.zeros((1, 3)), 3)
+    cursor = server.send_cursor(np.zeros((1, 3)), 3, ["left"])
 
     def is_stopped() -> bool:
         if cursor.state is Delivery.ACKED:
@@ -142,7 +143,33 @@ def test_a_device_without_a_wearer_shows_and_confirms_on_enter(
     run_headset(replace(settings, duration_s=10.0), KEY.encode(), is_stopped)
     presses.put("")
     assert (heard[0].cursor_id, heard[0].problem) == (3, "")
-    assert "left and right; cursor 3; open: left and right" in capsys.readouterr().out
+    assert (
+        "left and right; cursor 3 of the left eye; open: left and right" in capsys.readouterr().out
+    )
+
+
+@pytest.mark.parametrize(
+    ("is_open", "cursor_eyes", "seeing"),
+    [
+        (EYES, EYES, EYES),
+        (EYES, ("left",), ("left",)),
+        (("right",), EYES, ("right",)),
+        (("right",), ("left",), ()),
+    ],
+)
+def test_a_wearer_sees_a_cursor_only_in_the_open_eyes_that_draw_it(
+    is_open: tuple[Eye, ...], cursor_eyes: tuple[Eye, ...], seeing: tuple[Eye, ...]
+) -> None:
+    rig = read_rig(RIG_PATH)
+    state = HeadsetState(
+        cursor_W_m=np.zeros((1, 3)),
+        cursor_eyes=cursor_eyes,
+        eyes=is_open,
+        projections={eye: Projection(eye, np.eye(3, 4), 9, 8) for eye in EYES},
+    )
+    view = _view(state, rig, 0.0)
+    assert (view.cursor_W_m is not None, view.eyes) == (bool(seeing), seeing)
+    assert _view(replace(state, cursor_W_m=None), rig, 0.0).eyes == is_open
 
 
 def test_it_ends_when_the_pc_says_good_bye(

@@ -236,7 +236,7 @@ namespace Handcal.Link.Tests
             Tell("prompt", state.Prompt + "|" + state.OpenEyes);
             var cursor = new float[3 * state.Cursor.Points.Count];
             state.Cursor.Points.CopyTo(cursor, 0, 1);
-            Tell("cursor", Numbers.Write(Array.ConvertAll(cursor, one => (double)one)));
+            Tell("cursor", state.Cursor.Eyes + " " + Numbers.Write(Array.ConvertAll(cursor, one => (double)one)));
             LiveHand live = state.Live;
             var hand = new double[3 * live.Count];
             Array.Copy(live.PositionsM, hand, hand.Length);

@@ -87,7 +87,7 @@ namespace Handcal.Link.Tests
                     Add(answer, one.Eye.ToString(), Base64(one.P) + "," + Base64(one.TVH) + "," + Base64(one.POffline)
                         + "," + one.WidthPx + "," + one.HeightPx + ","
                         + Base64(Encoding.UTF8.GetBytes(one.Wearer)) + "," + Base64(Encoding.UTF8.GetBytes(one.Rig)));
-            if (isNewCursor) Add(answer, "cursor", state.Cursor == null ? "0," : state.Cursor.Id + "," + Base64(Cursor(state.Cursor)));
+            if (isNewCursor) Add(answer, "cursor", Cursor(state.Cursor));
             if (isNewLive) Add(answer, "live", Live(state.Live));
             if (state.Target != null) Add(answer, "target", (int)state.Target.Eye + "," + Base64(state.Target.CornersVM));
             if (state.Shape != null) Add(answer, "shape", (int)state.Shape.Eyes + "," + Base64(state.Shape.CornersWM));
@@ -105,11 +105,12 @@ namespace Handcal.Link.Tests
             return (live.IsRed ? 1 : 0) + "," + (live.IsOutline ? 1 : 0) + "," + (int)live.Eyes + "," + Base64(points);
         }
 
-        static float[] Cursor(Cursor cursor)
+        static string Cursor(Cursor cursor)
         {
+            if (cursor == null) return "0,3,";
             var points = new float[3 * cursor.Points.Count];
             cursor.Points.CopyTo(points, 0, 1);
-            return points;
+            return cursor.Id + "," + (int)cursor.Eyes + "," + Base64(points);
         }
 
         static void Add(StringBuilder answer, string name, string value)

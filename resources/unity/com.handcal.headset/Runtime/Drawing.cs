@@ -96,6 +96,7 @@ namespace Handcal
             if (shownCursor == shown) return;
             shownCursor = shown;
             Points points = shown == null ? Points.Nothing : shown.Points;
+            if (shown != null) cursor.Eyes = shown.Eyes;
             var positionsM = new float[3 * points.Count];
             points.CopyTo(positionsM, 0, 1);
             cursor.Begin(points.Count);

@@ -91,13 +91,19 @@ namespace Handcal.Link
         public readonly uint Id;
         public readonly Points Points = Points.Nothing;
 
+        /// <summary>The eyes that draw it.</summary>
+        public readonly Eyes Eyes;
+
         internal Cursor(ProtoReader reader)
         {
+            var eyes = new List<ulong>();
             while (reader.Next(out int field))
             {
                 if (field == 1) Id = (uint)reader.Number();
                 else if (field == 2) Points = new Points(reader.Message());
+                else if (field == 3) reader.Numbers(eyes);
             }
+            Eyes = Check.EyesOrBoth(eyes);
         }
     }
 
