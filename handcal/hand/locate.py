@@ -19,7 +19,7 @@ from handcal.core.types import Bool, Float32, Float64
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, covered, goes_on, on_border, solid_surface
 from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
-from handcal.hand.wrist import EDGE_RADIUS_M, FACING_RADIUS_M, box_exit_m, find_wrist_m
+from handcal.hand.wrist import EDGE_RADIUS_M, FACING_RADIUS_M, arm_fit, box_exit_m, find_wrist_m
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
 # Personnel: hand breadth 68–100 mm, hand length 165–220 mm). Seen from its edge the inscribed
@@ -36,6 +36,10 @@ _PALM_SIGMA_M, _PALM_STEPS = 0.04, 2
 # The forearm's axis runs from the palm to the mean of the arm about this distance from it.
 _ARM_M, _ARM_SIGMA_M = 0.11, 0.025
 _AXIS_STEPS = 3
+# The hand's end of a limb is the one behind which the limb fits a forearm, and its other end is the
+# thicker: of 5 cm, with this power of the ratio. It must be this much likelier than the other end
+# (a log), unless the palms that both lead to are the same.
+_THICKER, _SAME_PALM_M, _SURE = 8.0, 0.04, 1.5
 _ARM_RADIUS_M = 0.014  # a narrower limb is no arm; a finger is 24 mm wide
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
 _GAP_M, _JUMP_M = 0.015, 0.05
@@ -61,6 +65,10 @@ _NOT_A_HAND = (
     "bare hand, clear of other things"
 )
 _FROM_EDGE = "the hand is seen from its edge; turn its palm or its back to the camera"
+_EITHER_END = (
+    "the hand cannot be told from the arm in the depth image; spread the fingers, and show more of "
+    "the arm"
+)
 _NO_WRIST = (
     "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
     "camera"
@@ -90,6 +98,8 @@ class LocatedHand:
     sight."""
     depth_min_m: float
     """Nearest depth at which it was looked for."""
+    end_log_odds: float = np.inf
+    """Log of how much more the hand is at this end of its limb than at the other one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,7 +198,9 @@ def _is_plausible(located: LocatedHand) -> bool:
 
 
 def _check_wrist(located: LocatedHand) -> None:
-    """Raise HandError if it is too uncertain where the wrist is."""
+    """Raise HandError if it is too uncertain at which end the hand is, and where the wrist."""
+    if located.end_log_odds < _SURE:
+        raise HandError(_EITHER_END)
     if located.limit_sigma_m == np.inf:
         raise HandError(
             "the arm points along the camera's line of sight; raise the hand so that its palm or "
@@ -306,13 +318,14 @@ def _locate_on(
 ) -> LocatedHand:
     """Find palm and wrist on one surface; the palm where `likely` (N,), or near its tip."""
     points_m = limb.points_m
-    arm_m = _arm_end(limb)
-    if likely is None:
-        likely = (_distance(points_m, _farthest(limb, arm_m)) < _TIP_TO_PALM_M).astype(np.float32)
-    palm_m, palm_radius_m = _palm(limb, likely)
-    from_palm_m = points_m - palm_m[:, None]
     area_m2 = (np.float32(_pitch(limb.view)) * points_m[2]) ** 2
-    axis = _axis(from_palm_m, area_m2, arm_m - palm_m)
+    if likely is None:
+        palm_m, palm_radius_m, axis, end_log_odds = _hand_end(limb, area_m2)
+    else:
+        end_log_odds = np.inf
+        palm_m, palm_radius_m = _palm(limb, likely)
+        axis = _axis(points_m - palm_m[:, None], area_m2, _arm_end(limb) - palm_m)
+    from_palm_m = points_m - palm_m[:, None]
     exit_m = np.inf if box is None else box_exit_m(limb.view, box, palm_m, axis)
     wrist_m, wrist_sigma_m = find_wrist_m(
         from_palm_m, area_m2, limb.at_end, palm_m, palm_radius_m, axis, exit_m
@@ -334,25 +347,63 @@ def _locate_on(
         limit_m,
         wrist_sigma_m,
         depth_min_m,
+        end_log_odds,
     )
 
 
-def _arm_end(limb: _Limb) -> Float32:
-    """Return where the arm leaves the view: the mean of the places where the surface continues.
+def _hand_end(limb: _Limb, area_m2: Float32) -> tuple[Float32, float, Float32, float]:
+    """Return palm, its radius, the forearm's axis and `end_log_odds` at the hand's end of a limb.
 
-    Wide places count more, as fingers are thin. If it continues nowhere, this is the thicker of the
-    surface's two tips.
+    Either end may be it: fingers can be thicker than what is seen of the arm, and a hand may reach
+    out of the depth gate as an arm does.
     """
-    if limb.at_end.any():
-        weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
-        return np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
+    points_m = limb.points_m
+    found: list[tuple[Float32, float, Float32]] = []
+    scores = []
+    for end_m, thickness_m in _ends(limb):
+        likely = _distance(points_m, _farthest(limb, end_m)) < _TIP_TO_PALM_M
+        palm_m, radius_m = _palm(limb, likely.astype(np.float32))
+        from_palm_m = points_m - palm_m[:, None]
+        axis = _axis(from_palm_m, area_m2, end_m - palm_m)
+        fit = arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
+        found.append((palm_m, radius_m, axis))
+        scores.append((fit, _THICKER * float(np.log(thickness_m))))
+    (fit, thickness), (other_fit, other_thickness) = scores
+    log_odds = thickness - other_thickness
+    if float(np.linalg.norm(found[0][0] - found[1][0])) < _SAME_PALM_M:
+        return *found[log_odds < 0.0], np.inf
+    log_odds += fit - other_fit
+    return *found[log_odds < 0.0], abs(log_odds)
+
+
+def _arm_end(limb: _Limb) -> Float32:
+    """Return where the arm leaves the view, or else the thicker of the limb's two tips."""
+    (end_m, thickness_m), (other_m, other_thickness_m) = _ends(limb)
+    is_other = other_thickness_m > thickness_m and not limb.at_end.any()
+    return other_m if is_other else end_m
+
+
+def _ends(limb: _Limb) -> list[tuple[Float32, float]]:
+    """Return a limb's two tips, each with its thickness: the mean inscribed radius.
+
+    If the limb continues out of view, the first is where it does: the mean of these places. Wide
+    places count more, as fingers are thin.
+    """
     tip_m = limb.points_m.mean(axis=1)
-    tips = []
+    ends = []
     for _ in range(2):
         tip_m = _farthest(limb, tip_m)
-        tips.append(_distance(limb.points_m, tip_m) < _TIP_M)
-    thicker = max(tips, key=lambda tip: float(limb.radius_m[tip].mean()))
-    return np.asarray(limb.points_m[:, thicker].mean(axis=1), np.float32)
+        near = _distance(limb.points_m, tip_m) < _TIP_M
+        end_m = np.asarray(limb.points_m[:, near].mean(axis=1), np.float32)
+        ends.append((end_m, float(limb.radius_m[near].mean())))
+    if limb.at_end.any():
+        weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
+        leaves_m = np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
+        ends.sort(key=lambda end: float(np.linalg.norm(end[0] - leaves_m)))
+        near = _distance(limb.points_m, leaves_m) < _TIP_M
+        thickness_m = float(limb.radius_m[near].mean()) if near.any() else ends[0][1]
+        ends[0] = leaves_m, thickness_m
+    return ends
 
 
 def _farthest(limb: _Limb, from_m: Float32) -> Float32:

@@ -35,10 +35,15 @@ _LIMB_WIDTH_M, _NOTHING_M = 0.03, 0.005
 # narrower, nor this much wider within so many bins. A wrist seen from its edge is 36 mm wide.
 _NARROWER_M, _WIDER_M, _SHORTLY, _WRIST_WIDTH_M = 0.01, 0.025, 16, 0.036
 _MISFIT_SCALE_M = 0.003  # a place that misses this by as much is e times less likely
-_END_M = 0.005  # where the arm leaves the view it is cut off at an angle
+# Where the arm leaves the view it is cut off at an angle; where it ends in view it is rounded.
+_END_M, _ROUNDED_M = 0.005, 0.02
 # The surface of a wrist is this far from its middle, toward the camera. The narrowest place is this
 # far behind the wrist.
 _HALF_THICKNESS_M, _NARROWEST_M = 0.017, 0.004
+# An adult's palm has this inscribed radius. Which end of a limb is the hand is decided in units of
+# the palm found there, for hands of these sizes; its centre is the less certain.
+_USUAL_RADIUS_M, _SIZES, _FIT_SIGMA_M = 0.038, (0.5, 1.3), 0.03
+_NEVER = 1e-30
 
 _SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
 _SMOOTHING /= _SMOOTHING.sum()
@@ -47,6 +52,35 @@ _AT_M = np.asarray(
     _PROFILE_M[0] + _BIN_M * (np.arange(_BINS - len(_SMOOTHING) + 1) + 0.5 * len(_SMOOTHING)),
     np.float64,
 )
+
+
+def arm_fit(
+    from_palm_m: Float32,
+    area_m2: Float32,
+    at_end: Bool,
+    palm_m: Float32,
+    palm_radius_m: float,
+    axis: Float32,
+) -> float:
+    """Return how well a limb fits a forearm behind a wrist behind a palm: the log of a likelihood.
+
+    It is that of all places of the wrist together, in units of the palm's size: a limb that begins
+    with a forearm does not become narrower, and then suddenly wider.
+
+    Parameters
+    ----------
+    from_palm_m, area_m2, at_end, palm_m, palm_radius_m, axis
+        See `find_wrist_m`.
+    """
+    size = float(np.clip(palm_radius_m / _USUAL_RADIUS_M, *_SIZES))
+    along_m = axis @ from_palm_m / np.float32(size)
+    width_m = _width_m(along_m, area_m2 / np.float32(size**2), _cosine(axis, palm_m))
+    likely = _gaussian(_AT_M - _WRIST_M, _FIT_SIGMA_M) + _MISTAKEN
+    likely /= likely.sum()
+    misfit_m = _misfit_m(width_m, _AT_M, along_m[at_end])
+    likely *= np.exp(-width_m / _WIDTH_SCALE_M - misfit_m / _MISFIT_SCALE_M)
+    likely *= np.minimum(width_m / _WRIST_WIDTH_M, 1.0) ** 4
+    return float(np.log(likely.sum() + _NEVER))
 
 
 def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
@@ -93,14 +127,9 @@ def find_wrist_m(
     exit_m : float
         Where the axis leaves the detector's box; infinite without one.
     """
-    along_m = axis @ from_palm_m
-    # Seen at an angle, a limb's length is foreshortened, and so is its area.
-    forward = float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
-    cosine = max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - forward**2))))
-    place = np.floor((along_m - _PROFILE_M[0]) / _BIN_M).astype(int)
-    kept = (place >= 0) & (place < _BINS)
-    width_m = np.bincount(place[kept], area_m2[kept], _BINS) / (_BIN_M * cosine)
-    width_m, at_m = np.convolve(width_m, _SMOOTHING, "valid"), _AT_M
+    along_m, at_m = axis @ from_palm_m, _AT_M
+    cosine = _cosine(axis, palm_m)
+    width_m = _width_m(along_m, area_m2, cosine)
     if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
         return np.inf, np.inf if width_m[-1] > _NOTHING_M else 0.0
     edgewise = float(np.interp(palm_radius_m, (EDGE_RADIUS_M, FACING_RADIUS_M), (1.0, 0.0)))
@@ -118,9 +147,30 @@ def find_wrist_m(
     # The outline shows where the wrist's middle is; on the line of sight to it, the surface is
     # nearer, and so elsewhere along the axis.
     return (
-        wrist_m + _HALF_THICKNESS_M * forward / cosine - _NARROWEST_M,
+        wrist_m + _HALF_THICKNESS_M * _forward(axis, palm_m) / cosine - _NARROWEST_M,
         sigma_m if cosine > _LEAST_COS else np.inf,
     )
+
+
+def _forward(axis: Float32, palm_m: Float32) -> float:
+    """Return the cosine of the angle between the axis and the line of sight."""
+    return float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
+
+
+def _cosine(axis: Float32, palm_m: Float32) -> float:
+    """Return the cosine of the angle between the axis and the image plane, at least one half."""
+    return max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - _forward(axis, palm_m) ** 2))))
+
+
+def _width_m(along_m: Float32, area_m2: Float32, cosine: float) -> Float64:
+    """Return a limb's width at each place of the profile.
+
+    Seen at an angle, a limb's length is foreshortened, and so is its area.
+    """
+    place = np.floor((along_m - _PROFILE_M[0]) / _BIN_M).astype(int)
+    kept = (place >= 0) & (place < _BINS)
+    width_m = np.bincount(place[kept], area_m2[kept], _BINS) / (_BIN_M * cosine)
+    return np.convolve(width_m, _SMOOTHING, "valid")
 
 
 def _misfit_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
@@ -129,7 +179,8 @@ def _misfit_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
     The difference is what it is narrower anywhere behind, and wider shortly behind, than a forearm
     may be.
     """
-    end_m = float(ends_m[ends_m > 0.0].min(initial=np.inf)) - _END_M
+    last_m = float(at_m[width_m > _NOTHING_M].max(initial=0.0)) - _ROUNDED_M
+    end_m = float(ends_m[ends_m > 0.0].min(initial=last_m)) - _END_M
     is_arm = (at_m < end_m) & (width_m > _WRIST_WIDTH_M)
     narrowest_m = np.minimum.accumulate(np.where(is_arm, width_m, np.inf)[::-1])[::-1]
     widest_m = cv2.dilate(width_m, np.ones(_SHORTLY, np.uint8), anchor=(0, 0)).ravel()
