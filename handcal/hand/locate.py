@@ -57,12 +57,23 @@ _ARM_IN_BOX_MAX = 0.25
 # With a larger standard deviation the wrist is not known well enough for a cut: of a palm seen from
 # its edge, and from the front. A palm with a smaller inscribed circle is seen from its edge.
 _LIMIT_SIGMAS_M, _FROM_EDGE_M = (0.026, 0.03), 0.03
+# Unless the fingers reach less far beyond the palm's centre than this multiple of its radius (1.6
+# to 2.9 of an open hand that faces the camera): then it may as well be small.
+_SHORT = 2.8
 # Length of the outline with something this far before it: about a palm's breadth if a thing hides
 # half of the hand; by stray pixels it was 45 mm at most.
 _COVERED_MAX_M, _COVER_JUMP_M = 0.065, 0.03
 _NOT_A_HAND = (
     "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
     "bare hand, clear of other things"
+)
+_TOO_SMALL = (
+    "the hand is too small, or only a part of it is seen in the depth image; show the whole bare "
+    "hand, clear of other things"
+)
+_SMALL_OR_FROM_EDGE = (
+    "the hand is smaller than a six-year-old's, or seen from its edge; turn its palm or its back "
+    "to the camera"
 )
 _FROM_EDGE = "the hand is seen from its edge; turn its palm or its back to the camera"
 _EITHER_END = (
@@ -174,6 +185,8 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
                 _check_arm(located, within[place])
         elif _FINGER_RADIUS_M < located.palm_radius_m < _PALM_RADIUS_M[0]:
             problem = _FROM_EDGE
+        elif _has_palm(located):
+            problem = _TOO_SMALL
     if found is None and box is not None:
         raise HandError(problem)
     if found is None:
@@ -193,8 +206,11 @@ def _pitch(view: DepthView) -> float:
 
 def _is_plausible(located: LocatedHand) -> bool:
     area_m2 = np.count_nonzero(located.hand) * (_pitch(located.view) * located.palm_m[2]) ** 2
-    has_palm = _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
-    return bool(has_palm and area_m2 >= _AREA_MIN_M2)
+    return bool(_has_palm(located) and area_m2 >= _AREA_MIN_M2)
+
+
+def _has_palm(located: LocatedHand) -> bool:
+    return _PALM_RADIUS_M[0] <= located.palm_radius_m <= _PALM_RADIUS_M[1]
 
 
 def _check_wrist(located: LocatedHand) -> None:
@@ -208,7 +224,12 @@ def _check_wrist(located: LocatedHand) -> None:
         )
     seen_m = (EDGE_RADIUS_M, FACING_RADIUS_M)
     if located.limit_sigma_m > np.interp(located.palm_radius_m, seen_m, _LIMIT_SIGMAS_M):
-        raise HandError(_FROM_EDGE if located.palm_radius_m < _FROM_EDGE_M else _NO_WRIST)
+        if located.palm_radius_m >= _FROM_EDGE_M:
+            raise HandError(_NO_WRIST)
+        points_m = deproject(located.view, *pixels_of(located.hand)).T
+        reach_m = -np.percentile((points_m - located.palm_m) @ located.axis, 1.0)
+        is_short = reach_m < _SHORT * located.palm_radius_m
+        raise HandError(_SMALL_OR_FROM_EDGE if is_short else _FROM_EDGE)
 
 
 def _check_covered(located: LocatedHand) -> None:
