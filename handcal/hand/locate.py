@@ -36,10 +36,12 @@ _PALM_SIGMA_M, _PALM_STEPS = 0.04, 2
 # The forearm's axis runs from the palm to the mean of the arm about this distance from it.
 _ARM_M, _ARM_SIGMA_M = 0.11, 0.025
 _AXIS_STEPS = 3
-# The hand's end of a limb is the one behind which the limb fits a forearm, and its other end is the
-# thicker: of 5 cm, with this power of the ratio. It must be this much likelier than the other end
-# (a log), unless the palms that both lead to are the same.
-_THICKER, _SAME_PALM_M, _SURE = 8.0, 0.04, 1.5
+# The hand is at the end behind which a limb fits a forearm, and whose opposite end is the thicker
+# (around its tip, with this sigma; with this power of the ratio). Each counts for e^3 at most, so
+# that neither overrules the other. The end must be this much the likelier one (a log), unless both
+# lead to the same palm.
+_THICKER, _COUNTS, _SAME_PALM_M, _SURE = 10.0, 3.0, 0.04, 1.3
+_THICKNESS_SIGMA_M = 0.03
 _ARM_RADIUS_M = 0.014  # a narrower limb is no arm; a finger is 24 mm wide
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
 _GAP_M, _JUMP_M = 0.015, 0.05
@@ -77,8 +79,8 @@ _SMALL_OR_FROM_EDGE = (
 )
 _FROM_EDGE = "the hand is seen from its edge; turn its palm or its back to the camera"
 _EITHER_END = (
-    "the hand cannot be told from the arm in the depth image; spread the fingers, and show more of "
-    "the arm"
+    "the hand cannot be told from the arm in the depth image; turn its palm or its back to the "
+    "camera, spread the fingers, and show more of the arm"
 )
 _NO_WRIST = (
     "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
@@ -215,8 +217,6 @@ def _has_palm(located: LocatedHand) -> bool:
 
 def _check_wrist(located: LocatedHand) -> None:
     """Raise HandError if it is too uncertain at which end the hand is, and where the wrist."""
-    if located.end_log_odds < _SURE:
-        raise HandError(_EITHER_END)
     if located.limit_sigma_m == np.inf:
         raise HandError(
             "the arm points along the camera's line of sight; raise the hand so that its palm or "
@@ -230,6 +230,8 @@ def _check_wrist(located: LocatedHand) -> None:
         reach_m = -np.percentile((points_m - located.palm_m) @ located.axis, 1.0)
         is_short = reach_m < _SHORT * located.palm_radius_m
         raise HandError(_SMALL_OR_FROM_EDGE if is_short else _FROM_EDGE)
+    if located.end_log_odds < _SURE:
+        raise HandError(_EITHER_END)
 
 
 def _check_covered(located: LocatedHand) -> None:
@@ -389,12 +391,10 @@ def _hand_end(limb: _Limb, area_m2: Float32) -> tuple[Float32, float, Float32, f
         fit = arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
         found.append((palm_m, radius_m, axis))
         scores.append((fit, _THICKER * float(np.log(thickness_m))))
-    (fit, thickness), (other_fit, other_thickness) = scores
-    log_odds = thickness - other_thickness
+    fits, thicker = np.subtract(scores[0], scores[1]).clip(-_COUNTS, _COUNTS).tolist()
     if float(np.linalg.norm(found[0][0] - found[1][0])) < _SAME_PALM_M:
-        return *found[log_odds < 0.0], np.inf
-    log_odds += fit - other_fit
-    return *found[log_odds < 0.0], abs(log_odds)
+        return *found[thicker < 0.0], np.inf
+    return *found[fits + thicker < 0.0], abs(fits + thicker)
 
 
 def _arm_end(limb: _Limb) -> Float32:
@@ -405,7 +405,7 @@ def _arm_end(limb: _Limb) -> Float32:
 
 
 def _ends(limb: _Limb) -> list[tuple[Float32, float]]:
-    """Return a limb's two tips, each with its thickness: the mean inscribed radius.
+    """Return a limb's two tips, each with its thickness.
 
     If the limb continues out of view, the first is where it does: the mean of these places. Wide
     places count more, as fingers are thin.
@@ -416,15 +416,19 @@ def _ends(limb: _Limb) -> list[tuple[Float32, float]]:
         tip_m = _farthest(limb, tip_m)
         near = _distance(limb.points_m, tip_m) < _TIP_M
         end_m = np.asarray(limb.points_m[:, near].mean(axis=1), np.float32)
-        ends.append((end_m, float(limb.radius_m[near].mean())))
+        ends.append((end_m, _thickness_m(limb, tip_m)))
     if limb.at_end.any():
         weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
         leaves_m = np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
         ends.sort(key=lambda end: float(np.linalg.norm(end[0] - leaves_m)))
-        near = _distance(limb.points_m, leaves_m) < _TIP_M
-        thickness_m = float(limb.radius_m[near].mean()) if near.any() else ends[0][1]
-        ends[0] = leaves_m, thickness_m
+        ends[0] = leaves_m, _thickness_m(limb, leaves_m)
     return ends
+
+
+def _thickness_m(limb: _Limb, around_m: Float32) -> float:
+    """Return the mean inscribed radius around a place."""
+    weight = np.exp(-0.5 * (_distance(limb.points_m, around_m) / _THICKNESS_SIGMA_M) ** 2)
+    return float(weight @ limb.radius_m / max(float(weight.sum()), 1e-12))
 
 
 def _farthest(limb: _Limb, from_m: Float32) -> Float32:

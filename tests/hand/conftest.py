@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -48,13 +48,15 @@ def shoot(
     *,
     at_m: tuple[float, float, float] = (0.0, 0.02, 0.52),
     turn_rad: tuple[float, float, float] = (0.1, 0.1, 0.1),
+    roll_rad: float = 0.0,
     forearm_m: float = 0.3,
     wall_m: float = 1.5,
     noise_seed: int = 0,
+    shape: HandSettings | None = None,
 ) -> Shot:
-    """Render a hand in front of a wall, as seen by the depth camera."""
-    hand = make_hand(seed, HandSettings(forearm_m=forearm_m))
-    T_D_hand = rigid(turn_rad, at_m)
+    """Render a hand in front of a wall, as seen by the depth camera; rolled in the image."""
+    hand = make_hand(seed, replace(shape or HandSettings(), forearm_m=forearm_m))
+    T_D_hand = rigid([0.0, 0.0, roll_rad], at_m) @ rigid(turn_rad)
     image = draw_hand(hand, T_D_hand, CAMERA)
     depth_m = np.full((CAMERA.height, CAMERA.width), np.inf, np.float32)
     height, width = image.depth_m.shape
