@@ -42,6 +42,8 @@ _AXIS_STEPS = 3
 # lead to the same palm.
 _THICKER, _COUNTS, _SAME_PALM_M, _SURE = 10.0, 3.0, 0.04, 1.3
 _THICKNESS_SIGMA_M = 0.03
+# As much speaks for the end that leaves the image, over more than the width of a finger or two.
+_LEAVES_M = 0.025
 _ARM_RADIUS_M = 0.014  # a narrower limb is no arm; a finger is 24 mm wide
 # A part of the hand that depth jumps or missing pixels separate from it, such as a bent finger.
 _GAP_M, _JUMP_M = 0.015, 0.05
@@ -125,7 +127,8 @@ class _Parts:
     stats: Labels
     """(N, 5); as `cv2.connectedComponentsWithStats` gives them, the background's first."""
     ends: Bool
-    """(h, w); where the surface continues out of view."""
+    borders: Bool
+    """(h, w); where the surface continues out of view, and where that is the border of the view."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,6 +143,8 @@ class _Limb:
     """(N,); inscribed radius of the limb's silhouette."""
     at_end: Bool
     """(N,); where the surface continues out of view."""
+    border_m: float
+    """Length of its edge on the border of the view."""
 
 
 def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = None) -> LocatedHand:
@@ -162,9 +167,10 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
     depth_min_m = settings.depth_min_m - (0.0 if box is None else NEARER_M)
     solid = solid_surface(view.depth, jump)
     gated = solid & between(view, depth_min_m, settings.depth_max_m)
-    ends = on_border(gated) | goes_on(gated, solid & ~gated, view.depth, jump)
+    borders = on_border(gated)
+    ends = borders | goes_on(gated, solid & ~gated, view.depth, jump)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(gated.view(np.uint8), connectivity=8)
-    parts = _Parts(view, np.asarray(labels), np.asarray(stats), ends)
+    parts = _Parts(view, np.asarray(labels), np.asarray(stats), ends, borders)
     if box is not None:
         within = _within(view, box)
         chosen = _seen_part(parts, within)
@@ -311,7 +317,8 @@ def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
     # Infinite without an edge.
     radius_px = np.minimum(cv2.distanceTransform(closed, cv2.DIST_L2, 5)[pixels], max(closed.shape))
     radius_m = radius_px * points_m[2] * np.float32(_pitch(view))
-    return _Limb(part_view, pixels, points_m, radius_m, parts.ends[place][pixels]), place
+    border_m = pitch_m * np.count_nonzero(parts.borders & (parts.labels == main))
+    return _Limb(part_view, pixels, points_m, radius_m, parts.ends[place][pixels], border_m), place
 
 
 def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int, jump_m: Float64) -> Bool:
@@ -393,8 +400,10 @@ def _hand_end(limb: _Limb, area_m2: Float32) -> tuple[Float32, float, Float32, f
         scores.append((fit, _THICKER * float(np.log(thickness_m))))
     fits, thicker = np.subtract(scores[0], scores[1]).clip(-_COUNTS, _COUNTS).tolist()
     if float(np.linalg.norm(found[0][0] - found[1][0])) < _SAME_PALM_M:
-        return *found[thicker < 0.0], np.inf
-    return *found[fits + thicker < 0.0], abs(fits + thicker)
+        return *found[thicker < 0.0 and not limb.at_end.any()], np.inf
+    leaves = _COUNTS if limb.border_m > _LEAVES_M else 0.0
+    log_odds = (0.0 if np.isnan(fits) else fits) + thicker + leaves
+    return *found[log_odds < 0.0], abs(log_odds)
 
 
 def _arm_end(limb: _Limb) -> Float32:
@@ -421,7 +430,7 @@ def _ends(limb: _Limb) -> list[tuple[Float32, float]]:
         weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
         leaves_m = np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
         ends.sort(key=lambda end: float(np.linalg.norm(end[0] - leaves_m)))
-        ends[0] = leaves_m, _thickness_m(limb, leaves_m)
+        ends[0] = leaves_m, ends[0][1]
     return ends
 
 

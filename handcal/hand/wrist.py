@@ -65,16 +65,20 @@ def arm_fit(
     """Return how well a limb fits a forearm behind a wrist behind a palm: the log of a likelihood.
 
     It is that of all places of the wrist together, in units of the palm's size: a limb that begins
-    with a forearm does not become narrower, and then suddenly wider.
+    with a forearm does not become narrower, and then suddenly wider. NaN if the axis points along
+    the line of sight, so that nothing behind the palm is seen in its width.
 
     Parameters
     ----------
     from_palm_m, area_m2, at_end, palm_m, palm_radius_m, axis
         See `find_wrist_m`.
     """
+    cosine = _cosine(axis, palm_m)
+    if cosine <= _LEAST_COS:
+        return np.nan
     size = float(np.clip(palm_radius_m / _USUAL_RADIUS_M, *_SIZES))
     along_m = axis @ from_palm_m / np.float32(size)
-    width_m = _width_m(along_m, area_m2 / np.float32(size**2), _cosine(axis, palm_m))
+    width_m = _width_m(along_m, area_m2 / np.float32(size**2), cosine)
     likely = _gaussian(_AT_M - _WRIST_M, _FIT_SIGMA_M) + _MISTAKEN
     likely /= likely.sum()
     misfit_m = _misfit_m(width_m, _AT_M, along_m[at_end])
