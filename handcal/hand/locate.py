@@ -408,16 +408,15 @@ def _hand_end(limb: _Limb, area_m2: Float32) -> tuple[Float32, float, Float32, f
 
 def _arm_end(limb: _Limb) -> Float32:
     """Return where the arm leaves the view, or else the thicker of the limb's two tips."""
-    (end_m, thickness_m), (other_m, other_thickness_m) = _ends(limb)
-    is_other = other_thickness_m > thickness_m and not limb.at_end.any()
-    return other_m if is_other else end_m
+    if limb.at_end.any():
+        return _leaves_m(limb)
+    return max(_ends(limb), key=lambda end: end[1])[0]
 
 
 def _ends(limb: _Limb) -> list[tuple[Float32, float]]:
     """Return a limb's two tips, each with its thickness.
 
-    If the limb continues out of view, the first is where it does: the mean of these places. Wide
-    places count more, as fingers are thin.
+    If the limb continues out of view, the first is where it does.
     """
     tip_m = limb.points_m.mean(axis=1)
     ends = []
@@ -427,11 +426,19 @@ def _ends(limb: _Limb) -> list[tuple[Float32, float]]:
         end_m = np.asarray(limb.points_m[:, near].mean(axis=1), np.float32)
         ends.append((end_m, _thickness_m(limb, tip_m)))
     if limb.at_end.any():
-        weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
-        leaves_m = np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
+        leaves_m = _leaves_m(limb)
         ends.sort(key=lambda end: float(np.linalg.norm(end[0] - leaves_m)))
         ends[0] = leaves_m, ends[0][1]
     return ends
+
+
+def _leaves_m(limb: _Limb) -> Float32:
+    """Return the mean of the places where a limb continues out of view.
+
+    Wide places count more, as fingers are thin.
+    """
+    weight = limb.radius_m[limb.at_end] ** 2 + np.float32(1e-9)
+    return np.asarray(limb.points_m[:, limb.at_end] @ weight / weight.sum(), np.float32)
 
 
 def _thickness_m(limb: _Limb, around_m: Float32) -> float:
