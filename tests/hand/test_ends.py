@@ -1,4 +1,4 @@
-"""The hand's end of a limb is told from its other end by depth alone, or the hand is refused."""
+"""By depth alone, the hand's end of a limb is found, not its other end, or the hand is refused."""
 
 from __future__ import annotations
 
