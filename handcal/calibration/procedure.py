@@ -798,8 +798,8 @@ class Calibration:
 
     def _send_cursor(self, hand: PlacedHand) -> None:
         """Have the headset show the outline of a hand, with its marks."""
-        outline_m = hand.cloud.contour_m.astype(np.float64)
-        marks_m = outline_marks(outline_m, hand.cloud.contour_is_cut)
+        outline_m = hand.cloud.outline_m.astype(np.float64)
+        marks_m = outline_marks(outline_m, hand.cloud.outline_is_cut)
         drawn_W_m = transform(hand.T_W_D, np.vstack([outline_m, marks_m]))
         self._sent_cursor = self._link.send_cursor(drawn_W_m, self._cursor_id, self.eyes)
 
@@ -896,7 +896,7 @@ class Calibration:
     def _follow_nudges(self, observation: Observation, verifying: Verifying) -> None:
         """Draw the hand's outline for the verified eye, and take the wearer's nudges."""
         if observation.hand is not None:
-            outline_W_m = transform(observation.hand.T_W_D, observation.hand.cloud.contour_m)
+            outline_W_m = transform(observation.hand.T_W_D, observation.hand.cloud.outline_m)
             self._link.send_live_hand(outline_W_m, False, (verifying.eye,), is_outline=True)
         verify_id = verifying.request.verify_id
         if heard := [one for one in self._link.nudges() if one.verify_id == verify_id]:

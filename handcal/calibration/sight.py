@@ -12,8 +12,10 @@ from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import HandError, PoseError
 from handcal.core.types import CameraIdentity, Frame, HandCloud, Rig
+from handcal.hand.outline import with_outline
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
+from handcal.rig.edges import edges_of
 
 
 class Sight:
@@ -45,6 +47,7 @@ class Sight:
         self._evidence = evidence
         self._clock = FrameClock(settings.camera_latency_s)
         self._finder = make_finder(settings.segment)
+        self._edges = edges_of(rig)
         self.delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D, settings.delay)
         self.hands = RecentHands(
             link.pose_at_host_ns, rig.T_H_D, settings.steady_s, settings.steady_m
@@ -112,9 +115,10 @@ class Sight:
             self.hands.clear()
             return None, contradiction.text
         try:
-            return self._finder.find(frame), ""
+            cloud = self._finder.find(frame)
         except HandError as error:
             return None, str(error)
+        return with_outline(cloud, frame.depth_intrinsics, self._edges), ""
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:
         """Compare the pose that a frame carries with that of the headset's app."""

@@ -171,6 +171,11 @@ class Frame:
             freeze(self, "color", np.uint8, *size, 3)
 
 
+UNKNOWN_OUTLINE_PX = 2.0
+"""Standard deviation of an outline that nothing corrected: stereo shows hands 1 to 3 px too wide on
+every side."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class HandCloud:
     """The segmented hand of one frame."""
@@ -188,16 +193,29 @@ class HandCloud:
     contour_m: Float32
     """(M, 3); outer contour in order around the hand, frame D."""
     contour_is_cut: Bool
-    """(M,); True on a cut edge, False on the silhouette."""
+    """(M,); True on a cut edge, False on the silhouette. Of the mask, and so of all that the depth
+    camera measured: it may lie outside the hand (see `DepthEdges`)."""
     mask: UInt8
     """(H, W); 255 on the hand, in the depth image; 0 elsewhere."""
     box_px: tuple[int, int, int, int]
     """(4,); x0, y0, x1, y1 of the mask in the depth image, x1 and y1 exclusive."""
     median_depth_m: float
+    outline_m: Float32 = field(default_factory=lambda: np.empty((0, 3), np.float32))
+    """(K, 3); the hand's silhouette as it is drawn, in order around the hand, frame D: the contour
+    itself if not given."""
+    outline_is_cut: Bool = field(default_factory=lambda: np.empty(0, np.bool_))
+    """(K,); as `contour_is_cut`."""
+    outline_sigma_px: float = UNKNOWN_OUTLINE_PX
+    """Standard deviation of the whole outline inwards or outwards, in pixels of the depth image."""
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        if not len(self.outline_m):
+            object.__setattr__(self, "outline_m", self.contour_m)
+            object.__setattr__(self, "outline_is_cut", self.contour_is_cut)
+        freeze(self, "outline_m", np.float32, None, 3)
+        freeze(self, "outline_is_cut", np.bool_, len(self.outline_m))
         freeze(self, "points_m", np.float32, None, 3)
         freeze(self, "is_cut", np.bool_, len(self.points_m))
         freeze(self, "colors", np.uint8, len(self.points_m), 3)
@@ -484,6 +502,26 @@ class DepthCheck:
 
 
 @dataclass(frozen=True, slots=True)
+class DepthEdges:
+    """Distance by which the depth image's borders of near surfaces lie outside the true borders.
+
+    The border is the centres of the outermost pixels, as in `HandCloud.contour_m`. Lengths are in
+    pixels of the depth image: ``mm = px * z / f``.
+    """
+
+    fatten_px: float
+    """Positive if surfaces appear too large, as to a stereo camera, whose matching windows extend
+    them by about half a window."""
+    sigma_px: float
+    """Its standard deviation."""
+    source: Literal["measured", "typical"]
+    """Measured with this camera, or typical of cameras like it."""
+    views: int = 0
+    made: str = ""
+    """Views of the board, and date and time, ISO 8601; 0 and empty if not measured."""
+
+
+@dataclass(frozen=True, slots=True)
 class DisplayCheck:
     """The check that a headset draws as its projections say, observed from outside."""
 
@@ -516,6 +554,8 @@ class Rig:
     headset: HeadsetIdentity | None = None
     depth_check: DepthCheck | None = None
     """The devices of the rig and the check of its depth; empty or None if unknown."""
+    depth_edges: DepthEdges | None = None
+    """Measured with this depth camera; None if they never were."""
     display_check: DisplayCheck | None = None
     """The check that the headset draws what it is sent; None if there was none."""
 

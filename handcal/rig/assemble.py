@@ -68,7 +68,7 @@ def with_stereo(
 ) -> Rig:
     """Return `rig` with the pose of the depth camera calibrated.
 
-    A depth check of `rig` is removed: it may be of another camera.
+    Depth check and edges of `rig` are removed: they may be of another camera.
 
     Parameters
     ----------
@@ -107,6 +107,7 @@ def with_stereo(
         depth_intrinsics=intrinsics,
         depth_camera=depth_camera,
         depth_check=None,
+        depth_edges=None,
     )
     return _with_origin(calibrated, "T_H_D", origin)
 
@@ -116,8 +117,8 @@ def with_factory_pose(
 ) -> Rig:
     """Return `rig` with the headset's own depth camera, as its factory calibrated it.
 
-    Nothing is known of that calibration's accuracy, so T_H_D has no origin. A depth check of `rig`
-    is removed: it may be of another camera.
+    Nothing is known of that calibration's accuracy, so T_H_D has no origin. Depth check and
+    edges of `rig` are removed: they may be of another camera.
 
     Parameters
     ----------
@@ -134,6 +135,7 @@ def with_factory_pose(
         depth_intrinsics=depth_intrinsics,
         depth_camera=depth_camera,
         depth_check=None,
+        depth_edges=None,
         origins=origins,
     )
 

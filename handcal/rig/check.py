@@ -13,6 +13,7 @@ from handcal.core.types import (
     RIG_PARTS,
     CameraIdentity,
     DepthCheck,
+    DepthEdges,
     DisplayCheck,
     EyeDisplay,
     Float64,
@@ -41,6 +42,8 @@ def check_rig(rig: Rig) -> None:
         _check_headset(rig.headset)
     if rig.depth_check is not None:
         _check_depth_check(rig.depth_check)
+    if rig.depth_edges is not None:
+        _check_depth_edges(rig.depth_edges)
     if rig.display_check is not None:
         _check_display_check(rig.display_check)
     for part, origin in rig.origins.items():
@@ -166,6 +169,15 @@ def _check_depth_check(check: DepthCheck) -> None:
         bool(((values_m >= 0) & (values_m < 1)).all()),
         f"{name}.flatness must be at least 0 and below 1 (metres), and so its σ",
     )
+
+
+def _check_depth_edges(edges: DepthEdges) -> None:
+    name = "depth_edges"
+    require(edges.source == "measured", f"{name} must be measured ones")
+    _check_line(f"{name}.made", edges.made, MAX_TEXT)
+    require(edges.views > 0, f"{name}.views must be above 0")
+    require(abs(edges.fatten_px) <= 20.0, f"{name}.fatten_px must lie between -20 and 20")
+    require(0.0 < edges.sigma_px <= 20.0, f"{name}.sigma_px must be above 0, and 20 at most")
 
 
 def _check_display_check(check: DisplayCheck) -> None:

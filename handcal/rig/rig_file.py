@@ -1,8 +1,8 @@
 """The rig file: the offline calibration in OpenCV's FileStorage YAML.
 
 Anything that reads FileStorage reads it. Per eye: the display's size, T_V_H, and a named model with
-its parameters; for the depth camera: identity, intrinsics, T_H_D and the check of its depth; the
-headset's identity and views; and how each part was calibrated. Numbers survive exactly.
+its parameters; for the depth camera: identity, intrinsics, T_H_D and the check of its depth and
+edges; the headset's identity and views; and how each part was calibrated. Numbers survive exactly.
 
 Unknown fields are ignored.
 """
@@ -23,6 +23,7 @@ from handcal.core.types import (
     RIG_PARTS,
     CameraIdentity,
     DepthCheck,
+    DepthEdges,
     DisplayCheck,
     EyeDisplay,
     HeadsetIdentity,
@@ -83,6 +84,7 @@ def write_rig(path: str | PathLike[str], rig: Rig) -> None:
     storage.write("T_H_D", rig.T_H_D)
     _write_depth_camera(storage, rig.depth_intrinsics, rig.depth_camera)
     _write_depth_check(storage, rig.depth_check)
+    _write_depth_edges(storage, rig.depth_edges)
     _write_headset(storage, rig.headset)
     _write_display_check(storage, rig.display_check)
     _write_origins(storage, rig.origins)
@@ -191,6 +193,16 @@ def _write_depth_check(storage: cv2.FileStorage, check: DepthCheck | None) -> No
         storage.write("flatness", np.hstack(rows))
 
 
+def _write_depth_edges(storage: cv2.FileStorage, edges: DepthEdges | None) -> None:
+    if edges is None:
+        return
+    with _map(storage, "depth_edges"):
+        storage.write("made", quoted(edges.made))
+        storage.write("views", edges.views)
+        storage.write("fatten_px", edges.fatten_px)
+        storage.write("sigma_px", edges.sigma_px)
+
+
 def _write_headset(storage: cv2.FileStorage, headset: HeadsetIdentity | None) -> None:
     if headset is None:
         return
@@ -249,6 +261,7 @@ def _parse(root: Fields) -> Rig:
         depth_camera=CameraIdentity(*map(depth_camera.text, _CAMERA_TEXTS)),
         headset=_parse_headset(root),
         depth_check=_parse_depth_check(root),
+        depth_edges=_parse_depth_edges(root),
         display_check=_parse_display_check(root),
     )
     check_rig(rig)
@@ -300,6 +313,19 @@ def _parse_depth_check(root: Fields) -> DepthCheck | None:
         ranges_m=flatness[:, :2],
         flatness_m=flatness[:, 2],
         flatness_sigma_m=flatness[:, 3],
+    )
+
+
+def _parse_depth_edges(root: Fields) -> DepthEdges | None:
+    if not root.has("depth_edges"):
+        return None
+    fields = root.section("depth_edges")
+    return DepthEdges(
+        fatten_px=fields.number("fatten_px"),
+        sigma_px=fields.number("sigma_px"),
+        source="measured",
+        views=fields.integer("views"),
+        made=fields.text("made"),
     )
 
 

@@ -148,4 +148,4 @@ class EyeViews:
 
 
 def _outline_E(T_E_W: Float64, hand: PlacedHand) -> Float64:
-    return transform(T_E_W @ hand.T_W_D, hand.cloud.contour_m)
+    return transform(T_E_W @ hand.T_W_D, hand.cloud.outline_m)

@@ -326,7 +326,7 @@ class Station(Closable):
         """Show the live hand in the headset, and render the wearer's views if requested."""
         if self.calibration.state is State.APPLIED:
             # The wearer judges the calibration by this outline on their own hand.
-            outline_W_m = transform(hand.T_W_D, hand.cloud.contour_m)
+            outline_W_m = transform(hand.T_W_D, hand.cloud.outline_m)
             self._link.send_live_hand(outline_W_m, False, is_outline=True)
         if self.watch_views and not self.trials.comparing.shown:
             self._views.render_next(hand, self.trials.target_E_m, self.trials.is_offline)

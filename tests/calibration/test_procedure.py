@@ -75,10 +75,10 @@ def test_a_whole_calibration_reaches_the_displays(stage: Stage, session: Session
     stage.make_cursor()
     shown = stage.shown()
     assert shown.cursor_W_m is not None
-    contour_W_m = transform(T_W_H @ RIG.T_H_D, seen.hand.cloud.contour_m)
+    outline_W_m = transform(T_W_H @ RIG.T_H_D, seen.hand.cloud.outline_m)
     # Marks follow the outline: more points beside it, at the finger tips and the wrist.
-    np.testing.assert_allclose(shown.cursor_W_m[: len(contour_W_m)], contour_W_m, atol=1e-3)
-    assert len(contour_W_m) < len(shown.cursor_W_m) < 2 * len(contour_W_m)
+    np.testing.assert_allclose(shown.cursor_W_m[: len(outline_W_m)], outline_W_m, atol=1e-3)
+    assert len(outline_W_m) < len(shown.cursor_W_m) < 2 * len(outline_W_m)
     assert shown.eyes == EYES
     assert "both eyes" in shown.prompt
 

@@ -11,6 +11,7 @@ from handcal.core.types import (
     RIG_PARTS,
     CameraIdentity,
     DepthCheck,
+    DepthEdges,
     EyeDisplay,
     HeadsetIdentity,
     HeadsetView,
@@ -80,6 +81,14 @@ CHECKS = st.builds(
     ),
     VECTORS,
 )
+EDGES = st.builds(
+    DepthEdges,
+    fatten_px=st.floats(-20.0, 20.0),
+    sigma_px=st.floats(1e-3, 20.0),
+    source=st.just("measured"),
+    views=st.integers(1, 500),
+    made=st.just("2026-11-28T13:00:00+00:00"),
+)
 RIGS = st.builds(
     Rig,
     name=st.text(CHARACTERS, min_size=1, max_size=200)
@@ -102,4 +111,5 @@ RIGS = st.builds(
     depth_camera=st.builds(CameraIdentity, MAY_BE_EMPTY, MAY_BE_EMPTY, MAY_BE_EMPTY),
     headset=st.none() | HEADSETS,
     depth_check=st.none() | CHECKS,
+    depth_edges=st.none() | EDGES,
 )

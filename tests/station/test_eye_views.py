@@ -22,7 +22,7 @@ FRAME_NS = 333_000_000
 def hand_of(frame: int) -> PlacedHand:
     """Return the hand of a frame; its outline has as many points as there were frames."""
     contour_m = np.tile([0.0, 0.0, 0.5], (frame, 1))
-    cloud = cast(HandCloud, SimpleNamespace(contour_m=contour_m))
+    cloud = cast(HandCloud, SimpleNamespace(outline_m=contour_m))
     return PlacedHand(cloud, FRAME_NS * frame, np.eye(4), contour_m, contour_m[0])
 
 

@@ -1,0 +1,36 @@
+from dataclasses import replace
+
+import pytest
+
+from handcal.core.types import CameraIdentity, DepthEdges
+from handcal.rig.edges import edges_of
+from handcal.rig.example import example_rig
+
+
+def of_model(model: str) -> DepthEdges:
+    return edges_of(replace(example_rig(), depth_camera=CameraIdentity(model)))
+
+
+def test_measured_edges_are_taken() -> None:
+    measured = DepthEdges(1.2, 0.1, "measured", 12, "2026-11-28")
+    assert edges_of(replace(example_rig(), depth_edges=measured)) == measured
+
+
+@pytest.mark.parametrize("model", ["Intel RealSense D415", "Simulated camera", "OAK-D-LITE"])
+def test_stereo_cameras_fatten_by_one_to_three_pixels(model: str) -> None:
+    edges = of_model(model)
+    assert edges.source == "typical"
+    assert edges.fatten_px - 2 * edges.sigma_px < 1.0
+    assert edges.fatten_px + 2 * edges.sigma_px > 3.0
+    assert edges.fatten_px > 1.0
+
+
+@pytest.mark.parametrize("model", ["HoloLens 2 RM_DEPTH_AHAT", "Intel RealSense L515", "SR305"])
+def test_others_do_not(model: str) -> None:
+    assert of_model(model).fatten_px == 0.0
+
+
+def test_an_unknown_camera_is_the_least_certain() -> None:
+    known = of_model("Intel RealSense D455"), of_model("Azure Kinect"), of_model("SR305")
+    assert of_model("").sigma_px > max(one.sigma_px for one in known)
+    assert of_model("Something new") == of_model("")
