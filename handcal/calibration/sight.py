@@ -118,7 +118,7 @@ class Sight:
             cloud = self._finder.find(frame)
         except HandError as error:
             return None, str(error)
-        return with_outline(cloud, frame.depth_intrinsics, self._edges), ""
+        return with_outline(cloud, frame, self._edges), ""
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:
         """Compare the pose that a frame carries with that of the headset's app."""

@@ -6,38 +6,54 @@ are registered as measured, but the wearer compares what is drawn with the hand 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
-from handcal.core.types import Bool, DepthEdges, Float64, HandCloud, Intrinsics
+from handcal.core.types import Bool, DepthEdges, Float64, Frame, HandCloud, Intrinsics
+from handcal.hand.color_edge import find_color_edge
 
 _SMOOTH_PX = 4.0
 """Standard deviation of the smoothing of normals: several steps of a border along pixels, less than
 the width of a finger."""
+_STEP_SMOOTH_PX = 2.0
+"""The same for the border beside which the edge in colour is sought: only its steps vanish."""
 _STEPS = 4
 """Half the points over which a fold shows: a border along pixels turns at each of them."""
 _BESIDE_CUT_PX = 10
 """So far from a cut the normal would turn with the corner between cut and silhouette."""
+_LEAST_TOLD = 0.5
+"""Least share of the silhouette along which colour tells the hand from the background."""
+_COLOR_SIGMA_PX = 0.5
+"""Standard deviation of an outline that follows the edge in colour, as a whole: the image's blur,
+and 0.1 to 0.4 px against another method (docs/segmentation.md)."""
 
 
-def with_outline(cloud: HandCloud, intrinsics: Intrinsics, edges: DepthEdges) -> HandCloud:
-    """Return a hand with the outline that its depth camera's edges suggest.
+def with_outline(cloud: HandCloud, frame: Frame, edges: DepthEdges) -> HandCloud:
+    """Return a hand with the outline that is drawn.
+
+    It follows the hand's edge in the colour image where there is one and its colours tell the hand
+    from the background, otherwise what is known of the depth camera's edges.
 
     Parameters
     ----------
     cloud : HandCloud
-    intrinsics : Intrinsics
-        Of the depth camera.
+    frame : Frame
+        From which the hand was segmented.
     edges : DepthEdges
     """
-    contour_m = cloud.contour_m.astype(np.float64)
-    outline_m = moved_inward(contour_m, intrinsics, edges.fatten_px, cloud.contour_is_cut)
+    contour = _Contour.of(cloud.contour_m.astype(np.float64), frame.depth_intrinsics)
+    seen = _seen_in_color(contour, cloud, frame, edges) if frame.color is not None else None
+    if seen is None:
+        move_px, sigma_px = edges.fatten_px * contour.inward, edges.sigma_px
+    else:
+        move_px, sigma_px = seen
     return replace(
         cloud,
-        outline_m=outline_m.astype(np.float32),
+        outline_m=contour.moved(move_px, cloud.contour_is_cut).astype(np.float32),
         outline_is_cut=cloud.contour_is_cut,
-        outline_sigma_px=edges.sigma_px,
+        outline_sigma_px=sigma_px,
     )
 
 
@@ -64,28 +80,78 @@ def moved_inward(
     -------
     (N, 3) float64
     """
-    contour_m = np.asarray(contour_m, np.float64)
-    if len(contour_m) < 3 or not by_px:
-        return contour_m
-    focal_px = np.array([intrinsics.fx, intrinsics.fy])
-    place_px = contour_m[:, :2] / contour_m[:, 2:] * focal_px
-    move_px = by_px * inward_normals(place_px)
-    kept = np.ones(len(contour_m), np.bool_) if is_cut is None else ~_widened(is_cut)
-    before_px, after_px = (
-        np.roll(one, -_STEPS, axis=0) - np.roll(one, _STEPS, axis=0)
-        for one in (place_px, place_px + move_px)
-    )
-    kept &= np.einsum("ij,ij->i", before_px, after_px) > 0.0
-    if not kept.any():
-        return contour_m
-    if not kept.all():
-        at, known, turns = np.arange(len(kept)), np.flatnonzero(kept), len(kept)
-        move_px = np.column_stack(
-            [np.interp(at, known, one, period=turns) for one in move_px[known].T]
+    contour = _Contour.of(np.asarray(contour_m, np.float64), intrinsics)
+    if is_cut is None:
+        is_cut = np.zeros(len(contour_m), np.bool_)
+    return contour.moved(by_px * contour.inward, is_cut)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Contour:
+    """A closed contour and its place in the image of an undistorted lens."""
+
+    points_m: Float64
+    """(N, 3); frame D."""
+    focal_px: Float64
+    """(2,)."""
+    place_px: Float64
+    """(N, 2); from the principal point."""
+    inward: Float64
+    """(N, 2); smoothed normals in the image, unit vectors."""
+
+    @classmethod
+    def of(cls, points_m: Float64, intrinsics: Intrinsics) -> Self:
+        focal_px = np.array([intrinsics.fx, intrinsics.fy])
+        place_px = points_m[:, :2] / points_m[:, 2:] * focal_px
+        return cls(points_m, focal_px, place_px, inward_normals(place_px))
+
+    def in_space(self, move_px: Float64) -> Float64:
+        """Return movements (N, 3) in metres, at each point's depth."""
+        move_m = np.zeros_like(self.points_m)
+        move_m[:, :2] = move_px / self.focal_px * self.points_m[:, 2:]
+        return move_m
+
+    def moved(self, move_px: Float64, is_cut: Bool) -> Float64:
+        """Return the points moved (N, 3), except where cuts or folds make them follow others."""
+        kept = ~_widened(is_cut)
+        before_px, after_px = (
+            np.roll(one, -_STEPS, axis=0) - np.roll(one, _STEPS, axis=0)
+            for one in (self.place_px, self.place_px + move_px)
         )
-    moved_m = contour_m.copy()
-    moved_m[:, :2] += move_px / focal_px * contour_m[:, 2:]
-    return moved_m
+        kept &= np.einsum("ij,ij->i", before_px, after_px) > 0.0
+        if not kept.any():
+            return self.points_m
+        at, known, turn = np.arange(len(kept)), np.flatnonzero(kept), len(kept)
+        if len(known) < turn:
+            move_px = np.column_stack(
+                [np.interp(at, known, one, period=turn) for one in move_px[known].T]
+            )
+        return self.points_m + self.in_space(move_px)
+
+
+def _seen_in_color(
+    contour: _Contour, cloud: HandCloud, frame: Frame, edges: DepthEdges
+) -> tuple[Float64, float] | None:
+    """Return movements to the edge in colour (N, 2), in pixels, and their standard deviation.
+
+    None if it cannot be seen along most of the silhouette.
+    """
+    smooth_px = _smoothed(contour.place_px, _STEP_SMOOTH_PX)
+    to_smooth_px = smooth_px - contour.place_px
+    px_m = cloud.median_depth_m / float(contour.focal_px[0])
+    found = find_color_edge(
+        frame,
+        contour.points_m + contour.in_space(to_smooth_px),
+        contour.in_space(contour.inward),
+        px_m,
+        edges.fatten_px,
+    )
+    is_silhouette = ~cloud.contour_is_cut
+    told = float(found.is_told[is_silhouette].mean()) if is_silhouette.any() else 0.0
+    if told < _LEAST_TOLD:
+        return None
+    sigma_px = told * _COLOR_SIGMA_PX + (1.0 - told) * edges.sigma_px
+    return to_smooth_px + found.inward_px[:, None] * contour.inward, sigma_px
 
 
 def inward_normals(closed_px: Float64) -> Float64:
@@ -109,6 +175,13 @@ def inward_normals(closed_px: Float64) -> Float64:
     twice_area_px = np.sum(np.imag(np.conj(z) * np.roll(z, -1)))
     inward = 1j * np.sign(twice_area_px) * along / np.maximum(np.abs(along), 1e-9)
     return np.column_stack([inward.real, inward.imag])
+
+
+def _smoothed(closed_px: Float64, sigma: float) -> Float64:
+    """Return a closed contour (N, 2) smoothed along it by a Gaussian, in points."""
+    frequency = 2.0 * np.pi * np.fft.fftfreq(len(closed_px))
+    passed = np.exp(-0.5 * (frequency * sigma) ** 2)
+    return np.fft.ifft(passed[:, None] * np.fft.fft(closed_px, axis=0), axis=0).real
 
 
 def _widened(is_cut: Bool) -> Bool:
