@@ -52,6 +52,7 @@ def frames(
     scale: float = 1.0,
     offset_m: float = 0.0,
     painter: BoardPainter | None = None,
+    sensor: SensorSettings = SENSOR,
 ) -> Iterator[Frame]:
     """Yield a frame for each pose, a second apart; the colour is black without a painter."""
     for index, T_D_B in enumerate(T_D_Bs, 1):
@@ -63,8 +64,8 @@ def frames(
             index=index,
             t_camera_ns=index * 10**9,
             t_host_ns=0,
-            depth=sense_depth(measured_m, DEPTH.fx, rng, SENSOR),
-            depth_scale_m=SENSOR.depth_scale_m,
+            depth=sense_depth(measured_m, DEPTH.fx, rng, sensor),
+            depth_scale_m=sensor.depth_scale_m,
             depth_intrinsics=DEPTH,
             color=np.repeat(image[..., None], 3, axis=2),
             color_intrinsics=COLOR,

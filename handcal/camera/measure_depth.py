@@ -9,11 +9,12 @@ from handcal.camera.camera import Camera
 from handcal.camera.take_board import see_board
 from handcal.core.errors import CameraEndError
 from handcal.core.progress import Progress
-from handcal.core.types import DepthCheck, Frame
-from handcal.rig.boards.board import Board, BoardError
+from handcal.core.types import DepthCheck, DepthEdges, Frame
+from handcal.rig.boards.board import Board, BoardError, BoardView
 from handcal.rig.boards.choose import ChooseSettings, ViewSelector
 from handcal.rig.boards.views import MAX_VIEWS, ViewsError
 from handcal.rig.depth import DepthView, depth_view, fit_depth
+from handcal.rig.depth_border import MIN_BORDER_VIEWS, border_outside_px, fit_edges
 
 _SILENT_S = 5.0
 
@@ -34,10 +35,21 @@ STILLS = DepthSettings(
 """For recordings in which every frame is a still image."""
 
 
+@dataclass(frozen=True, slots=True)
+class MeasuredDepth:
+    """The depth and the edges of a depth camera, as views of a board show them."""
+
+    check: DepthCheck
+    edges: DepthEdges | None
+    """None if the border of the board's sheet was not seen often enough."""
+    why_no_edges: str
+    """The most frequent reason; empty if the edges were measured."""
+
+
 def run_depth_check(
     camera: Camera, board: Board, settings: DepthSettings, progress: Progress = Progress()
-) -> DepthCheck:
-    """Check the depth of a camera or recording that shows a board at several distances.
+) -> MeasuredDepth:
+    """Check depth and edges of a camera or recording that shows a board at several distances.
 
     Parameters
     ----------
@@ -57,7 +69,9 @@ def run_depth_check(
         used.
     """
     selector, views = ViewSelector(settings.choose), list[DepthView]()
+    borders_px: list[float] = []
     passed_over: Counter[str] = Counter()
+    no_border: Counter[str] = Counter()
     next_ns: int | None = None
     while not selector.is_done and not progress.is_cancelled():
         try:
@@ -69,11 +83,24 @@ def run_depth_check(
         next_ns = frame.t_camera_ns + round(1e9 * settings.every_s)
         progress.show(len(views) / settings.choose.most, f"{len(views)} views used")
         try:
-            views.append(_view_of(frame, board, selector))
+            seen = _seen_in(frame, board, selector)
+            views.append(depth_view(seen, frame))
         except BoardError as error:
             passed_over[str(error)] += 1
+            continue
+        try:
+            borders_px.append(border_outside_px(seen, frame))
+        except BoardError as error:
+            no_border[str(error)] += 1
+    edges = fit_edges(borders_px)
+    why_no_edges = ""
+    if edges is None:
+        why_no_edges = f"{len(borders_px)} views are too few: {MIN_BORDER_VIEWS} are needed"
+        if no_border:
+            why, count = no_border.most_common(1)[0]
+            why_no_edges += f"; in {count} others {why}"
     try:
-        return fit_depth(views)
+        return MeasuredDepth(fit_depth(views), edges, why_no_edges)
     except ViewsError as error:
         if not passed_over:
             raise
@@ -81,12 +108,12 @@ def run_depth_check(
         raise ViewsError(f"{error}; {count} frames were not used: {why}") from error
 
 
-def _view_of(frame: Frame, board: Board, selector: ViewSelector) -> DepthView:
-    """Return the depth of the board in a frame, or raise BoardError with the reason."""
+def _seen_in(frame: Frame, board: Board, selector: ViewSelector) -> BoardView:
+    """Return the board in a frame that is to be used, or raise BoardError with the reason."""
     if frame.color is None:
         raise BoardError("they have no colour, in which the board is found")
     (seen,) = see_board([frame.color], board)
     why_not = selector.consider([seen])
     if why_not or seen is None:
         raise BoardError(why_not)
-    return depth_view(seen, frame)
+    return seen

@@ -108,13 +108,13 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     *REALSENSE_OPTIONS,
 )
 def depth(arguments: argparse.Namespace) -> None:
-    """Check the depth camera against a board at several distances, and store it in a rig file."""
+    """Check depth and edges of the depth camera by a board, and store them in a rig file."""
     import numpy as np
 
     from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
     from handcal.report.cells import signed
     from handcal.rig.depth import explain_depth
-    from handcal.rig.report import depth_finding
+    from handcal.rig.report import depth_finding, edges_finding
 
     rig, board = rig_or_example(arguments.rig), board_of(arguments)
     with ExitStack() as stack:
@@ -126,7 +126,8 @@ def depth(arguments: argparse.Namespace) -> None:
         is_stopped = stack.enter_context(until_interrupted())
         progress = stack.enter_context(show_progress(is_stopped))
         settings = STILLS if arguments.stills else DepthSettings()
-        measured = run_depth_check(camera, board, settings, progress)
+        found = run_depth_check(camera, board, settings, progress)
+    measured = found.check
     scale_sigma, offset_sigma_m = np.sqrt(np.diag(measured.covariance))
     console.print(
         f"Scale {measured.scale:.4f} ± {scale_sigma:.4f}, offset "
@@ -142,6 +143,11 @@ def depth(arguments: argparse.Namespace) -> None:
     console.print(f"{'good' if finding.is_fine else 'doubtful'}: {finding.found}", markup=False)
     if not finding.is_fine:
         console.print(explain_depth(measured) or "add views, at more distances", markup=False)
+    if found.edges is None:
+        console.print(f"Edges not measured: {found.why_no_edges}", markup=False)
+    else:
+        rig = replace(rig, depth_edges=found.edges)
+    console.print(f"Edges: {edges_finding(rig).found}", markup=False)
     write_rig_file(arguments.output, replace(rig, depth_check=measured))
 
 

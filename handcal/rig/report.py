@@ -22,6 +22,7 @@ from handcal.core.types import (
     RigPart,
 )
 from handcal.report.cells import signed
+from handcal.rig.edges import edges_of
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0
@@ -102,6 +103,7 @@ def _findings(rig: Rig) -> Iterator[RigFinding]:
         found = f"{name}, {runtime or 'runtime not known'}"
         yield RigFinding("Headset", found, is_known=bool(runtime))
     yield depth_finding(rig.depth_check)
+    yield edges_finding(rig)
     yield display_finding(rig.display_check)
     for part in RIG_PARTS:
         yield _origin_finding(rig, part)
@@ -177,6 +179,21 @@ def depth_finding(check: DepthCheck | None) -> RigFinding:
         f"({check.views} views, {check.made})",
         bool(abs(bias_m[worst]) + 2.0 * sigma_m[worst] <= _LARGEST_BIAS_M),
         f"within {1e3 * _LARGEST_BIAS_M:g} mm, including twice its standard deviation",
+    )
+
+
+def edges_finding(rig: Rig) -> RigFinding:
+    """Return how far the depth camera shows a hand's edges outside it, measured or assumed."""
+    what, edges = "Edges of the depth camera", edges_of(rig)
+    far = f"{signed(edges.fatten_px, 1)} ± {edges.sigma_px:.1f} px"
+    if edges.source == "measured":
+        return RigFinding(what, f"{far} outside a hand's ({edges.views} views, {edges.made})")
+    of = rig.depth_camera.model or "a camera that is not known"
+    return RigFinding(
+        what,
+        f"never measured: {far} outside a hand's is assumed, as is typical of {of}; run 'handcal "
+        "rig depth' with the whole sheet of the board in view",
+        is_known=False,
     )
 
 

@@ -34,9 +34,13 @@ class BoardPainter:
     """Renders a camera's images of a board; the lens is computed once."""
 
     def __init__(
-        self, board: Board, camera: Intrinsics, settings: PictureSettings | None = None
+        self,
+        board: Board,
+        camera: Intrinsics,
+        settings: PictureSettings | None = None,
+        wall: float = WALL,
     ) -> None:
-        self._board, self._camera = board, camera
+        self._board, self._camera, self._wall = board, camera, wall
         self._settings = settings or PictureSettings()
         print_ = draw_board(board, _SQUARE_PX).astype(np.float32) / 255
         texture = BLACK + (WHITE - BLACK) * print_
@@ -62,7 +66,7 @@ class BoardPainter:
                 place -= 0.5
                 at.append(np.clip(place, -1e4, 1e4, out=place).astype(np.float32))
         x, y = at
-        fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=WALL)
+        fine = cv2.remap(self._texture, x, y, cv2.INTER_LINEAR, borderValue=self._wall)
         size = self._camera.width, self._camera.height
         image = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.float32)
         return expose(image, self._settings, rng)

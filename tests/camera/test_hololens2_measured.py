@@ -88,7 +88,7 @@ def test_a_bias_of_20_mm_is_found_by_the_depth_check() -> None:
                 depth_m.astype(np.float32), reflectance, SHARP, offset_m=0.02, keeps_wrapped=True
             )
         )
-    check = run_depth_check(Played(frames), BOARD, STILLS)  # type: ignore[arg-type]
+    check = run_depth_check(Played(frames), BOARD, STILLS).check  # type: ignore[arg-type]
     assert check.bias_m(0.5)[0] == pytest.approx(0.02, abs=0.003)
     assert not depth_finding(check).is_fine
 

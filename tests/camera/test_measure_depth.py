@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 
 from handcal.camera.folder import FolderCamera, record_folder
-from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
+from handcal.camera.measure_depth import (
+    STILLS,
+    DepthSettings,
+    MeasuredDepth,
+    run_depth_check,
+)
 from handcal.core.progress import Progress
 from handcal.core.types import DepthCheck, Frame
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import ViewsError
-from handcal.sim.boards import BoardPainter, PictureSettings
+from handcal.sim.boards import WHITE, BoardPainter, PictureSettings
 from tests.board_frames import BOARD, COLOR, frames, poses
 
 COUNT = 6
@@ -35,6 +40,12 @@ def held_twice(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def check(
     folder: Path, settings: DepthSettings, progress: Progress = Progress(), board: Board = BOARD
 ) -> DepthCheck:
+    return measure(folder, settings, progress, board).check
+
+
+def measure(
+    folder: Path, settings: DepthSettings, progress: Progress = Progress(), board: Board = BOARD
+) -> MeasuredDepth:
     with FolderCamera(folder) as camera:
         return run_depth_check(camera, board, settings, progress)
 
@@ -54,6 +65,28 @@ def test_stills_are_all_used(held_twice: Path) -> None:
     assert check(held_twice, few).views == COUNT + 1
     every_other = replace(STILLS, every_s=1.5)
     assert check(held_twice, every_other).views == COUNT
+
+
+def test_the_edges_are_measured_in_the_same_views(held_twice: Path) -> None:
+    found = measure(held_twice, DepthSettings())
+    assert found.edges is not None
+    # The nearest board is larger than the image. Nothing fattens, and edges have holes.
+    assert (found.edges.source, found.edges.views) == ("measured", COUNT - 1)
+    assert found.edges.fatten_px == pytest.approx(-1.0, abs=0.3)
+    assert found.why_no_edges == ""
+
+
+def test_a_board_without_a_border_in_color_leaves_the_edges_unknown(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    painter = BoardPainter(BOARD, COLOR, PictureSettings(samples=1), wall=WHITE)
+    places = poses(COUNT, rng, 0.33, 0.52)
+    record_folder(tmp_path / "take", frames(places, rng, painter=painter))
+    found = measure(tmp_path / "take", STILLS)
+    assert found.check.views == COUNT
+    assert found.edges is None
+    assert found.why_no_edges.startswith(
+        "0 views are too few: 5 are needed; in 6 others the border of its sheet is not seen"
+    )
 
 
 def test_the_reason_why_frames_were_not_used_is_given(held_twice: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def test_a_rig_in_doubt_fails_the_check(tmp_path: Path, capsys: pytest.CaptureFi
         one["is_fine"] for one in json.loads((tmp_path / "found.json").read_text())["findings"]
     )
     write_rig(path, replace(RIG, eyes={"left": RIG.eyes["right"], "right": RIG.eyes["left"]}))
-    with pytest.raises(HandcalError, match="1 of 19 findings"):
+    with pytest.raises(HandcalError, match="1 of 20 findings"):
         run("check", path)
     assert "left and right are exchanged" in capsys.readouterr().out
 
@@ -86,10 +87,14 @@ def test_the_depth_camera_is_checked_and_the_rig_file_keeps_it(
     assert check is not None
     assert check.views == 6
     assert check.bias_m(0.5)[0] == pytest.approx(0.01, abs=0.0015)
+    edges = read_rig(new).depth_edges
+    assert edges is not None
+    assert (edges.source, edges.views) == ("measured", 5)
     said = " ".join(capsys.readouterr().out.split())
     assert "doubtful: +" in said
+    assert re.search(r"Edges: −\d\.\d ± 0\.3 px outside a hand's \(5 views, ", said)
     assert "calibrate the sensor" in said
-    with pytest.raises(HandcalError, match="1 of 19 findings"):
+    with pytest.raises(HandcalError, match="1 of 20 findings"):
         run("check", new)
     with pytest.raises(HandcalError, match=r"not the depth camera of this rig: images of 640x360"):
         run("depth", tmp_path / "take", "--stills", "--output", tmp_path / "other.yaml")
