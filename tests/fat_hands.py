@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from handcal.core.geometry import invert, rigid
+from handcal.core.geometry import invert, rigid, transform
 from handcal.core.types import Bool, Float64, Frame, HandCloud, Intrinsics, UInt8
 from handcal.hand.segment import SegmentSettings, segment_hand
 from handcal.rig.example import example_rig
@@ -16,6 +16,7 @@ from handcal.sim.raster import D415, draw_hand
 from handcal.sim.sensor import SensorSettings, sense_depth
 
 SKIN = (205, 155, 130)
+CAMERA_D_M: Float64 = np.zeros(3)
 
 
 def fat_hand(
@@ -74,30 +75,38 @@ class Difference:
     size: float
 
 
-def beside_truth(cloud: HandCloud, hand: HandModel, T_H_hand: Float64) -> Difference:
-    """Compare what is drawn, without its cut, with the silhouette: distance and similarity."""
-    finer = 3
-    camera = replace(
-        D415,
-        width=finer * D415.width,
-        height=finer * D415.height,
-        **{name: finer * getattr(D415, name) for name in ("fx", "fy")},
-        **{name: finer * (getattr(D415, name) + 0.5) - 0.5 for name in ("cx", "cy")},
+def beside_truth(
+    cloud: HandCloud, hand: HandModel, T_H_hand: Float64, eye_D_m: Float64 = CAMERA_D_M
+) -> Difference:
+    """Compare what is drawn, without its cut, with the silhouette: distance and similarity.
+
+    As seen from the depth camera or, with the same lens, from a place in its frame.
+    """
+    T_E_D = rigid(None, -eye_D_m)
+    finer, beyond_px = 3, 300  # an eye sees it elsewhere
+    cx, cy = D415.cx + beyond_px, D415.cy + beyond_px
+    camera = Intrinsics(
+        width=finer * (D415.width + 2 * beyond_px),
+        height=finer * (D415.height + 2 * beyond_px),
+        fx=finer * D415.fx,
+        fy=finer * D415.fy,
+        cx=finer * (cx + 0.5) - 0.5,
+        cy=finer * (cy + 0.5) - 0.5,
     )
-    image = draw_hand(hand, invert(example_rig().T_H_D) @ T_H_hand, camera)
+    image = draw_hand(hand, T_E_D @ invert(example_rig().T_H_D) @ T_H_hand, camera)
     is_hand = np.pad(np.isfinite(image.depth_m), 30).astype(np.uint8)
     # Either distance is to the centre of the nearest pixel of the other kind.
-    beyond_px = np.asarray(cv2.distanceTransform(1 - is_hand, cv2.DIST_L2, 5), np.float64)
-    beyond_px -= cv2.distanceTransform(is_hand, cv2.DIST_L2, 5)
-    beyond_px = (beyond_px - 0.5 * np.sign(beyond_px)) / finer
-    silhouette_m = cloud.outline_m[~near_cut(cloud.outline_is_cut)].astype(np.float64)
+    outside_px = np.asarray(cv2.distanceTransform(1 - is_hand, cv2.DIST_L2, 5), np.float64)
+    outside_px -= cv2.distanceTransform(is_hand, cv2.DIST_L2, 5)
+    outside_px = (outside_px - 0.5 * np.sign(outside_px)) / finer
+    silhouette_m = transform(T_E_D, cloud.outline_m[~near_cut(cloud.outline_is_cut)])
     place_px = silhouette_m[:, :2] / silhouette_m[:, 2:] * D415.fx
-    at = finer * (place_px + np.add([D415.cx, D415.cy], 0.5)) - 0.5
+    at = finer * (place_px + np.add([cx, cy], 0.5)) - 0.5
     column, row = (at - [image.x0 - 30, image.y0 - 30]).astype(np.float32).T
-    slope = np.gradient(finer * cv2.GaussianBlur(beyond_px, (0, 0), 3.0))
+    slope = np.gradient(finer * cv2.GaussianBlur(outside_px, (0, 0), 3.0))
     gap_px, down, right = (
         cv2.remap(one.astype(np.float32), column, row, cv2.INTER_LINEAR).ravel()
-        for one in (beyond_px, *slope)
+        for one in (outside_px, *slope)
     )
     from_middle = place_px - place_px.mean(axis=0)
     across = right * from_middle[:, 0] + down * from_middle[:, 1]

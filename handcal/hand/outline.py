@@ -23,6 +23,7 @@ _STEPS = 4
 """Half the points over which a fold shows: a border along pixels turns at each of them."""
 _BESIDE_CUT_PX = 10
 """So far from a cut the normal would turn with the corner between cut and silhouette."""
+_FINGER_RADIUS_M = 0.008
 _LEAST_TOLD = 0.5
 """Least share of the silhouette along which colour tells the hand from the background."""
 _COLOR_SIGMA_PX = 0.5
@@ -49,12 +50,24 @@ def with_outline(cloud: HandCloud, frame: Frame, edges: DepthEdges) -> HandCloud
         move_px, sigma_px = edges.fatten_px * contour.inward, edges.sigma_px
     else:
         move_px, sigma_px = seen
+    outline_m = contour.moved(move_px, cloud.contour_is_cut)
+    outline_m *= 1.0 + _beyond_border_m(cloud, frame.depth_intrinsics) / outline_m[:, 2:]
     return replace(
         cloud,
-        outline_m=contour.moved(move_px, cloud.contour_is_cut).astype(np.float32),
+        outline_m=outline_m.astype(np.float32),
         outline_is_cut=cloud.contour_is_cut,
         outline_sigma_px=sigma_px,
     )
+
+
+def _beyond_border_m(cloud: HandCloud, intrinsics: Intrinsics) -> float:
+    """Return how far the rim, where a finger turns away, is behind what border pixels measure.
+
+    Their centres are half a pixel inside the rim, where the front of a finger is still nearer. The
+    eyes, beside the camera, would see a rim at that depth shifted.
+    """
+    px_m = cloud.median_depth_m / intrinsics.fx
+    return float(np.sqrt(_FINGER_RADIUS_M * px_m))
 
 
 def moved_inward(

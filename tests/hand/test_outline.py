@@ -11,9 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handcal.core.geometry import rigid
+from handcal.core.display import view_of_eye
+from handcal.core.geometry import invert, rigid, transform
 from handcal.core.types import DepthEdges, Float64, HandCloud, Intrinsics
 from handcal.hand.outline import inward_normals, moved_inward, with_outline
+from handcal.rig.example import example_rig
 from tests.fat_hands import SKIN, Difference, beside_truth, fat_hand
 
 TYPICAL = DepthEdges(1.8, 0.7, "typical")
@@ -117,6 +119,25 @@ def test_color_shows_the_edge_of_a_camera_that_is_not_known(fatten_px: int, zoom
     assert abs(drawn.size) < 0.002
     assert np.hypot(drawn.right_px, drawn.down_px) < 0.3
     assert max(one.outline_sigma_px for one in clouds) < 0.6
+
+
+def test_an_eye_below_the_camera_sees_the_outline_on_the_silhouette() -> None:
+    rig = example_rig()
+    view = view_of_eye(rig.eyes["left"], np.eye(4))
+    eye_D_m = transform(invert(rig.T_H_D), invert(view)[:3, 3][None])[0]
+    assert 0.05 < np.linalg.norm(eye_D_m) < 0.1
+    found, at_the_border = [], []
+    for seed in range(4):
+        cloud, frame, hand, T_H_hand = fat_hand(seed, 2, (40, 110, 50))
+        drawn = with_outline(cloud, frame, TYPICAL)
+        found.append(beside_truth(drawn, hand, T_H_hand, eye_D_m))
+        nearer_m = drawn.outline_m * (cloud.contour_m[:, 2:] / drawn.outline_m[:, 2:])
+        as_measured = replace(drawn, outline_m=nearer_m)
+        at_the_border.append(beside_truth(as_measured, hand, T_H_hand, eye_D_m))
+    assert abs(np.mean([one.size for one in found])) < 0.0025
+    assert abs(np.mean([one.right_px for one in found])) < 0.15
+    assert abs(np.mean([one.down_px for one in found])) < 0.35
+    assert np.mean([one.down_px for one in at_the_border]) < -0.6
 
 
 def test_color_that_tells_nothing_changes_nothing() -> None:
