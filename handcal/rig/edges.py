@@ -7,11 +7,12 @@ from handcal.core.types import DepthEdges, Rig
 _STEREO = DepthEdges(fatten_px=1.8, sigma_px=0.7, source="typical")
 """Active stereo: half of the matching window, 1 to 3 px on a D4xx; 1.0 to 2.4 px, 1.8 in the mean,
 in the real frames of docs/segmentation.md."""
-_TIME_OF_FLIGHT = DepthEdges(fatten_px=0.0, sigma_px=0.5, source="typical")
-"""No matching windows: a pixel that sees both surfaces has a depth between them and is left out as
-a flying pixel, or not. So the error is of half a pixel, which is large for their coarse images."""
-_STRUCTURED_LIGHT = DepthEdges(fatten_px=0.0, sigma_px=1.0, source="typical")
-"""Each pixel decodes the pattern alone, but the projector's shadow and its blur along the stripes
+_TIME_OF_FLIGHT = DepthEdges(fatten_px=-0.5, sigma_px=0.5, source="typical")
+"""Without matching windows the centres of the outermost pixels lie half a pixel inside. One that
+sees both surfaces has a depth between them and may be left out, which is half a pixel either way:
+a millimetre for their coarse images."""
+_STRUCTURED_LIGHT = DepthEdges(fatten_px=-0.5, sigma_px=1.0, source="typical")
+"""Each pixel decodes the pattern alone, but the projector's shadow and the blur of its stripes
 remove or add a pixel."""
 _UNKNOWN = DepthEdges(fatten_px=1.5, sigma_px=1.2, source="typical")
 """Most likely a stereo camera."""

@@ -26,8 +26,8 @@ def test_stereo_cameras_fatten_by_one_to_three_pixels(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", ["HoloLens 2 RM_DEPTH_AHAT", "Intel RealSense L515", "SR305"])
-def test_others_do_not(model: str) -> None:
-    assert of_model(model).fatten_px == 0.0
+def test_the_outermost_pixels_of_others_lie_half_a_pixel_inside(model: str) -> None:
+    assert of_model(model).fatten_px == -0.5
 
 
 def test_an_unknown_camera_is_the_least_certain() -> None:
