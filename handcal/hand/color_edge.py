@@ -22,6 +22,7 @@ _MOST_RAYS = 400
 _STEP_PX = 0.5
 # The edge is searched this far to both sides; less where a finger, 8 mm to its middle, is thin.
 _REACH_PX, _REACH_M = 6.0, 0.006
+_MARGIN = 2  # steps at the ends of the search
 # Samples beyond it at each end of a ray, and rays to both sides, that tell the colours.
 _ENDS, _ALONG_M = 8, 0.010
 # Least standard deviation of a colour, in shades of 255.
@@ -46,6 +47,9 @@ class ColorEdge:
     """(N,); from each point of the contour, in pixels of the depth image."""
     is_told: Bool
     """(N,); False where hand and background have too similar colours: the place expected."""
+    beyond: float
+    """Share of the rays told at whose ends the edge is, or beyond: much if the two images do not
+    show the same place or time."""
 
 
 def find_color_edge(
@@ -79,11 +83,14 @@ def find_color_edge(
     inward_px = samples_px[edges] - 0.5 * _STEP_PX
     cost = np.cumsum(ratio, axis=1)[:, edges - 1] * is_told[:, None]
     cost += (0.5 * ((inward_px - expected_px) / _PRIOR_PX) ** 2).astype(np.float32)
-    found_px = inward_px[_cheapest_path(cost)]
+    path = _cheapest_path(cost)
+    found_px = inward_px[path]
+    at_ends = is_told & ((path < _MARGIN) | (path >= len(edges) - _MARGIN))
     at, turn = np.arange(len(contour_m)), len(contour_m)
     return ColorEdge(
         np.interp(at, chosen, found_px, period=turn),
         np.interp(at, chosen, is_told.astype(np.float64), period=turn) > 0.5,
+        float(at_ends.sum() / max(1, is_told.sum())),
     )
 
 

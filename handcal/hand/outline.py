@@ -26,6 +26,9 @@ _BESIDE_CUT_PX = 10
 _FINGER_RADIUS_M = 0.008
 _LEAST_TOLD = 0.5
 """Least share of the silhouette along which colour tells the hand from the background."""
+_MOST_BEYOND = 0.1
+"""Largest share of it whose edge in colour is too far away: 0.05 at most in real frames, 0.2 to 0.3
+if their colour is moved by 6 to 10 px."""
 _COLOR_SIGMA_PX = 0.5
 """Standard deviation of an outline that follows the edge in colour, as a whole: the image's blur,
 and 0.1 to 0.4 px against another method (docs/segmentation.md)."""
@@ -147,7 +150,8 @@ def _seen_in_color(
 ) -> tuple[Float64, float] | None:
     """Return movements to the edge in colour (N, 2), in pixels, and their standard deviation.
 
-    None if it cannot be seen along most of the silhouette.
+    None if it cannot be seen along most of the silhouette, or not near enough: the hand may have
+    moved between both images.
     """
     smooth_px = _smoothed(contour.place_px, _STEP_SMOOTH_PX)
     to_smooth_px = smooth_px - contour.place_px
@@ -161,7 +165,7 @@ def _seen_in_color(
     )
     is_silhouette = ~cloud.contour_is_cut
     told = float(found.is_told[is_silhouette].mean()) if is_silhouette.any() else 0.0
-    if told < _LEAST_TOLD:
+    if told < _LEAST_TOLD or found.beyond > _MOST_BEYOND:
         return None
     sigma_px = told * _COLOR_SIGMA_PX + (1.0 - told) * edges.sigma_px
     return to_smooth_px + found.inward_px[:, None] * contour.inward, sigma_px

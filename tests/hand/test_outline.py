@@ -147,7 +147,8 @@ def test_color_that_tells_nothing_changes_nothing() -> None:
     dark = replace(frame, color=frame.color // 16)
     alike = replace(frame, color=np.full_like(frame.color, SKIN))
     elsewhere = replace(frame, T_C_D=rigid(None, [2.0, 0.0, 0.0]))
-    for one in (dark, alike, elsewhere):
+    moved = replace(frame, color=np.roll(frame.color, 12, axis=1))
+    for one in (dark, alike, elsewhere, moved):
         drawn = with_outline(cloud, one, TYPICAL)
         np.testing.assert_array_equal(drawn.outline_m, without.outline_m)
         assert drawn.outline_sigma_px == TYPICAL.sigma_px
