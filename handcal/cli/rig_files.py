@@ -147,7 +147,7 @@ def depth(arguments: argparse.Namespace) -> None:
         console.print(f"Edges not measured: {found.why_no_edges}", markup=False)
     else:
         rig = replace(rig, depth_edges=found.edges)
-    console.print(f"Edges: {edges_finding(rig).found}", markup=False)
+    console.print(f"Edges outside the true ones: {edges_finding(rig).found}", markup=False)
     write_rig_file(arguments.output, replace(rig, depth_check=measured))
 
 

@@ -183,18 +183,13 @@ def depth_finding(check: DepthCheck | None) -> RigFinding:
 
 
 def edges_finding(rig: Rig) -> RigFinding:
-    """Return how far the depth camera shows a hand's edges outside it, measured or assumed."""
-    what, edges = "Edges of the depth camera", edges_of(rig)
+    """Return how far a depth camera's edges lie outside the true ones, measured or assumed."""
+    what, edges = "Depth edges outside the true ones", edges_of(rig)
     far = f"{signed(edges.fatten_px, 1)} ± {edges.sigma_px:.1f} px"
     if edges.source == "measured":
-        return RigFinding(what, f"{far} outside a hand's ({edges.views} views, {edges.made})")
-    of = rig.depth_camera.model or "a camera that is not known"
-    return RigFinding(
-        what,
-        f"never measured: {far} outside a hand's is assumed, as is typical of {of}; run 'handcal "
-        "rig depth' with the whole sheet of the board in view",
-        is_known=False,
-    )
+        return RigFinding(what, f"{far} ({edges.views} views, {edges.made})")
+    found = f"not measured, {far} assumed: run 'handcal rig depth'"
+    return RigFinding(what, found, is_known=False)
 
 
 def display_finding(check: DisplayCheck | None) -> RigFinding:

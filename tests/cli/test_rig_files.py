@@ -92,7 +92,7 @@ def test_the_depth_camera_is_checked_and_the_rig_file_keeps_it(
     assert (edges.source, edges.views) == ("measured", 5)
     said = " ".join(capsys.readouterr().out.split())
     assert "doubtful: +" in said
-    assert re.search(r"Edges: −\d\.\d ± 0\.3 px outside a hand's \(5 views, ", said)
+    assert re.search(r"Edges outside the true ones: −\d\.\d ± 0\.3 px \(5 views, ", said)
     assert "calibrate the sensor" in said
     with pytest.raises(HandcalError, match="1 of 20 findings"):
         run("check", new)

@@ -97,22 +97,19 @@ def test_what_the_file_does_not_tell_is_neither_fine_nor_doubtful() -> None:
     bare = replace(RIG, headset=None, depth_check=None, display_check=None, origins={})
     unknown = [one.what for one in report_rig(bare) if not one.is_known]
     parts = [f"Calibration of the {PART_NAMES[part]}" for part in RIG_PARTS]
-    edges, checks = "Edges of the depth camera", ("Depth check", "Display check")
+    edges, checks = "Depth edges outside the true ones", ("Depth check", "Display check")
     assert unknown == ["Depth camera", "Headset", checks[0], edges, checks[1], *parts]
 
 
 def test_edges_that_were_never_measured_are_told_with_what_is_assumed() -> None:
     d415 = replace(RIG, depth_camera=CameraIdentity("Intel RealSense D415", "123"))
-    told = {one.what: one for one in report_rig(d415)}["Edges of the depth camera"]
+    told = {one.what: one for one in report_rig(d415)}["Depth edges outside the true ones"]
     assert not told.is_known
-    assert told.found == (
-        "never measured: +1.8 ± 0.7 px outside a hand's is assumed, as is typical of Intel "
-        "RealSense D415; run 'handcal rig depth' with the whole sheet of the board in view"
-    )
+    assert told.found == ("not measured, +1.8 ± 0.7 px assumed: run 'handcal rig depth'")
     edges = DepthEdges(1.2, 0.3, "measured", 9, "today")
     told = {one.what: one for one in report_rig(replace(d415, depth_edges=edges))}[told.what]
     assert told.is_known
-    assert told.found == "+1.2 ± 0.3 px outside a hand's (9 views, today)"
+    assert told.found == "+1.2 ± 0.3 px (9 views, today)"
 
 
 def test_only_what_was_compared_with_something_is_judged() -> None:

@@ -95,12 +95,12 @@ def test_a_failed_acceptance_is_shown_as_a_failure(
     assert next(iter(told(page))) == "Acceptance"
     assert told(page)["Acceptance"][1] == "Failed"
     said, sign = child(page, QLabel, "savedRigFound"), child(page, QLabel, "savedRigHealth")
-    assert said.text().startswith("1 failed; 4 not known or not made. Follow the advice under")
+    assert said.text().startswith("1 failed; 5 not known or not made. Follow the advice under")
     assert sign.accessibleName() == "Problem"
     project.note_accepted("the rig passes", is_passed=True)
     page.enter()
     assert told(page)["Acceptance"][1] == "Good"
-    assert said.text().startswith("4 not known or not made; none doubtful. Save")
+    assert said.text().startswith("5 not known or not made; none doubtful. Save")
     project.note_accepted("the rig fails: left", is_passed=False)
     project.save_rig_as(tmp_path / "ours.yaml")
     assert said.text().endswith("Follow the advice under Acceptance, then accept the rig again.")

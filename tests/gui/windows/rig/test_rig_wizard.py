@@ -182,7 +182,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     wizard.show_step(RESULT)
     found = child(wizard, QLabel, "savedRigFound").text()
     parts = "left display, right display, depth camera's pose"
-    assert found.startswith(f"3 not calibrated by handcal: {parts}; 5 not known or not made; ")
+    assert found.startswith(f"3 not calibrated by handcal: {parts}; 6 not known or not made; ")
     signs = child(wizard, QTreeWidget, "rigFindings")
     rows = [signs.topLevelItem(row) for row in range(signs.topLevelItemCount())]
     told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
