@@ -103,7 +103,7 @@ _RIG: Mapping[str, Entry] = {
         "rig_files",
     ),
     "depth": Entry(
-        "Check the depth camera against a board at several distances, and store it in a rig file.",
+        "Check depth and edges of the depth camera by a board, and store them in a rig file.",
         "rig_files",
     ),
     "display-check": Entry(
