@@ -20,8 +20,15 @@ from handcal.core.geometry import rotation_matrix, rotation_vector, transform
 from handcal.core.types import Bool, EyeShift, Float64
 from handcal.register.cut import CUT_BAND_M, common_cut
 from handcal.register.model import balance, balanced_turn, design, predict
+from handcal.register.opening import Opening, measure_opening
 from handcal.register.rcicp import best_rotation
-from handcal.register.rigid import RigidResult, RigidSettings, motion_covariance, register_rigid
+from handcal.register.rigid import (
+    RigidResult,
+    RigidSettings,
+    find_patches,
+    motion_covariance,
+    register_rigid,
+)
 from handcal.register.shape import ShapeChange, measure_shape_change
 from handcal.register.surface import (
     Indices,
@@ -54,7 +61,7 @@ _GAIN = 0.01
 _SAME_POINTS = 0.97
 # An error of φ, over the measured change of shape: which part of a bent hand is the hand, nobody
 # can tell. Fitted to pairs of frames of color_aligned_640 and _b.
-_SHAPE_SHARE = 1.35
+_SHAPE_SHARE = 1.6
 # Lower bound of a registration's error, whatever its residuals say, and the share of the hand's
 # movement by a rotation that becomes an error in every direction.
 _LEAST_SIGMA_M = 5e-5
@@ -87,7 +94,13 @@ class HandMatch:
     covariance: Float64
     """(6, 6); of `rigid`, see `motion_covariance`."""
     shape: ShapeChange
-    """From the hand to the cursor."""
+    """From the hand to the cursor, without the opening as far as that is known."""
+    opening: Opening
+    """Change of size from the hand to the cursor."""
+    opened: float
+    """Share of it that is expected."""
+    opening_sigma: float
+    """Standard deviation of the rest, as a share of the hand's size."""
     thinned_m: Float64
     """(K, 3); the hand's points within the common cut, thinned."""
     outline_m: Float64
@@ -129,20 +142,30 @@ def match_hands(
         is_common = transform(T_cursor_hand, hand_m) @ along <= limit_m
         near_cut |= cursor_m @ along > limit_m - CUT_BAND_M - spacing_m
     fine = register_rigid(hand, cursor, _FINE, T_cursor_hand)
+    patches = find_patches(hand)
+    opening = measure_opening(hand, cursor, fine, _FINE, patches)
+    shape = measure_shape_change(hand, cursor, fine, _FINE)
+    rest_m = shape.without_opening(1.0).rms_m
     T_cursor_hand = fine.T_target_source
     find = partial(_pairs, tree, near_cut, is_common, spacing_m)
     pairs = find(transform(T_cursor_hand, hand_m))
     partners = pairs[1][pairs[2]]
     paired_once = np.count_nonzero(np.bincount(partners, minlength=1))
+    same_points = bool(paired_once > _SAME_POINTS * len(partners))
+    # Of clouds that hold the same points, the fit to their pairs tells more of the size.
+    opened, opening_sigma = (0.0, 0.0) if same_points else opening.known(rest_m)
     return HandMatch(
         cursor_m=cursor_m,
         hand_m=hand_m,
         find_pairs=find,
         pairs=pairs,
-        same_points=bool(paired_once > _SAME_POINTS * len(partners)),
+        same_points=same_points,
         rigid=fine,
-        covariance=motion_covariance(fine.rows, hand, T_cursor_hand),
-        shape=measure_shape_change(hand, cursor, fine, _FINE),
+        covariance=motion_covariance(fine.rows, patches),
+        shape=shape.without_opening(opened),
+        opening=opening,
+        opened=opened,
+        opening_sigma=opening_sigma,
         thinned_m=hand.points_m,
         outline_m=outline_m,
     )
@@ -170,15 +193,19 @@ def fit_match(
     inliers, residuals_m = kept, np.where(kept, gap_m, np.nan)
     # All points of clouds that hold different points were moved by one motion: fewer say as much.
     hand_m = match.hand_m[kept] if match.same_points else match.thinned_m
-    paired = transform(T_E, hand_m)
-    R, unturned = _unturned(paired, transform(T_cursor @ match.rigid.T_target_source, hand_m))
+    seen_m = transform(T_E, hand_m)
+    # A hand of the cursor's size would be as much nearer or farther, over the same pixels.
+    paired = np.exp(match.opened * match.opening.log_size) * seen_m
+    T_fit = (1.0 - match.opened) * match.rigid.T_target_source
+    T_fit += match.opened * match.opening.T_target_source
+    R, unturned = _unturned(paired, transform(T_cursor @ T_fit, hand_m))
     turn = _measure_turn(match, T_E, R, paired)
     R_turned = rotation_matrix(turn.share * turn.turned_rad)
     outline_m = transform(T_cursor, match.outline_m)
     moved_m = _BALANCE_SHARE * balanced_turn(outline_m, R_turned, mean_point(unturned))
     unturned += moved_m
     rigid_fit_m, _ = _fit_pairs(unturned, paired, distance_m, history[0] / 3.0)
-    shift_m = balance(unturned, paired, rigid_fit_m, distance_m)
+    shift_m = balance(unturned, seen_m, rigid_fit_m, distance_m)
     aspect_m = shift_m - rigid_fit_m
     same_points = match.same_points
     if same_points:
@@ -258,7 +285,8 @@ def _covariance(
     Its parts: the registration's own; if the hand returned rotated by R, the unknown
     centre of that turn, which may be any point of the cloud and moves the centroid by (I - R)
     times its distance, and the movement (3,) by which the wearer is expected to have balanced it,
-    which is as far from either extreme; the change of the hand's shape; and a lower bound.
+    which is as far from either extreme; the change of the hand's shape and size; and a lower
+    bound.
     """
     R_E = T_E[:3, :3]
     R = rotation_matrix(np.sqrt(turn.share) * turn.turned_rad)
@@ -266,10 +294,14 @@ def _covariance(
     turned = lever @ turn.scatter_m2 @ lever.T
     least_m2 = _LEAST_SIGMA_M**2 + _TURNED_SHARE**2 * np.trace(turned)
     measured = match.covariance[3:, 3:] + _SHAPE_SHARE**2 * match.shape.scatter_m2
+    shifted_m = match.rigid.T_target_source[:3, :3] @ match.shape.shifted_m
+    measured += np.outer(shifted_m, shifted_m)
     displacement = R_E @ measured @ R_E.T + turned + least_m2 * np.eye(3)
     displacement += np.outer(moved_m, moved_m)
     # The rows are linear in the points: their mean is that of the middles.
     middle_m = np.array([mean_point(cursor_m), mean_point(hand_m)])
+    # A hand that is larger than expected was held as much farther from the eye.
+    displacement += match.opening_sigma**2 * np.outer(middle_m[1], middle_m[1])
     gain = np.linalg.inv(design(middle_m[:1], middle_m[1:], distance_m, exact=True)[0])
     return np.asarray(gain @ displacement @ gain.T, dtype=np.float64)
 

@@ -9,7 +9,7 @@ rigid motion of the nodes is no change of shape and is removed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import lapack
@@ -20,8 +20,16 @@ from handcal.core.frozen import brief, freeze
 from handcal.core.geometry import invert, transform
 from handcal.core.types import Float64
 from handcal.register.rcicp import best_rigid
-from handcal.register.rigid import RigidResult, RigidSettings, registration_rows, sums
-from handcal.register.surface import Indices, Surface, cube_means, mean_point
+from handcal.register.rigid import (
+    SIGMA_OF_MEDIAN,
+    RigidResult,
+    RigidSettings,
+    Rows,
+    distant,
+    registration_rows,
+    sums,
+)
+from handcal.register.surface import Indices, Surface, cube_means, mean_point, quantile
 
 _NODE_SPACING_M = 0.018
 _NODE_CUBE_M = 0.030
@@ -33,6 +41,13 @@ _STEPS = 2
 # Variance of the nodes over that of independent rows. Fitted to disjoint samples of real frames and
 # to simulated clouds (2.4 to 6.5).
 _NOISE_FACTOR = 4.5
+# A row inside the hand has half its weight at this gap, or so many standard deviations, and at this
+# distance of its points, or so many medians; more than in the registration, as fingers may move.
+_GAP_M, _GAP_SIGMAS = 0.015, 6.0
+_APART_M, _APART_MEDIANS = 0.020, 4.0
+# What the rows lack in weight holds their nodes in place, as so large a share of a row: parts that
+# only one cloud has follow the hand, and do not fly to the nearest part of the other.
+_HELD = 0.1
 # Nodes as near as this to the one that moved most are reported together.
 _REGION_M = 0.035
 # Places of a symmetric (3, 3) matrix, each of its pairs once.
@@ -53,6 +68,9 @@ class ShapeChange:
     """(3,); from the cursor's middle to its cut forearm; zero if none is cut."""
     noise_m: float
     """Root mean square that `moved_m` has without a change of shape."""
+    shifted_m: Float64
+    """(3,); how the middle of the cursor moves with the whole of the nodes, along the cursor's
+    axes: what the rows that the registration takes for outliers would add to it."""
 
     __repr__ = brief
 
@@ -60,6 +78,7 @@ class ShapeChange:
         freeze(self, "nodes_m", np.float64, None, 3)
         freeze(self, "moved_m", np.float64, None, 3)
         freeze(self, "toward_arm", np.float64, 3)
+        freeze(self, "shifted_m", np.float64, 3)
 
     @property
     def rms_m(self) -> float:
@@ -72,6 +91,12 @@ class ShapeChange:
         """(3, 3); mean of the products of the change's coordinates, their trace `rms_m` squared."""
         products = self.moved_m.T @ self.moved_m / len(self.moved_m)
         return np.asarray(products * (self.rms_m**2 / max(float(np.trace(products)), 1e-18)))
+
+    def without_opening(self, share: float) -> ShapeChange:
+        """Return the change without a share of its uniform change of size."""
+        out_m = self.nodes_m - self.nodes_m.mean(axis=0)
+        growth = np.vdot(self.moved_m, out_m) / max(np.vdot(out_m, out_m), 1e-18)
+        return replace(self, moved_m=self.moved_m - share * growth * out_m)
 
 
 def measure_shape_change(
@@ -102,17 +127,19 @@ def measure_shape_change(
             rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
         toward = T_hand_cursor[:3, :3].T @ rows.toward.T
         before_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - rows.gap_m
-        normal, wanted = _normal_equation(
-            shares, products, rows.index, toward, rows.weight, before_m
-        )
+        far_weight = _far_weight(rows, settings)
+        weight = rows.trust * far_weight
+        normal, wanted = _normal_equation(shares, products, rows.index, toward, weight, before_m)
         prior = len(rows.gap_m) / count * stiffness
+        lacking = np.bincount(rows.index, 1.0 - far_weight, len(points))
+        prior += _HELD * np.diag(shares.T @ lacking)
         for i in range(3):
             normal[i::3, i::3] += prior
         factor = _factor(normal)
         moved = lapack.dpotrs(factor, wanted)[0].reshape(-1, 3)
         point_moved = shares @ moved
     left_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - before_m
-    variance_m2 = _NOISE_FACTOR * float(rows.weight @ left_m**2 / rows.weight.sum())
+    variance_m2 = _NOISE_FACTOR * float(weight @ left_m**2 / weight.sum())
     # The trace of M⁻¹ (M - P) M⁻¹ with the normal matrix M and its part P from the prior, which is
     # the same for each coordinate.
     inverse = _inverse(factor)
@@ -125,7 +152,22 @@ def measure_shape_change(
         moved_m=transform(invert(T_moved), nodes + moved) - nodes,
         toward_arm=(mean_point(cut_m) if len(cut_m) else middle_m) - middle_m,
         noise_m=float(np.sqrt(variance_m2 * scatter / count)),
+        shifted_m=transform(T_moved, middle_m[None])[0] - middle_m,
     )
+
+
+def _far_weight(rows: Rows, settings: RigidSettings) -> Float64:
+    """Return the weights of rows, (N,), that decrease with what they are apart."""
+    apart = np.ones(len(rows.gap_m))
+    outline_m, inner_m = np.split(rows.distance_m, [rows.outlines])
+    if len(outline_m):
+        scale_m = max(settings.outlier_m, 3.0 * quantile(outline_m, 0.5))
+        apart[: rows.outlines] = (1.0 + (outline_m / scale_m) ** 2) ** 2
+    if len(inner_m):
+        apart[rows.outlines :] = distant(
+            np.abs(rows.gap_m[rows.outlines :]), _GAP_M, _GAP_SIGMAS * SIGMA_OF_MEDIAN
+        ) * distant(inner_m, _APART_M, _APART_MEDIANS)
+    return np.asarray(1.0 / apart)
 
 
 def _shares(nodes_m: Float64, points_m: Float64) -> tuple[Indices, Float64]:

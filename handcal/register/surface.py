@@ -25,6 +25,9 @@ _SPACING_NEIGHBOUR = 4
 # Number of cubes that a hand fills, over the product of its two largest standard deviations in
 # cubes, as measured for hands thinned to 500 to 1,500 points.
 _AREA = 22.0
+# A point whose 8th neighbour is this many times as far as that of most is no part of a surface. Of
+# clean clouds a few points at the thinnest tips are; removing so few is not worth the time.
+_STRAY_NEIGHBOUR, _STRAY, _FEW_STRAYS = 8, 2.0, 0.01
 # Least number of points away from cut edges for a registration.
 _LEAST_FREE = 10
 
@@ -61,7 +64,8 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
     is_cut : (N,) bool or None
         True beside a cut edge; None if cuts are unknown.
     max_points : int
-        A larger cloud is thinned to the means of cubes.
+        A larger cloud is thinned to the means of cubes. Of these, strays are dropped: a cube with
+        one outlier counts as much as one that is full of points.
 
     Raises
     ------
@@ -72,6 +76,11 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
     tree = KdTree(thinned)
     count = min(_NEIGHBOURS, len(thinned) - 1)
     index, distance_m2 = tree.batch_knn_search(thinned, count + 1)
+    is_stray = _strays(distance_m2)
+    if np.count_nonzero(is_stray) > _FEW_STRAYS * len(thinned):
+        thinned = thinned[~is_stray]
+        tree = KdTree(thinned)
+        index, distance_m2 = tree.batch_knn_search(thinned, count + 1)
     # Coordinates come first, so that NumPy works along rows of all points.
     around = np.ascontiguousarray(thinned.T).take(index[:, 1:].T.view(np.intp), axis=1)
     centroid = around.mean(axis=1)
@@ -100,6 +109,14 @@ def describe_surface(points_m: Float64, is_cut: Bool | None, max_points: int) ->
             spacing_m=spacing_m,
         )
     )
+
+
+def _strays(distance_m2: Float64) -> Bool:
+    """Return which points are far from their neighbours, (N,), from squared distances (N, K)."""
+    if distance_m2.shape[1] <= _STRAY_NEIGHBOUR:
+        return np.zeros(len(distance_m2), np.bool_)
+    apart_m2 = distance_m2[:, _STRAY_NEIGHBOUR]
+    return np.asarray(apart_m2 > _STRAY**2 * quantile(apart_m2, 0.5))
 
 
 def thin(points_m: Float64, max_points: int) -> Float64:
