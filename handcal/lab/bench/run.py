@@ -19,12 +19,14 @@ from handcal.lab.bench.peers import measure_peers
 from handcal.lab.bench.scale import measure_scale
 from handcal.lab.bench.settings import BenchSettings
 from handcal.lab.bench.speed import measure_speed
+from handcal.lab.bench.spoiled_clouds import measure_spoiled_clouds
 from handcal.lab.bench.trials import Measured
 from handcal.lab.bench.wearer import measure_wearer
 
 PARTS: dict[str, Callable[[BenchSettings, Progress], Measured]] = {
     "speed": measure_speed,
     "peers": measure_peers,
+    "spoiled": measure_spoiled_clouds,
     "delivery": measure_delivery,
     "wearer": measure_wearer,
     "cuts": measure_cuts,

@@ -30,6 +30,8 @@ class BenchSettings:
     """Sizes of the clouds registered beside other libraries; the middle one is the usual one."""
     peer_trials: int = 48
     """Alignments of each size for these."""
+    spoiled_pairs: int = 60
+    """Pairs of clouds with outliers or missing parts, for each condition."""
     offline_rigs: int = 1
     """Rigs calibrated from rendered photographs, which takes minutes for each."""
     offline_wearers: int = 100
@@ -51,6 +53,7 @@ QUICK = BenchSettings(
     paper_repeats=1,
     peer_points=(500, 1000, 2000),
     peer_trials=1,
+    spoiled_pairs=1,
     offline_rigs=0,
     camera_wearers=0,
     study_trials=0,
