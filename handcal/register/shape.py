@@ -37,13 +37,15 @@ _NODE_CUBE_M = 0.030
 _NODES_PER_POINT = 4
 # Weight of the prior that neighbouring nodes move together, against the pairs of one node.
 _STIFFNESS = 0.1
-_STEPS = 2
+# Steps, and those of a hand of which a part has moved so far, rms, that its rows weigh little at
+# first.
+_STEPS, _MOST_STEPS, _LARGE_M = 2, 4, 0.002
 # Variance of the nodes over that of independent rows. Fitted to disjoint samples of real frames and
 # to simulated clouds (2.4 to 6.5).
 _NOISE_FACTOR = 4.5
 # A row inside the hand has half its weight at this gap, or so many standard deviations, and at this
 # distance of its points, or so many medians; more than in the registration, as fingers may move.
-_GAP_M, _GAP_SIGMAS = 0.015, 6.0
+_GAP_M, _GAP_SIGMAS = 0.012, 6.0
 _APART_M, _APART_MEDIANS = 0.020, 4.0
 # What the rows lack in weight holds their nodes in place, as so large a share of a row: parts that
 # only one cloud has follow the hand, and do not fly to the nearest part of the other.
@@ -121,7 +123,9 @@ def measure_shape_change(
     stiffness = _STIFFNESS * _laplacian(nodes) + 1e-4 * np.eye(count)
     moved: Float64 = np.zeros((count, 3))
     point_moved: Float64 = np.zeros_like(points)
-    for step in range(_STEPS):
+    for step in range(_MOST_STEPS):
+        if step >= _STEPS and np.vdot(moved, moved) < count * _LARGE_M**2:
+            break
         if step:
             bent = points + point_moved
             rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)

@@ -20,6 +20,7 @@ from handcal.register.rcicp import best_rigid
 from handcal.register.shape import ShapeChange, change_text
 from handcal.sim.hand import HandSettings, make_hand
 from handcal.sim.raster import visible_points
+from tests.register.real_clouds import halves, read_clouds
 
 T_D_HAND = rigid([0.1, 0.1, 0.05], [0.0, 0.02, 0.5])
 LIMIT_M = GuardSettings().shape_limit_m
@@ -109,3 +110,36 @@ def test_real_hands_change_as_their_joints_do(shared_data: Path) -> None:
             change = guard.shape_change(transform(invert(T), hand_m), hand_cut)
             by_surface.append(change.rms_m)
     assert np.corrcoef(by_joints, by_surface)[0, 1] > 0.8
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_outliers_are_no_change_of_shape(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    hand_m, is_cut = seen(seed, 0.05)
+    stray_m = rng.uniform(hand_m.min(axis=0), hand_m.max(axis=0), (len(hand_m) // 20, 3))
+    spoiled = np.vstack([hand_m, stray_m]), np.append(is_cut, np.zeros(len(stray_m), np.bool_))
+    assert RotationGuard(*seen(seed, 0.03)).shape_change(*spoiled).rms_m < 0.0008
+
+
+@pytest.mark.parametrize("away_m", [0.03, 0.05])
+def test_a_clump_that_only_the_cursor_has_is_no_change_of_shape(away_m: float) -> None:
+    """Its node moved by centimetres to the nearest part of the hand, and counted as a finger."""
+    rng = np.random.default_rng(0)
+    cursor_m, is_cut = seen(1, 0.03)
+    beside_m = cursor_m[np.argmax(cursor_m[:, 0])] + [away_m, 0.0, away_m]
+    clump_m = beside_m + rng.normal(0.0, 0.004, (120, 3))
+    guard = RotationGuard(
+        np.vstack([cursor_m, clump_m]), np.append(is_cut, np.zeros(len(clump_m), np.bool_))
+    )
+    assert guard.shape_change(*seen(1, 0.05)).rms_m < 0.0008
+
+
+def test_halves_of_real_frames_have_not_changed(shared_data: Path) -> None:
+    """Of the frame with the longest tail, and of others."""
+    for name, every in (("sr300_320", 7), ("color_aligned_640_b", 3)):
+        for number, (_, cloud) in enumerate(read_clouds(shared_data / "rgbd" / name, every)):
+            for draw in range(8):
+                rng = np.random.default_rng([number, draw])
+                (cursor_m, cursor_cut), hand = halves(rng, cloud)
+                change = RotationGuard(cursor_m, cursor_cut).shape_change(*hand)
+                assert change.rms_m < 0.0015

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from small_gicp import KdTree
 
 from handcal.core.errors import HandError
 from handcal.core.geometry import rigid, transform
@@ -16,6 +17,8 @@ from handcal.register.surface import (
     thin,
     thinnest,
 )
+from handcal.sim.hand import make_hand
+from handcal.sim.raster import visible_points
 
 PITCH_M = 0.003
 SIZE = 40
@@ -149,3 +152,16 @@ def test_thinning_does_not_depend_on_the_frame(pose: tuple[float, ...]) -> None:
     once, again = thin(cloud_m, 400), thin(transform(T, cloud_m), 400)
     np.testing.assert_allclose(again, transform(T, once), atol=1e-9)
     assert 200 < len(once) < 700
+
+
+def test_strays_are_dropped() -> None:
+    """An outlier fills a cube of its own, which would count as much as one of the hand's."""
+    rng = np.random.default_rng(0)
+    T_D_hand = rigid([0.1, 0.1, 0.0], [0.0, 0.0, 0.5])
+    hand_m, is_cut = visible_points(make_hand(1), T_D_hand, 5000, rng)
+    stray_m = rng.uniform(hand_m.min(axis=0), hand_m.max(axis=0), (250, 3))
+    flags = np.append(is_cut, np.zeros(len(stray_m), np.bool_))
+    surface = describe_surface(np.vstack([hand_m, stray_m]), flags, 1000)
+    apart_m, _ = nearest(KdTree(hand_m), surface.points_m)
+    # All of them would be a fifth of the surface.
+    assert np.mean(apart_m > 0.015) < 0.05
