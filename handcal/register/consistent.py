@@ -142,7 +142,7 @@ def match_hands(
         is_common = transform(T_cursor_hand, hand_m) @ along <= limit_m
         near_cut |= cursor_m @ along > limit_m - CUT_BAND_M - spacing_m
     fine = register_rigid(hand, cursor, _FINE, T_cursor_hand)
-    patches = find_patches(hand)
+    patches = find_patches(hand, fine.T_target_source)
     opening = measure_opening(hand, cursor, fine, _FINE, patches)
     shape = measure_shape_change(hand, cursor, fine, _FINE)
     rest_m = shape.without_opening(1.0).rms_m
@@ -161,7 +161,7 @@ def match_hands(
         pairs=pairs,
         same_points=same_points,
         rigid=fine,
-        covariance=motion_covariance(fine.rows, patches),
+        covariance=motion_covariance(fine.rows, hand, T_cursor_hand, patches),
         shape=shape.without_opening(opened),
         opening=opening,
         opened=opened,

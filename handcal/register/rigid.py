@@ -246,22 +246,27 @@ def registration_rows(
     )
 
 
-def find_patches(source: Surface) -> Patches:
+def find_patches(source: Surface, T_target_source: Float64) -> Patches:
     """Return the patch of each of a surface's points, within which errors count as one."""
-    centres = cube_means(source.points_m, _PATCH_M)
-    return Patches(nearest(KdTree(centres), source.points_m)[1], len(centres))
+    moved = transform(T_target_source, source.points_m)
+    centres = cube_means(moved, _PATCH_M)
+    return Patches(nearest(KdTree(centres), moved)[1], len(centres))
 
 
-def motion_covariance(rows: Rows, patches: Patches) -> Float64:
+def motion_covariance(
+    rows: Rows, source: Surface, T_target_source: Float64, patches: Patches | None = None
+) -> Float64:
     """Return the covariance (6, 6) of a registration: rotation about the mean, and translation.
 
     Parameters
     ----------
     rows : Rows
-        Of the registration.
-    patches : Patches
-        Of its source's points.
+    source : Surface
+    T_target_source : (4, 4) float64
+    patches : Patches, optional
+        Of `find_patches`, if they are known.
     """
+    patches = patches or find_patches(source, T_target_source)
     return solve_rows(rows, rows.jacobian, patches, np.zeros(6))[1]
 
 
