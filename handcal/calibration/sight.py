@@ -15,7 +15,7 @@ from handcal.core.types import CameraIdentity, Frame, HandCloud, Rig
 from handcal.hand.outline import with_outline
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
-from handcal.rig.edges import edges_of
+from handcal.hand.edges import edges_of
 
 
 class Sight:

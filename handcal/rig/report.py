@@ -22,7 +22,7 @@ from handcal.core.types import (
     RigPart,
 )
 from handcal.report.cells import signed
-from handcal.rig.edges import edges_of
+from handcal.hand.edges import edges_of
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0
