@@ -14,7 +14,7 @@ a millimetre for their coarse images."""
 _STRUCTURED_LIGHT = DepthEdges(fatten_px=-0.5, sigma_px=1.0, source="typical")
 """Each pixel decodes the pattern alone, but the projector's shadow and the blur of its stripes
 remove or add a pixel."""
-_UNKNOWN = DepthEdges(fatten_px=1.5, sigma_px=1.2, source="typical")
+_UNKNOWN = DepthEdges(fatten_px=1.8, sigma_px=0.8, source="typical")
 """Most likely a stereo camera."""
 
 _BY_MODEL = {
@@ -31,9 +31,16 @@ _BY_MODEL = {
 }
 
 
-def edges_of(rig: Rig) -> DepthEdges:
-    """Return the measured edges of a rig's depth camera, or those typical of its model."""
+def edges_of(rig: Rig, live_model: str = "") -> DepthEdges:
+    """Return the measured edges of a rig's depth camera, or those typical of its model.
+
+    Parameters
+    ----------
+    rig : Rig
+    live_model : str
+        Model of the connected camera, for a rig that names none.
+    """
     if rig.depth_edges is not None:
         return rig.depth_edges
-    model = rig.depth_camera.model.lower()
+    model = (rig.depth_camera.model or live_model).lower()
     return next((edges for part, edges in _BY_MODEL.items() if part in model), _UNKNOWN)

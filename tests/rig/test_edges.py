@@ -30,7 +30,9 @@ def test_the_outermost_pixels_of_others_lie_half_a_pixel_inside(model: str) -> N
     assert of_model(model).fatten_px == -0.5
 
 
-def test_an_unknown_camera_is_the_least_certain() -> None:
-    known = of_model("Intel RealSense D455"), of_model("Azure Kinect"), of_model("SR305")
-    assert of_model("").sigma_px > max(one.sigma_px for one in known)
-    assert of_model("Something new") == of_model("")
+def test_an_unknown_camera_is_most_likely_a_stereo_camera_but_less_certain() -> None:
+    """It may be wrong by several times that, too, as nobody measured it (test_sitting.py)."""
+    stereo, unknown = of_model("Intel RealSense D455"), of_model("")
+    assert unknown.fatten_px == stereo.fatten_px
+    assert unknown.sigma_px > max(stereo.sigma_px, of_model("Azure Kinect").sigma_px)
+    assert of_model("Something new") == unknown
