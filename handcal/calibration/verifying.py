@@ -26,6 +26,8 @@ from handcal.session.journal import Event
 from handcal.session.state import VERIFYING, SessionEvent
 
 SKIPPED = "verification_skipped"
+_OFFSET_ARCMIN = 8.0, 12.0
+_OFFSET_SIZE = 0.015, 0.025
 _ENDS = (
     SKIPPED,
     "cursor_made",
@@ -51,6 +53,8 @@ class VerifyingView:
     can_redo: bool
     began_host_ns: int = 0
     """Time of its first frame; 0 if it was resumed."""
+    is_set_aside: bool = False
+    """True if the program has moved the drawing aside, for the wearer to bring it back."""
 
 
 class Verifying:
@@ -71,7 +75,9 @@ class Verifying:
     Attributes
     ----------
     moved : NudgeSum
-        All movement so far.
+        All movement by the wearer and the technician so far.
+    offset : NudgeSum
+        Movement by the program, for the wearer to bring the drawing back.
     shift_m : (3,) float64
         φ with it.
     fits : Nudge or None
@@ -91,7 +97,7 @@ class Verifying:
         self.request = request
         self.before_m = before_m
         self.hand_E_m = hand_E_m
-        self.moved = NudgeSum()
+        self.moved = self.offset = NudgeSum()
         self.shift_m = before_m
         self.fits: Nudge | None = None
         self.refusal = ""
@@ -117,6 +123,7 @@ class Verifying:
             can_undo=bool(self._done),
             can_redo=bool(self._undone),
             began_host_ns=self._began_host_ns,
+            is_set_aside=self.offset != NudgeSum(),
         )
 
     def nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
@@ -164,6 +171,21 @@ class Verifying:
             return "Hold your hand still, and confirm again."
         return hand
 
+    @property
+    def is_moved(self) -> bool:
+        """True if somebody has moved the drawing: only then is it evidence that it fits."""
+        return self.moved != NudgeSum()
+
+    @property
+    def needs_proof(self) -> bool:
+        """True if the drawing must be set aside before a confirmation counts."""
+        return not self.is_moved and self.offset == NudgeSum()
+
+    def set_aside(self, offset: NudgeSum) -> None:
+        """Move the drawing aside; ValueError if it is moved too far."""
+        self.offset = offset
+        self._draw(self.moved)
+
     def undo(self) -> None:
         """Undo the last nudge; ValueError if there is none."""
         if not self._done:
@@ -177,14 +199,17 @@ class Verifying:
             raise ValueError("there is no nudge to redo")
         self._move(self._undone.pop())
 
-    def result(self, hand_E_m: Float64) -> Verification:
-        """Return the verification, with the hand where it was when the drawing fitted."""
+    def result(self, hand_E_m: Float64, outline_sigma_px: float) -> Verification:
+        """Return the verification, with the hand and its outline when the drawing fitted."""
         return Verification(
             before_m=_triple(self.before_m),
             nudge_arcmin=(self.moved.right_arcmin, self.moved.down_arcmin),
             nudge_size=self.moved.size,
             after_m=_triple(self.shift_m),
             hand_E_m=_triple(hand_E_m),
+            offset_arcmin=(self.offset.right_arcmin, self.offset.down_arcmin),
+            offset_size=self.offset.size,
+            outline_sigma_px=outline_sigma_px,
         )
 
     def event(self) -> dict[str, Any]:
@@ -195,6 +220,8 @@ class Verifying:
             "hand_E_m": list(_triple(self.hand_E_m)),
             "nudge_arcmin": [self.moved.right_arcmin, self.moved.down_arcmin],
             "nudge_size": self.moved.size,
+            "offset_arcmin": [self.offset.right_arcmin, self.offset.down_arcmin],
+            "offset_size": self.offset.size,
         }
 
     def _move(self, moved: NudgeSum) -> None:
@@ -203,13 +230,14 @@ class Verifying:
         self._done.append(before)
 
     def _draw(self, moved: NudgeSum) -> None:
+        total = moved.plus(self.offset.right_arcmin, self.offset.down_arcmin, self.offset.size)
         self.shift_m = nudged_shift_m(
             self._display,
             self.before_m,
             self.hand_E_m,
-            moved.right_arcmin,
-            moved.down_arcmin,
-            moved.size,
+            total.right_arcmin,
+            total.down_arcmin,
+            total.size,
         )
         self.moved = moved
         self.fits = None
@@ -219,6 +247,19 @@ def hand_centre_E_m(rig: Rig, eye: Eye, hand: PlacedHand) -> Float64:
     """Return the centre (3,) of a hand in an eye's E."""
     T_E_W = view_of_eye(rig.eyes[eye], hand.T_W_D @ invert(rig.T_H_D))
     return np.asarray(transform(T_E_W, hand.points_W_m).mean(axis=0))
+
+
+def draw_offset(rng: np.random.Generator) -> NudgeSum:
+    """Draw the movement of a drawing that fits, so that the wearer shows it by bringing it back.
+
+    It is several times what a wearer overlooks, in any direction, with a growth either way.
+    """
+    distance_arcmin, angle_rad = rng.uniform(*_OFFSET_ARCMIN), rng.uniform(0.0, 2.0 * np.pi)
+    return NudgeSum(
+        float(distance_arcmin * np.cos(angle_rad)),
+        float(distance_arcmin * np.sin(angle_rad)),
+        float(rng.choice([-1.0, 1.0]) * rng.uniform(*_OFFSET_SIZE)),
+    )
 
 
 def new_id() -> int:
@@ -243,6 +284,8 @@ def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Veri
             for name in ("before_m", "hand_E_m")
         )
         verifying = Verifying(VerifyRequest(new_id(), eye), displays[eye], before_m, hand_E_m)
+        aside = *last.data.get("offset_arcmin", (0.0, 0.0)), last.data.get("offset_size", 0.0)
+        verifying.set_aside(NudgeSum(*aside))
         right_arcmin, down_arcmin = last.data["nudge_arcmin"]
         verifying.nudge(right_arcmin, down_arcmin, last.data["nudge_size"])
     except (KeyError, TypeError, ValueError):
@@ -267,6 +310,14 @@ def verify_prompt(eye: Eye) -> str:
         f"Keep your hand up and still, and close your {other} eye. Move the outline with the "
         "arrow keys until it covers your hand, then confirm."
     )
+
+
+SET_ASIDE_PROMPT = (
+    "The outline was moved aside, to see that it is brought back. Move it until it covers your "
+    "hand, then confirm."
+)
+"""Shown to a wearer who has moved nothing."""
+UNMOVED_PROMPT = "The outline was not moved back, so this eye is not verified."
 
 
 def _triple(values_m: Float64) -> tuple[float, float, float]:

@@ -250,6 +250,8 @@ class Alignment:
     time_sigma_m: float = 0.0
     """Standard deviation of the hand's place because the times of frames and confirmation are not
     exact."""
+    outline_sigma_px: float | None = None
+    """`HandCloud.outline_sigma_px` of the cursor as drawn; None: as the rig's `DepthEdges` say."""
 
     __repr__ = brief
 
@@ -259,6 +261,8 @@ class Alignment:
         freeze(self, "cursor_is_cut", np.bool_, len(self.cursor_m))
         freeze(self, "hand_is_cut", np.bool_, len(self.hand_m))
         freeze(self, "rotation_rad", np.float64, 3)
+        if self.outline_sigma_px is not None and not 0.0 <= self.outline_sigma_px < np.inf:
+            raise ValueError(f"Alignment.outline_sigma_px: {self.outline_sigma_px} is no σ")
         poses = {eye: readonly(T, np.float64, (4, 4)) for eye, T in self.T_E_W.items()}
         object.__setattr__(self, "T_E_W", MappingProxyType(poses))
         shifts = {eye: readonly(m, np.float64, (3,)) for eye, m in self.drawn_shift_m.items()}
@@ -316,7 +320,7 @@ class EyeShift:
 
 
 def phi_text(shift: EyeShift) -> str:
-    """Return φ ± σ in one line: ``φ = (+3.16 ± 1.29, -4.42 ± 0.92, +0.99 ± 1.86) mm``."""
+    """Return φ ± σ in one line: ``φ = (+4.20 ± 1.14, -4.39 ± 0.96, +0.91 ± 2.54) mm``."""
     return f"φ = ({', '.join(_coordinates_mm(shift))}) mm"
 
 
@@ -367,8 +371,18 @@ class Verification:
     """Relative growth of the drawing by the wearer."""
     hand_E_m: tuple[float, float, float] | None = None
     """Centre of the hand then, in the eye's E; None if unknown: it is then not fused."""
+    offset_arcmin: tuple[float, float] = (0.0, 0.0)
+    offset_size: float = 0.0
+    """Movement and growth by the program, for the wearer to bring the drawing back."""
+    outline_sigma_px: float | None = None
+    """Of the outline as drawn; as in `Alignment`."""
     earlier: tuple[Verification, ...] = ()
     """Verifications of the same eye before this one, oldest first; each is fused as well."""
+
+    @property
+    def was_moved(self) -> bool:
+        """False if the wearer moved nothing: this says nothing about the eye."""
+        return any(self.nudge_arcmin) or self.nudge_size != 0.0
 
     def after(self, former: Verification | None) -> Verification:
         """Return this verification with a former one, if any, among the earlier ones."""

@@ -15,6 +15,7 @@ from functools import cache
 import cv2
 import numpy as np
 
+from handcal.camera.radial import is_not_wrapped, white_brightness
 from handcal.core.types import Float32, Float64, Intrinsics, UInt16
 
 SIDE_PX = 512
@@ -22,6 +23,9 @@ _MIDDLE_PX = 257.0
 _FOCAL_PX = 252.0
 _CUBIC = 0.0708
 _INVALID = 4090
+# Of a hand, and of the room behind it.
+_WALL_M = 1.2
+_SKIN, _WHITE = 0.55, 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +101,49 @@ def sense_distance(
     distance_m = z_m * np.sqrt(1.0 + np.square(rays).sum(axis=2))
     returned = settings.white * look(shaded) / np.square(np.maximum(distance_m, 0.05))
     returned[z_m <= 0.0] = 0.0
+    return _by_phase(distance_m, returned, rng, settings)
+
+
+def sense_depth_by_phase(
+    depth_m: Float32, intrinsics: Intrinsics, rng: np.random.Generator, settings: AhatSettings
+) -> UInt16:
+    """Return the depth that such a camera measures with the lens of a pinhole camera.
+
+    Parameters
+    ----------
+    depth_m : (H, W) float32
+        Positive everywhere.
+    intrinsics : Intrinsics
+        Its distortion is ignored.
+    rng : numpy.random.Generator
+    settings : AhatSettings
+
+    Returns
+    -------
+    (H, W) uint16
+        In units of 1 / `settings.units_per_m`; 0 where there is no measurement.
+    """
+    x = (np.arange(intrinsics.width, dtype=np.float32) - intrinsics.cx) / intrinsics.fx
+    y = (np.arange(intrinsics.height, dtype=np.float32) - intrinsics.cy) / intrinsics.fy
+    along = np.sqrt(1.0 + np.square(x) + np.square(y)[:, None]).astype(np.float32)
+    reflectance = np.where(depth_m < _WALL_M, _SKIN, _WHITE).astype(np.float32)
+    distance_m = depth_m * along
+    returned = settings.white * reflectance * _facing(depth_m, intrinsics) / np.square(distance_m)
+    units, brightness = _by_phase(distance_m, returned, rng, settings)
+    found_m = (units / settings.units_per_m).astype(np.float32)
+    bright = brightness.astype(np.float32)
+    is_near = is_not_wrapped(found_m, bright, settings.alias_m, white_brightness(found_m, bright))
+    is_near &= units < _INVALID
+    return np.where(is_near, np.rint(units / along), 0.0).astype(np.uint16)
+
+
+def _by_phase(
+    distance_m: Float64 | Float32,
+    returned: Float64 | Float32,
+    rng: np.random.Generator,
+    settings: AhatSettings,
+) -> tuple[UInt16, UInt16]:
+    """Return distance and brightness of surfaces by the phase of their light, which adds up."""
     phase = 2.0 * np.pi / settings.alias_m * (distance_m + settings.offset_m)
     parts = np.dstack([returned * np.cos(phase), returned * np.sin(phase)])
     parts = np.asarray(cv2.GaussianBlur(parts, (0, 0), settings.blur_px), np.float64)

@@ -13,12 +13,13 @@ from handcal.core.errors import CameraError, CameraTimeoutError
 from handcal.core.geometry import invert, rigid
 from handcal.core.types import CameraIdentity, Frame, Intrinsics
 from handcal.io.closable import Closable
+from handcal.sim.ahat import AhatSettings, sense_depth_by_phase
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import D415
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
-from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.sim.sensor import D415_FATTEN_PX, SensorName, SensorSettings, sense_depth
 
 _POLL_S = 0.002
 # What rendering takes longer is the computer's doing, of which a camera knows nothing: if it
@@ -41,7 +42,7 @@ class SyntheticSettings:
     clock_offset_s: float = 123.456
     clock_drift: float = 20e-6
     """The camera's clock shows ``(1 + clock_drift) t + clock_offset_s`` at host time t."""
-    sensor: SensorSettings = field(default_factory=SensorSettings)
+    sensor: SensorSettings | AhatSettings = field(default_factory=SensorSettings)
     freeze_after_s: float = np.inf
     """Fault: from this time on every frame repeats the last picture, with running time stamps."""
     late_s: float = 0.0
@@ -50,6 +51,16 @@ class SyntheticSettings:
     """Fault: another camera, whose focal length is that of `depth_intrinsics` times this."""
     depth_bias_m: float = 0.0
     """Fault: added to every measured depth."""
+
+
+def sensor_settings(
+    name: SensorName, fatten_px: float | None = None
+) -> SensorSettings | AhatSettings:
+    """Return the settings of a sensor; `fatten_px` replaces how much a D415's edges grow."""
+    if name == "ahat":
+        return AhatSettings()
+    usual = D415_FATTEN_PX if name == "d415" else 0.0
+    return SensorSettings(fatten_px=usual if fatten_px is None else fatten_px)
 
 
 CAMERA_FAULTS: Mapping[str, SyntheticSettings] = {
@@ -159,13 +170,19 @@ class SyntheticCamera(Closable):
             color_intrinsics, T_C_D = _COLOR, _T_C_D
             _, color = render(world, state.T_W_D @ invert(T_C_D), state.T_W_hand, _COLOR)
         biased_m = np.where(depth_m > 0.0, depth_m + settings.depth_bias_m, depth_m)
-        depth = sense_depth(biased_m, self.depth_intrinsics.fx, self._rng, settings.sensor)
+        sensor = settings.sensor
+        if isinstance(sensor, AhatSettings):
+            scale_m = 1.0 / sensor.units_per_m
+            depth = sense_depth_by_phase(biased_m, self.depth_intrinsics, self._rng, sensor)
+        else:
+            scale_m = sensor.depth_scale_m
+            depth = sense_depth(biased_m, self.depth_intrinsics.fx, self._rng, sensor)
         frame = Frame(
             index=self._index,
             t_camera_ns=self._camera_ns(state),
             t_host_ns=_arrival_ns(state),
             depth=depth,
-            depth_scale_m=settings.sensor.depth_scale_m,
+            depth_scale_m=scale_m,
             depth_intrinsics=self.depth_intrinsics,
             color=color,
             color_intrinsics=color_intrinsics,

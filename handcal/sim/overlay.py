@@ -11,10 +11,12 @@ from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, rigid, transform
 from handcal.core.types import EYES, Alignment, Bool, Eye, Float64, Rig
 from handcal.sim.hand import HandModel
-from handcal.sim.placement import PlacementError, apply_placement_error, overlay_hand, view_through
+from handcal.sim.placement import PlacementError, apply_placement_error
 from handcal.sim.raster import visible_points
+from handcal.sim.silhouette import overlay_outline, silhouette, view_outline
 
 _FOREARM_M = 0.04
+_FEWEST_POINTS = 20
 # Position of the raised palm and its spread, so that it is on both displays.
 _PALM_H_M = np.array([0.0, 0.088, 0.51])
 _PALM_SPREAD_M = np.array([0.015, 0.006, 0.025])
@@ -82,19 +84,25 @@ def overlay_by_eye(
     palm_m = _PALM_H_M + rng.uniform(-1.0, 1.0, 3) * _PALM_SPREAD_M
     T_H_raised = rigid(rng.normal(0.0, _PALM_TURN_RAD, 3), palm_m)
     cursor_m, cursor_is_cut = see(T_H_raised)
+    viewpoints_m = [invert(view_of_eye(rig.eyes[eye], np.eye(4)))[:3, 3] for eye in true_shift_m]
+    # Drawn without a camera's faults: what an eye at the viewpoints sees of the raised hand.
+    seen_from_m = transform(invert(T_H_raised), np.mean(viewpoints_m, axis=0)[None])[0]
+    rim = silhouette(hand, seen_from_m)
+    on_hand = (rim.points_m - hand.wrist_m) @ hand.arm_axis <= _FOREARM_M
     views = [
-        view_through(
+        view_outline(
             worn.eyes[eye],
             shift_m,
             np.eye(4),
             projection_matrix(rig.eyes[eye], drawn_m[eye]) @ worn.eyes[eye].T_V_H,
-            cursor_m,
+            transform(T_H_raised, rim.points_m[on_hand]),
+            rim.normals[on_hand] @ T_H_raised[:3, :3].T,
         )
         for eye, shift_m in true_shift_m.items()
     ]
     turned = T_H_raised @ rigid(placement_error.rotation_rad)
-    placed = overlay_hand(transform(invert(T_H_raised), cursor_m), turned, views)
-    if placed is None:
+    placed = overlay_outline(hand, turned, views)
+    if placed is None or len(cursor_m) < _FEWEST_POINTS:
         raise HandcalError(
             "with this rig, a hand raised half a metre from the headset is not on the displays, "
             "or the depth camera does not see it: check the rig file"

@@ -13,14 +13,30 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from handcal.core.geometry import rigid
 from handcal.core.types import Bool, Float64
 from handcal.sim.hand import HandModel
 from handcal.sim.placement import PlacementError
+from handcal.sim.verifying import SeenDifference
 from handcal.sim.wearer import draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
 
 Variant: TypeAlias = Literal[
-    "plain", "fingers-only", "palm-only", "by-distance", "heavy-tails", "drift", "late-presses"
+    "plain",
+    "fingers-only",
+    "palm-only",
+    "by-distance",
+    "heavy-tails",
+    "drift",
+    "late-presses",
+    "fits-at-once",
+    "opens",
+    "known-fat-2mm",
+    "unmeasured",
+    "fat-2mm",
+    "fat-1mm",
+    "constant-size",
+    "constant-direction",
 ]
 VARIANTS: tuple[Variant, ...] = get_args(Variant)
 
@@ -34,7 +50,14 @@ LATE_S = 0.3
 LEAVING_M_S = 0.0084
 """Standard deviation of the velocity along each axis of a hand meanwhile: 2.5 mm in 0.3 s in the
 laser recordings, whose arms were stretched and not supported."""
+CONSTANT_SIZE = 0.01
+"""By how much larger those with a constant error of size see the hand."""
+CONSTANT_ARCMIN = 4.0
+"""Distance beside the hand at which those with a constant error of direction see it."""
+_RIGHT = SeenDifference(0.0, 0.0, 0.0)
+_OPENING = 0.01, 0.03
 _OFTEN, _FAR_OFF = 0.1, 3.0
+_ARCMIN = np.radians(1.0 / 60.0)
 _SAME_AT_M = 0.56
 
 
@@ -48,6 +71,8 @@ class Sitting:
     """The part of every error of an overlay that stays the same."""
     perceived_bias: Float64
     """(3,); the same of a verification, right, down and size, in standard deviations."""
+    sees_hand: SeenDifference = _RIGHT
+    """The hand as this person sees it, relative to where, and how large, it is."""
 
 
 def begin_sitting(
@@ -61,12 +86,20 @@ def begin_sitting(
         rotation_sigma_rad=scale * settings.rotation_sigma_rad,
     )
     bias = draw_placement_error(rng, scaled)
+    sees_hand = _RIGHT
+    if variant == "constant-size":
+        sees_hand = SeenDifference(0.0, 0.0, CONSTANT_SIZE)
+    elif variant == "constant-direction":
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        right, down = CONSTANT_ARCMIN * np.cos(angle), CONSTANT_ARCMIN * np.sin(angle)
+        sees_hand = SeenDifference(right, down, 0.0)
     share = SITTING_SHARE if variant == "drift" else 0.0
     return Sitting(
         variant,
         scaled,
         _times(np.sqrt(share), replace(bias, rotation_rad=np.zeros(3))),
         np.sqrt(share) * rng.normal(size=3),
+        sees_hand,
     )
 
 
@@ -92,6 +125,33 @@ def draw_error(
     )
 
 
+def misplaced(T_H_hand: Float64, eye_m: Float64, sees_hand: SeenDifference) -> Float64:
+    """Return the pose of a hand that seems to be at a pose to someone who sees it wrongly.
+
+    Who sees the hand to the right of where it is holds it to the left, and who sees it larger
+    holds it farther away.
+
+    Parameters
+    ----------
+    T_H_hand : (4, 4) float64
+    eye_m : (3,) float64
+    sees_hand : SeenDifference
+    """
+    line_m = T_H_hand[:3, 3] - eye_m
+    x, y, z = line_m
+    moved_m = np.array([x, y, z]) * sees_hand.size
+    moved_m -= z * _ARCMIN * np.array([sees_hand.right_arcmin, sees_hand.down_arcmin, 0.0])
+    return rigid(translation_m=moved_m) @ T_H_hand
+
+
+def opened(rng: np.random.Generator, hand: HandModel, sitting: Sitting) -> HandModel:
+    """Return the hand as it is held under a cursor: opened since, of those whose hand opens."""
+    if sitting.variant != "opens":
+        return hand
+    larger = np.float32(1.0 + rng.uniform(*_OPENING))
+    return replace(hand, vertices_m=larger * hand.vertices_m)
+
+
 def draw_movement_m(rng: np.random.Generator, sitting: Sitting) -> Float64:
     """Draw the movement of the hand, (3,), from being right to being measured."""
     if sitting.variant == "drift":
@@ -114,8 +174,8 @@ def is_balanced(points_m: Float64, hand: HandModel, sitting: Sitting) -> Bool:
 
 def draw_perception(
     rng: np.random.Generator, sitting: Sitting, lateral_arcmin: float, size: float
-) -> tuple[Float64, float]:
-    """Draw the error of a verification: right and down in arcmin, and relative size.
+) -> SeenDifference:
+    """Draw the error of a verification.
 
     Parameters
     ----------
@@ -132,7 +192,12 @@ def draw_perception(
     if sitting.variant == "drift":
         own *= np.sqrt(1.0 - SITTING_SHARE)
     right, down, larger = scale * (own + sitting.perceived_bias)
-    return lateral_arcmin * np.array([right, down]), size * float(larger)
+    always = sitting.sees_hand
+    return SeenDifference(
+        lateral_arcmin * float(right) + always.right_arcmin,
+        lateral_arcmin * float(down) + always.down_arcmin,
+        size * float(larger) + always.size,
+    )
 
 
 def _times(factor: float, error: PlacementError) -> PlacementError:

@@ -7,11 +7,18 @@ from the disparity d = f B / z to the right imager, so that σz = z² σd / (f B
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
 
 import cv2
 import numpy as np
+from scipy.special import ndtri
 
 from handcal.core.types import Bool, Float32, UInt16
+
+SensorName: TypeAlias = Literal["d415", "ahat", "exact"]
+SENSORS: tuple[SensorName, ...] = get_args(SensorName)
+"""A stereo camera with its faults at edges, a time-of-flight camera, and a stereo camera whose
+edges are where those of the hand are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +39,9 @@ class SensorSettings:
     edge_hole_ratio: float = 0.35
     edge_flying_ratio: float = 0.15
     """Shares of the pixels in that band without depth, and with a depth in between."""
-    fatten_px: int = 0
+    fatten_px: float = 0.0
     """Width by which near surfaces grow over what is behind them, half of the matching window; on a
-    D4xx 1 to 3 px."""
+    D4xx 1 to 3 px. Of a fraction, as large a share of the edges grows by one more."""
     disparities: int | None = None
     """Number of disparities that the matching tries, 126 on a D4xx: what is nearer than f B over
     the largest of them, 0.44 m at 1280x720, has no depth. None: as many as needed."""
@@ -45,8 +52,33 @@ class SensorSettings:
     """Metres per unit."""
 
 
+# Size of the patches in which an edge grows by one pixel more.
+_PATCH_PX = 6.0
 # A disparity difference above this within the band is an edge, not a slope.
 _EDGE_STEP_PX = 4.0
+
+
+D415_FATTEN_PX = 2.35
+"""With it the border of a simulated hand's mask lies as far outside the hand as in real frames, by
+1.8 px (docs/segmentation.md)."""
+
+
+EDGE_SIGMA_PX = 0.2
+"""Standard deviation with which a depth check finds `border_px`."""
+
+
+def border_px(fatten_px: float) -> float:
+    """Return how far the border of a simulated hand's mask lies outside the hand, px.
+
+    A line fitted to hands at 0.5 m with growths of 1 to 5 px, which it meets within 0.1 px: holes
+    and flying pixels at the edge, which the mask leaves out, take one pixel back.
+    """
+    return 1.19 * fatten_px - 1.0
+
+
+def fatten_for(border_px: float) -> float:
+    """Return the growth with which the border lies as far outside: the reverse of `border_px`."""
+    return (border_px + 1.0) / 1.19
 
 
 def sense_depth(
@@ -72,8 +104,7 @@ def sense_depth(
     disparity = np.float32(fB) / depth_m
     hidden = _not_tried(disparity, settings)
     if settings.fatten_px:
-        window = np.ones((2 * settings.fatten_px + 1,) * 2, dtype=np.uint8)
-        disparity = np.asarray(cv2.dilate(disparity, window), dtype=np.float32)
+        disparity = _fattened(disparity, settings.fatten_px, rng)
     hidden |= _hidden_from_the_right(disparity)
     hidden |= _blur_edges(disparity, rng, settings)
     disparity += settings.disparity_sigma_px * _correlated_noise(
@@ -85,6 +116,20 @@ def sense_depth(
     measured = np.asarray(cv2.divide(units, disparity, dtype=cv2.CV_16U), dtype=np.uint16)
     measured[hidden] = 0
     return measured
+
+
+def _fattened(disparity: Float32, by_px: float, rng: np.random.Generator) -> Float32:
+    """Return a disparity image whose near surfaces have grown by a width."""
+    whole = int(by_px)
+
+    def grown(px: int) -> Float32:
+        window = np.ones((2 * px + 1,) * 2, dtype=np.uint8)
+        return np.asarray(cv2.dilate(disparity, window), dtype=np.float32)
+
+    if whole == by_px:
+        return grown(whole)
+    more = _correlated_noise(disparity.shape, _PATCH_PX, rng) < ndtri(by_px - whole)
+    return np.where(more, grown(whole + 1), grown(whole))
 
 
 def _not_tried(disparity: Float32, settings: SensorSettings) -> Bool:

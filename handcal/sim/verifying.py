@@ -1,30 +1,24 @@
 """The simulated wearer's verification: looks at the outline, presses keys, looks again.
 
 A person sees how two outlines differ across them, not along them. So the drawn outline is compared
-with the hand's silhouette in the display, along the silhouette's normals, for the movement and
-growth that would make them coincide.
+with the silhouette of the true hand in the display, along the silhouette's normals, for the
+movement and growth that would make them coincide.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from handcal.core.display import arcmin_from_px, eye_projection, view_of_eye
-from handcal.core.geometry import invert, project, transform
-from handcal.core.types import EyeDisplay, Float64
+from handcal.core.display import arcmin_from_px
+from handcal.core.types import Bool, EyeDisplay, Float64
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.sim.hand import HandModel
+from handcal.sim.silhouette import find_gaps, view_outline
 
-_POINTS = 300
-_FEWEST_POINTS = 20
-_STEP_M = 1e-3
-# Points whose normal faces the eye are on no silhouette: those at a cut.
-_ACROSS = 0.5
+_LOOKS = 3
 # Half a step either way is as good; a little more does not make the wearer press again.
 _CONTENT_STEPS = 0.75
 # The longest that a wearer waits for the effect of a key.
@@ -53,8 +47,9 @@ def see_difference(
     hand: HandModel,
     T_W_hand: Float64,
     outline_W_m: Float64,
+    is_balanced: Callable[[Float64], Bool] | None = None,
 ) -> SeenDifference | None:
-    """Return how the drawn outline differs from the hand for the true eye.
+    """Return how the drawn outline differs from the hand's silhouette for the true eye.
 
     Parameters
     ----------
@@ -67,44 +62,31 @@ def see_difference(
         True poses of the headset and the hand.
     hand : HandModel
     outline_W_m : (N, 3) float64
-        The outline as sent by the PC.
+        The outline as sent by the PC, in order.
+    is_balanced : callable, optional
+        As in `handcal.sim.silhouette.find_gaps`.
 
     Returns
     -------
     SeenDifference or None
         None if almost nothing of the outline is on the display.
     """
-    points = transform(invert(T_W_hand), outline_W_m[:: max(1, len(outline_W_m) // _POINTS)])
-    _, nearest = _tree(hand).query(points)
-    normals = hand.normals[nearest].astype(np.float64)
-    away_m = np.einsum("ij,ij->i", points - hand.vertices_m[nearest], normals)
-    silhouette = points - away_m[:, None] * normals
-    seen = eye_projection(display, true_shift_m) @ view_of_eye(display, T_W_H)
-    seen_px = project(seen, transform(T_W_hand, silhouette))
-    beside_px = project(seen, transform(T_W_hand, silhouette + _STEP_M * normals))
-    drawn_px = project(drawn @ invert(T_W_H), transform(T_W_hand, points))
-    across = beside_px - seen_px
-    length = np.linalg.norm(across, axis=1)
-    is_used = (drawn_px >= 0.0).all(axis=1) & (
-        drawn_px <= [display.width_px - 1, display.height_px - 1]
-    ).all(axis=1)
-    is_used &= length > _ACROSS * np.median(length)
-    if is_used.sum() < _FEWEST_POINTS:
-        return None
-    n = across[is_used] / length[is_used, None]
-    from_centre = seen_px[is_used] - seen_px[is_used].mean(axis=0)
-    J = np.column_stack([n, np.einsum("ij,ij->i", n, from_centre)])
-    gap_px = np.einsum("ij,ij->i", n, seen_px[is_used] - drawn_px[is_used])
-    right_px, down_px, size = np.linalg.lstsq(J, gap_px, rcond=None)[0]
-    right, down = (
-        float(np.copysign(arcmin_from_px(display, abs(px)), px)) for px in (right_px, down_px)
-    )
-    return SeenDifference(right, down, float(size))
-
-
-@lru_cache(maxsize=2)
-def _tree(hand: HandModel) -> KDTree:
-    return KDTree(hand.vertices_m)
+    view = view_outline(display, true_shift_m, T_W_H, drawn, outline_W_m)
+    total = np.zeros(3)
+    for _ in range(_LOOKS):
+        gaps = find_gaps(hand, T_W_hand, view, is_balanced)
+        if gaps is None:
+            return None
+        drawn_px = gaps.rim_px - gaps.gap_px[:, None] * gaps.across
+        middle_px = drawn_px.mean(axis=0)
+        grown = np.einsum("ij,ij->i", gaps.across, drawn_px - middle_px)
+        step = np.linalg.lstsq(np.column_stack([gaps.across, grown]), gaps.gap_px, rcond=None)[0]
+        total = total + step + [0.0, 0.0, total[2] * step[2]]
+        # Move the drawing, and look again: parts that were far apart now find each other.
+        moved_px = middle_px + step[:2] + (1.0 + step[2]) * (view.drawn_px - middle_px)
+        view = replace(view, drawn_px=moved_px)
+    right, down = (float(np.copysign(arcmin_from_px(display, abs(px)), px)) for px in total[:2])
+    return SeenDifference(right, down, float(total[2]))
 
 
 class SimulatedVerification:
@@ -174,17 +156,27 @@ class SimulatedVerification:
         self._looks += 1
         if self._looks > _MOST_LOOKS:
             return
-        right_arcmin, down_arcmin, size = np.mean(
-            [[one.right_arcmin, one.down_arcmin, one.size] for one in self._samples], axis=0
-        )
-        step, size_step = self.request.step_arcmin, self.request.step_size
-        counts = (
-            (right_arcmin + self._error.right_arcmin) / step,
-            (down_arcmin + self._error.down_arcmin) / step,
-            (size + self._error.size) / size_step,
-        )
-        for axis, count in enumerate(counts):
-            if abs(count) > _CONTENT_STEPS:
-                press = np.zeros(3)
-                press[axis] = np.sign(count) * (size_step if axis == 2 else step)
-                self._presses += [(press[0], press[1], press[2])] * round(abs(count))
+        mean = np.mean([[one.right_arcmin, one.down_arcmin, one.size] for one in self._samples], 0)
+        presses = presses_for(SeenDifference(*mean.tolist()), self._error, self.request)
+        steps = self.request.step_arcmin, self.request.step_arcmin, self.request.step_size
+        for axis, (whole, step) in enumerate(zip(presses, steps, strict=True)):
+            press = np.zeros(3)
+            press[axis] = np.sign(whole) * step
+            self._presses += [(press[0], press[1], press[2])] * round(abs(whole) / step)
+
+
+def presses_for(
+    seen: SeenDifference, error: SeenDifference, request: VerifyRequest
+) -> tuple[float, float, float]:
+    """Return the movement by whole presses of keys after a look; zeros if the drawing fits."""
+    steps = request.step_arcmin, request.step_arcmin, request.step_size
+    wanted = (
+        seen.right_arcmin + error.right_arcmin,
+        seen.down_arcmin + error.down_arcmin,
+        seen.size + error.size,
+    )
+    right, down, size = (
+        step * round(one / step) if abs(one) > _CONTENT_STEPS * step else 0.0
+        for one, step in zip(wanted, steps, strict=True)
+    )
+    return right, down, size

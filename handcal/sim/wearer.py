@@ -13,18 +13,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from handcal.core.display import view_of_eye
-from handcal.core.geometry import interpolate_pose, invert, rigid, transform
+from handcal.core.geometry import interpolate_pose, invert, rigid
 from handcal.core.types import EYES, LOOK_AROUND, Eye, Float64, Rig
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.sim.hand import HandModel
-from handcal.sim.placement import (
-    CursorMatch,
-    PlacementError,
-    apply_placement_error,
-    match_cursor,
-    overlay_hand,
-    view_through,
-)
+from handcal.sim.placement import PlacementError, apply_placement_error, match_cursor
+from handcal.sim.silhouette import overlay_outline, view_outline
 from handcal.sim.verifying import SeenDifference, SimulatedVerification, see_difference
 from handcal.sim.wearer_settings import WearerSettings
 
@@ -186,7 +180,8 @@ class Wearer:
         self._T_W_hand = rigid(translation_m=[0.0, _LOWERED_M, 0.0]) @ self._T_W_raised
         self._move: _Move | None = None
         self._task: tuple[int, tuple[Eye, ...]] | None = None
-        self._match: CursorMatch | None = None
+        self._T_W_cursor: Float64 | None = None
+        self._overlaid: Float64 | None = None
         self._error = self._draw_error(0.0)
         self._confirmed_s = 0.0
         self._P_confirmed: Mapping[Eye, Float64] = {}
@@ -288,10 +283,12 @@ class Wearer:
 
     def _take_up(self, view: DisplayView, task: tuple[int, tuple[Eye, ...]]) -> None:
         assert view.cursor_W_m is not None
-        if self._match is None or self._task is None or self._task[0] != task[0]:
+        if self._T_W_cursor is None or self._task is None or self._task[0] != task[0]:
             every = -(-len(view.cursor_W_m) // _CURSOR_POINTS)
             cursor_m = np.asarray(view.cursor_W_m[::every], dtype=np.float64)
-            self._match = match_cursor(self._hand, cursor_m, self._recognised(cursor_m))
+            # How the drawn hand is turned, people see at a glance.
+            match = match_cursor(self._hand, cursor_m, self._recognised(cursor_m))
+            self._T_W_cursor = self._overlaid = match.T_W_hand
         self._task = task
         turned_rad = self._settings.novice_rotation_rad if self._is_naive else 0.0
         self._reach(view.t_s, self._draw_error(turned_rad))
@@ -342,18 +339,26 @@ class Wearer:
 
     def _overlay(self, view: DisplayView, T_W_H: Float64) -> Float64 | None:
         """Return the pose that seems to overlap the cursor; None if too little is drawn."""
-        assert self._match is not None
-        views, eyes_m = [], []
-        for eye in view.eyes:
-            display, shift_m = self._rig.eyes[eye], self.true_shift_m[eye]
-            drawn = view.P[eye] @ view.T_V_H[eye]
-            views.append(view_through(display, shift_m, T_W_H, drawn, self._match.cursor_m))
-            eyes_m.append(transform(invert(view_of_eye(display, T_W_H)), shift_m[None])[0])
-        turned = self._match.T_W_hand @ rigid(self._error.rotation_rad)
-        placed = overlay_hand(self._match.surface_m, turned, views)
+        assert view.cursor_W_m is not None
+        assert self._T_W_cursor is not None
+        assert self._overlaid is not None
+        views = [
+            view_outline(
+                self._rig.eyes[eye],
+                self.true_shift_m[eye],
+                T_W_H,
+                view.P[eye] @ view.T_V_H[eye],
+                view.cursor_W_m.astype(np.float64),
+            )
+            for eye in view.eyes
+        ]
+        turned = self._T_W_cursor @ rigid(self._error.rotation_rad)
+        start = rigid(turned[:3, :3], self._overlaid[:3, 3])
+        placed = overlay_outline(self._hand, start, views)
         if placed is None:
             return None
-        eye_m = np.mean(eyes_m, axis=0)
+        self._overlaid = placed[0]
+        eye_m = np.mean([view.eye_W_m for view in views], axis=0)
         return apply_placement_error(placed[0], eye_m, self._error)
 
     def _draw_error(self, turned_rad: float) -> PlacementError:

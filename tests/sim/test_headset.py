@@ -26,6 +26,7 @@ from handcal.rig.rig_file import read_rig
 from handcal.sim.hand import make_hand
 from handcal.sim.headset import HeadsetSettings, _view, run_headset
 from handcal.sim.scene import SceneReceiver, SceneState
+from tests.sim.rims import rim_outline
 
 KEY = "a pairing key of the tests"
 RIG_PATH = resource_path("example_rig.yaml")
@@ -86,8 +87,8 @@ def test_a_wearer_in_another_process_aligns_and_confirms(
     for eye, display in rig.eyes.items():
         P, size = projection_matrix(display), (display.width_px, display.height_px)
         server.send_projection(Projection(eye, P, *size, display.T_V_H))
-    hand_W_m = transform(state.T_W_hand, make_hand(1).vertices_m)
-    server.wait_acked(server.send_cursor(hand_W_m[::10], cursor_id=1), 5.0)
+    rim_m = rim_outline(make_hand(1), invert(state.T_W_D) @ state.T_W_hand)[::10]
+    server.wait_acked(server.send_cursor(transform(state.T_W_D, rim_m), cursor_id=1), 5.0)
     confirmation: Confirmation = wait_for(lambda: next(iter(server.confirmations()), None))
     assert confirmation.cursor_id == 1
     assert abs(time.monotonic_ns() - confirmation.t_host_ns) < 1e9

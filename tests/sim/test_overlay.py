@@ -30,7 +30,7 @@ def _overlay(true_shift_m: dict[Eye, Float64]) -> tuple[Float64, Float64]:
 def test_the_hand_covers_the_cursor_on_the_display() -> None:
     hand_px, cursor_px = _overlay({"left": np.array([0.004, -0.003, 0.010])})
     for side in (np.min, np.max, np.mean):
-        np.testing.assert_allclose(side(hand_px, axis=0), side(cursor_px, axis=0), atol=6.0)
+        np.testing.assert_allclose(side(hand_px, axis=0), side(cursor_px, axis=0), atol=8.0)
 
 
 def test_a_cursor_drawn_rightly_lies_on_the_hand() -> None:

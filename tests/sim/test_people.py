@@ -71,10 +71,15 @@ def test_only_the_named_part_of_the_hand_is_balanced() -> None:
 def test_perception_scales_with_the_person() -> None:
     rng = np.random.default_rng(2)
     drawn = [
-        np.std([draw_perception(rng, begin_sitting(rng, USUAL, "plain", scale), 1.5, 0.004)[0]
-                for _ in range(400)])
+        np.std(
+            [
+                draw_perception(rng, sitting, 1.5, 0.004).right_arcmin
+                for sitting in [begin_sitting(rng, USUAL, "plain", scale)]
+                for _ in range(400)
+            ]
+        )
         for scale in (1.0, 4.0)
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(drawn, [1.5, 6.0], rtol=0.12)
 
 

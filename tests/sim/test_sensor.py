@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from handcal.core.types import Float32
-from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.sim.sensor import (
+    D415_FATTEN_PX,
+    SensorSettings,
+    border_px,
+    fatten_for,
+    sense_depth,
+)
+from tests.fat_hands import beside_truth, fat_hand
 
 FOCAL_PX = 1005.0
 SETTINGS = SensorSettings()
@@ -82,6 +89,42 @@ def test_near_things_grow_over_what_is_behind() -> None:
     holes = int((_sense_m(_post(), clean)[150] == 0).sum())
     assert widths[1] - widths[0] == pytest.approx(4, abs=1)
     assert holes > 0
+
+
+@pytest.mark.parametrize("fatten_px", [0.3, 1.5, 2.35])
+def test_a_fraction_is_the_share_of_the_edge_that_grows_by_one_more(fatten_px: float) -> None:
+    clean = replace(SETTINGS, edge_hole_ratio=0.0, edge_flying_ratio=0.0, disparity_sigma_px=0.0)
+    widths = [
+        (_sense_m(_post(), replace(clean, fatten_px=px)) < 0.6)[:, 300:420].sum(axis=1)
+        for px in (0.0, fatten_px)
+    ]
+    grown = widths[1] - widths[0]  # at the right edge; the left one casts a shadow
+    whole = int(fatten_px)
+    assert set(grown.tolist()) == {whole, whole + 1}
+    assert grown.mean() == pytest.approx(fatten_px, abs=0.15)
+    # In patches along the edge, as matching windows have them, and not row by row.
+    assert np.count_nonzero(np.diff(grown)) < 0.2 * len(grown)
+
+
+def test_a_whole_number_grows_every_edge_alike() -> None:
+    clean = replace(SETTINGS, edge_hole_ratio=0.0, edge_flying_ratio=0.0, disparity_sigma_px=0.0)
+    measured_m = _sense_m(_post(), replace(clean, fatten_px=2.0))
+    assert set((measured_m < 0.6)[:, 300:420].sum(axis=1).tolist()) == {102}
+
+
+@pytest.mark.parametrize(("seed", "fatten_px"), [(1, 1), (2, 2), (3, 4)])
+def test_the_border_of_a_hand_s_mask_lies_outside_as_the_line_says(
+    seed: int, fatten_px: int
+) -> None:
+    cloud, _, hand, T_H_hand = fat_hand(seed, fatten_px)
+    outside_px = beside_truth(cloud, hand, T_H_hand).outside_px
+    assert outside_px == pytest.approx(border_px(fatten_px), abs=0.2)
+
+
+def test_the_growth_for_a_border_is_the_line_s_reverse() -> None:
+    for px in (-1.0, 0.0, 1.8, 3.5):
+        assert border_px(fatten_for(px)) == pytest.approx(px)
+    assert border_px(D415_FATTEN_PX) == pytest.approx(1.8, abs=0.01)
 
 
 def test_the_nearest_distance_and_what_a_disparity_shift_does_to_it() -> None:

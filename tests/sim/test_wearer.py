@@ -10,9 +10,10 @@ from handcal.core.geometry import invert, transform
 from handcal.core.types import EYES, Eye, Float64
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
-from handcal.sim.raster import D415, draw_hand, visible_points
+from handcal.sim.raster import D415, draw_hand
 from handcal.sim.wearer import DisplayView, Wearer, WearerAction, draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
+from tests.sim.rims import rim_outline
 
 RIG = example_rig()
 STEADY = WearerSettings(
@@ -63,14 +64,11 @@ class Stage:
         return [self.view.t_s for action in self.run(duration_s) if action.confirm]
 
     def show_cursor(self, cursor_id: int, eyes: tuple[Eye, ...] = EYES) -> Float64:
-        """Show the hand as the camera sees it now; return its pose."""
+        """Show the rim of the hand as the camera sees it now; return its pose."""
         T_W_D = self.action.T_W_H @ RIG.T_H_D
-        T_D_hand = invert(T_W_D) @ self.action.T_W_hand
-        points_m, _ = visible_points(
-            self.hand, T_D_hand, 600, np.random.default_rng(0), forearm_m=0.02
-        )
+        rim_m = rim_outline(self.hand, invert(T_W_D) @ self.action.T_W_hand)[::5]
         self.view = replace(
-            self.view, cursor_W_m=transform(T_W_D, points_m), cursor_id=cursor_id, eyes=eyes
+            self.view, cursor_W_m=transform(T_W_D, rim_m), cursor_id=cursor_id, eyes=eyes
         )
         return self.action.T_W_hand
 
