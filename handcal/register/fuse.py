@@ -13,23 +13,25 @@ a usual wearer is far too certain about a careless one. So the precision is unkn
 `FuseSettings.wearer_scales`, and the estimate is the mean over them, weighted by how well each
 explains the alignments. One alignment says little about it, several say much by their scatter.
 
-An error of the measured depth, known from the depth check (`DepthCheck`), is common to all
-observations of a wearer: it is added to the covariance of the estimate, and more alignments do not
-reduce it. Without a depth check it is taken as zero.
+What is wrong in all observations of a sitting alike does not average out, so it is unknown too
+(`handcal.register.sitting`).
 
 A verification, in which the wearer moves the drawing of the resting hand until it covers the hand
 (`handcal.register.nudge`), is one more observation of one eye's φ, more precise than an alignment.
+One in which nothing was moved is none: a wearer who does not look says the same. Verifications of
+one eye that contradict each other count less.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
-from scipy.special import softmax
+from scipy.special import chdtri, softmax
 
 from handcal.core.display import eye_projection
 from handcal.core.geometry import project, transform
@@ -45,16 +47,26 @@ from handcal.core.types import (
     Rig,
     Verification,
 )
+from handcal.hand.edges import edges_of
+from handcal.register.benefit import expected_arcmin
 from handcal.register.prior import (
     EyePrior,
     Observed,
     PriorSettings,
-    depth_covariance_m2,
     eye_prior,
     eye_slice,
     posterior,
     shift_by_depth,
+    stacked,
     with_eye_distance,
+    with_sitting,
+)
+from handcal.register.sitting import (
+    OUTLINE,
+    SittingPrior,
+    SittingSettings,
+    shift_by_sitting,
+    sitting_prior,
 )
 from handcal.register.surface import describe_surface
 
@@ -64,6 +76,13 @@ _OUTLINE_FROM_POINTS = 1500
 _NORMAL_FLOOR = 1e-3
 # Place of the hand, in E, that a verification to come is expected to have.
 _VERIFIED_AT_M = 0.0, 0.0, 0.5
+# Share of a usual wearer's pairs of verifications that contradict each other by chance.
+_CONTRADICTING = 0.05
+# Probability that a drawn outline which nobody has measured is wrong by this many times its σ.
+_WRONG, _WRONG_SCALE = 0.1, 4.0
+# The limit of `Misfit`, over that for data as the priors say: the eyes of wearers differ less than
+# the default prior allows. Measured on plain wearers (docs/studies.md).
+_MISFIT = 0.85
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +103,7 @@ class FuseSettings:
     """Errors of a wearer's overlay, relative to a usual wearer's."""
     wearer_weights: tuple[float, ...] = (0.7, 0.16, 0.08, 0.05, 0.01)
     """Probability of each of `wearer_scales`."""
+    sitting: SittingSettings = field(default_factory=SittingSettings)
 
     def __post_init__(self) -> None:
         if not self.wearer_scales or len(self.wearer_scales) != len(self.wearer_weights):
@@ -98,7 +118,8 @@ class Fused:
 
     shifts: Mapping[Eye, EyeShift]
     prior: EyePrior
-    """Prior of the eyes before the alignments, with the eye distance if it was measured."""
+    """Prior of the eyes and of the errors of the sitting, with the eye distance if it was
+    measured."""
     observed: tuple[Observation, ...]
     """The displacement measured by each alignment."""
     wearer_scale: float
@@ -107,8 +128,10 @@ class Fused:
     """The φ found by each eye's verifications."""
     verifiable: Mapping[Eye, Observation] = field(default_factory=dict)
     """The verification to expect of each solved eye; its φ is zero."""
-    by_depth_m2: Float64 = field(default_factory=lambda: np.zeros((6, 6)))
-    """(6, 6); part of the covariance by errors of the depth camera."""
+    apart_arcmin: Mapping[Eye, float] = field(default_factory=dict)
+    """Distance between the verifications of each eye whose verifications contradict each other."""
+    misfit: Misfit | None = None
+    """Fit of the eyes and a usual wearer to what was observed."""
 
     @property
     def all_observed(self) -> tuple[Observation, ...]:
@@ -116,27 +139,30 @@ class Fused:
         return (*self.observed, *(one for found in self.verified.values() for one in found))
 
     def covariance_after_m2(self, eyes: Sequence[Eye], count: int) -> Float64:
-        """Return the covariance (6, 6) to expect after more alignments with some eyes open."""
+        """Return the covariance to expect after more alignments with some eyes open."""
         return self.foreseen_m2([eyes] * count)
 
     def foreseen_m2(
         self, upcoming: Sequence[Sequence[Eye]], then: Sequence[Observation] = ()
     ) -> Float64:
-        """Return the covariance (6, 6) to expect after alignments and other observations.
+        """Return the covariance of the unknowns to expect after alignments and other observations.
 
         The alignments, each with some eyes open, are taken to be as precise as those so far on
         average; without any, as the verifications.
         """
         known = [one.at(self.wearer_scale) for one in self.all_observed]
         aligned, verified = known[: len(self.observed)], known[len(self.observed) :]
-        noise_m2 = np.mean([covariance_m2 for _, _, covariance_m2 in aligned or verified], axis=0)
+        alike = aligned or verified
+        noise_m2 = np.mean([covariance_m2 for _, _, covariance_m2 in alike], axis=0)
         for eyes in upcoming:
-            H = np.zeros((3, 6))
+            H = np.mean([H for H, _, _ in alike], axis=0)
+            H[:, :6] = 0.0
             for eye in eyes:
                 H[:, eye_slice(eye)] = np.eye(3) / len(eyes)
             known.append((H, np.zeros(3), noise_m2))
         known += [one.at(self.wearer_scale) for one in then]
-        return posterior(self.prior, known)[1] + self.by_depth_m2
+        excess = 1.0 if self.misfit is None else max(1.0, self.misfit.ratio)
+        return excess * posterior(self.prior, known)[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,12 +177,27 @@ class Observation:
     """(3, 3); covariance of the registration."""
     wearer_m2: Float64
     """(3, 3); covariance of a usual wearer's overlay."""
-    by_depth: Float64 = field(default_factory=lambda: np.zeros((3, 2)))
-    """(3, 2); derivatives of the displacement by scale and offset, m, of the measured depth."""
+    by_sitting: Float64 = field(default_factory=lambda: np.zeros((3, 6)))
+    """(3, 6); derivatives of the displacement by the errors of the sitting."""
 
     def at(self, scale: float) -> Observed:
-        """Return H, displacement and covariance for a wearer of a precision."""
-        return self.H, self.seen_m, self.registration_m2 + scale**2 * self.wearer_m2
+        """Return H with `by_sitting` (3, 12), displacement and covariance for a precision."""
+        covariance_m2 = self.registration_m2 + scale**2 * self.wearer_m2
+        return np.hstack([self.H, self.by_sitting]), self.seen_m, covariance_m2
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """Distance of all observations from what the priors and a usual wearer predict."""
+
+    chi2: float
+    numbers: int
+    """Squared distance in standard deviations, and the number of numbers observed."""
+
+    @property
+    def ratio(self) -> float:
+        """Of `chi2` to what 95 % of wearers with the usual errors reach at most."""
+        return self.chi2 / (_MISFIT * float(chdtri(self.numbers, 0.05)))
 
 
 def fuse_alignments(
@@ -188,33 +229,41 @@ def fuse_alignments(
     """
     observations = {
         eye: tuple(
-            verified_observation(rig, eye, one.after_m, one.hand_E_m, settings)
+            verified_observation(
+                rig, eye, one.after_m, one.hand_E_m, settings, one.outline_sigma_px
+            )
             for one in (*newest.earlier, newest)
-            if one.hand_E_m is not None
+            if one.hand_E_m is not None and one.was_moved
         )
         for eye, newest in verified.items()
     }
-    verifications = {eye: found for eye, found in observations.items() if found}
+    sitting = sitting_prior(rig, settings.sitting)
+    verifications: dict[Eye, tuple[Observation, ...]] = {}
+    apart_arcmin: dict[Eye, float] = {}
+    for eye, moved in observations.items():
+        if moved:
+            verifications[eye], apart_m = _reconciled(moved, sitting)
+            if apart_m is not None:
+                apart_arcmin[eye] = expected_arcmin(rig.eyes[eye], apart_m, np.zeros((3, 3)))
     if not solved and not verifications:
         raise ValueError("at least one alignment is needed")
     observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
-    prior = with_eye_distance(eye_prior(settings.prior), rig, eye_distance)
+    prior = with_sitting(eye_prior(settings.prior), sitting)
+    prior = with_eye_distance(prior, rig, eye_distance)
     known = (*observed, *(one for found in verifications.values() for one in found))
-    weights = _scale_weights(prior, known, settings)
-    found = [posterior(prior, [o.at(scale) for o in known]) for scale in settings.wearer_scales]
+    cases = _cases(prior, rig, settings)
+    weights = _weights(cases, known)
+    found = [posterior(case.prior, [one.at(case.scale) for one in known]) for case in cases]
     estimate_m = sum(weight * mean_m for weight, (mean_m, _) in zip(weights, found, strict=True))
     joint_m2 = sum(
         weight * (covariance_m2 + np.outer(mean_m - estimate_m, mean_m - estimate_m))
         for weight, (mean_m, covariance_m2) in zip(weights, found, strict=True)
     )
-    wearer_scale = float(np.sqrt(weights @ np.square(settings.wearer_scales)))
-    by_depth_m2 = depth_covariance_m2(
-        rig.depth_check,
-        prior,
-        [one.at(wearer_scale) for one in known],
-        [one.by_depth for one in known],
-    )
-    joint_m2 = joint_m2 + by_depth_m2
+    misfit = Misfit(_surprise(prior, known, 1.0)[0], 3 * len(known))
+    # What nothing explains may be wrong in anything (Birge 1932).
+    joint_m2 = max(1.0, misfit.ratio) * joint_m2
+    wearer_scale = float(np.sqrt(weights @ [case.scale**2 for case in cases]))
+    outline_scale = float(np.sqrt(weights @ [case.outline_scale**2 for case in cases]))
     of_eye = {
         eye: found_shifts
         for eye in EYES
@@ -228,7 +277,7 @@ def fuse_alignments(
             )
             for eye, shifts in of_eye.items()
         },
-        prior=prior,
+        prior=_with_outline(prior, outline_scale),
         observed=observed,
         wearer_scale=wearer_scale,
         verified=verifications,
@@ -236,28 +285,80 @@ def fuse_alignments(
             eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M, settings)
             for eye in of_eye
         },
-        by_depth_m2=by_depth_m2,
+        apart_arcmin=apart_arcmin,
+        misfit=misfit,
     )
 
 
-def _scale_weights(
-    prior: EyePrior, observed: Sequence[Observation], settings: FuseSettings
-) -> Float64:
-    """Return the probability of each precision of the wearer, by how well it predicts them all.
+class _Case(NamedTuple):
+    """One precision of the wearer, and of what is known of the drawn outline."""
 
-    The displacements of all alignments are jointly Gaussian, given the precision.
+    scale: float
+    outline_scale: float
+    weight: float
+    prior: EyePrior
+
+
+def _cases(prior: EyePrior, rig: Rig, settings: FuseSettings) -> list[_Case]:
+    """Return the precisions with their probabilities; a measured outline has one."""
+    is_measured = rig.depth_edges is not None
+    outlines = [(1.0, 1.0)] if is_measured else [(1.0, 1.0 - _WRONG), (_WRONG_SCALE, _WRONG)]
+    return [
+        _Case(scale, outline, weight * share, _with_outline(prior, outline))
+        for scale, weight in zip(settings.wearer_scales, settings.wearer_weights, strict=True)
+        for outline, share in outlines
+    ]
+
+
+def _with_outline(prior: EyePrior, scale: float) -> EyePrior:
+    """Return the prior with another standard deviation of the drawn outline."""
+    covariance_m2 = prior.covariance_m2.copy()
+    covariance_m2[OUTLINE, OUTLINE] = scale**2
+    return replace(prior, covariance_m2=covariance_m2)
+
+
+def _weights(cases: Sequence[_Case], observed: Sequence[Observation]) -> Float64:
+    """Return the probability of each case, by how well it predicts all observations.
+
+    The displacements of all alignments are jointly Gaussian in each.
     """
-    H = np.concatenate([one.H for one in observed])
-    surprise_m = np.concatenate([one.seen_m for one in observed]) - H @ prior.mean_m
-    common_m2 = H @ prior.covariance_m2 @ H.T
     logarithms = []
-    for scale, weight in zip(settings.wearer_scales, settings.wearer_weights, strict=True):
-        noise_m2 = block_diag(*[one.at(scale)[2] for one in observed])
-        total_m2 = common_m2 + noise_m2
-        _, log_determinant = np.linalg.slogdet(total_m2)
-        fit = float(surprise_m @ np.linalg.solve(total_m2, surprise_m))
-        logarithms.append(np.log(weight) - 0.5 * (log_determinant + fit))
+    for case in cases:
+        fit, log_determinant = _surprise(case.prior, observed, case.scale)
+        logarithms.append(np.log(case.weight) - 0.5 * (log_determinant + fit))
     return np.asarray(softmax(logarithms))
+
+
+def _surprise(
+    prior: EyePrior, observed: Sequence[Observation], scale: float
+) -> tuple[float, float]:
+    """Return the squared distance of all observations from their prediction, and log det Σ."""
+    H, seen_m, noise_m2 = stacked([one.at(scale) for one in observed], len(prior.mean_m))
+    apart_m = seen_m - H @ prior.mean_m
+    total_m2 = H @ prior.covariance_m2 @ H.T + noise_m2
+    fit = float(apart_m @ np.linalg.solve(total_m2, apart_m))
+    return fit, float(np.linalg.slogdet(total_m2)[1])
+
+
+def _reconciled(
+    found: tuple[Observation, ...], sitting: SittingPrior
+) -> tuple[tuple[Observation, ...], Float64 | None]:
+    """Return the verifications of one eye, and how far apart two are that contradict each other.
+
+    Those of a usual wearer contradict each other once in twenty times. They then count as much
+    less as they are too far apart (Birge 1932).
+    """
+    pairs = list(combinations(found, 2))
+    worst, apart_m = float(chdtri(3, _CONTRADICTING / max(1, len(pairs)))), None
+    for one, other in pairs:
+        between_m, by = one.seen_m - other.seen_m, one.by_sitting - other.by_sitting
+        expected_m2 = one.wearer_m2 + other.wearer_m2 + by @ sitting.covariance @ by.T
+        chi2 = float(between_m @ np.linalg.solve(expected_m2, between_m))
+        if chi2 > worst:
+            worst, apart_m = chi2, between_m
+    if apart_m is None:
+        return found, None
+    return tuple(replace(one, wearer_m2=worst / 3.0 * one.wearer_m2) for one in found), apart_m
 
 
 def _observe(
@@ -268,7 +369,7 @@ def _observe(
     The wearer sees the part of the cursor's outline that lies within the display.
     """
     surface = describe_surface(alignment.cursor_m, alignment.cursor_is_cut, _OUTLINE_FROM_POINTS)
-    H, wearer_m2 = seen_by(
+    H, wearer_m2, by_sitting = seen_by(
         alignment.cursor_m,
         surface.points_m[surface.outline],
         alignment.T_E_W,
@@ -276,19 +377,17 @@ def _observe(
         tuple(shifts),
         rig,
         settings,
+        alignment.outline_sigma_px,
     )
     R_W_A = _common_axes(alignment.T_E_W)
-    seen_m, by_depth = np.zeros(3), np.zeros((3, 2))
+    seen_m = np.zeros(3)
     registrations = []
-    middle_m = alignment.cursor_m.mean(axis=0)
     for eye, shift in shifts.items():
         R_A_E = R_W_A.T @ alignment.T_E_W[eye][:3, :3].T
         registrations.append(R_A_E @ shift.covariance_m2 @ R_A_E.T)
         seen_m += H[:, eye_slice(eye)] @ shift.shift_m
-        middle_E_m = transform(alignment.T_E_W[eye], middle_m[None])[0]
-        by_depth += H[:, eye_slice(eye)] @ shift_by_depth(middle_E_m, rig.eyes[eye], rig)
     registration_m2 = np.mean(registrations, axis=0) + alignment.time_sigma_m**2 * np.eye(3)
-    return Observation(H, seen_m, registration_m2, wearer_m2, by_depth)
+    return Observation(H, seen_m, registration_m2, wearer_m2, by_sitting)
 
 
 def seen_by(
@@ -299,8 +398,9 @@ def seen_by(
     eyes: Sequence[Eye],
     rig: Rig,
     settings: FuseSettings,
-) -> tuple[Float64, Float64]:
-    """Return H (3, 6) and a usual wearer's covariance (3, 3) for a cursor and the open eyes.
+    outline_sigma_px: float | None = None,
+) -> tuple[Float64, Float64, Float64]:
+    """Return H (3, 6), a usual wearer's covariance (3, 3) and `by_sitting` of an alignment.
 
     Parameters
     ----------
@@ -310,10 +410,14 @@ def seen_by(
     drawn_shift_m : mapping of eye to (3,) float64
         φ that the cursor is drawn with.
     eyes : sequence of eye
+        The open eyes.
     rig : Rig
     settings : FuseSettings
+    outline_sigma_px : float, optional
+        As in `Alignment`.
     """
     R_W_A = _common_axes(T_E_W)
+    middle_m = cursor_m.mean(axis=0)
     normals: dict[Eye, Float64] = {}
     wearers = []
     for eye in eyes:
@@ -322,16 +426,18 @@ def seen_by(
         outline_E = transform(T_E_W[eye], outline_m)
         shown = _is_shown(outline_E, display, drawn_shift_m[eye])
         normals[eye] = R_A_E @ _pixel_normal(outline_E[shown]) @ R_A_E.T
-        depth_m = float(transform(T_E_W[eye], cursor_m)[:, 2].mean())
+        depth_m = float(transform(T_E_W[eye], middle_m[None])[0, 2])
         sigmas = settings.lateral_sigma_arcmin, settings.depth_sigma
         wearer = _wearer_covariance(depth_m, display.z_C0_S_m, *sigmas)
         wearers.append(R_A_E @ wearer @ R_A_E.T)
     total = np.sum(list(normals.values()), axis=0)
-    H = np.zeros((3, 6))
+    H, by_sitting = np.zeros((3, 6)), np.zeros((3, 6))
     for eye in eyes:
         weight = np.linalg.solve(total, normals[eye]) @ R_W_A.T @ T_E_W[eye][:3, :3].T
         H[:, eye_slice(eye)] = weight
-    return H, np.mean(wearers, axis=0)
+        middle_E_m = transform(T_E_W[eye], middle_m[None])[0]
+        by_sitting += weight @ _by_sitting(middle_E_m, eye, rig, outline_sigma_px)
+    return H, np.mean(wearers, axis=0), by_sitting
 
 
 def verified_observation(
@@ -340,6 +446,7 @@ def verified_observation(
     shift_m: Sequence[float],
     hand_E_m: Sequence[float],
     settings: FuseSettings,
+    outline_sigma_px: float | None = None,
 ) -> Observation:
     """Return the observation of one eye's φ by a verification, with the hand at a place of E."""
     R_A_E = rig.eyes["left"].T_V_H[:3, :3] @ rig.eyes[eye].T_V_H[:3, :3].T
@@ -352,7 +459,19 @@ def verified_observation(
         R_A_E @ np.asarray(shift_m),
         np.zeros((3, 3)),
         R_A_E @ wearer_m2 @ R_A_E.T,
-        R_A_E @ shift_by_depth(np.asarray(hand_E_m, np.float64), rig.eyes[eye], rig),
+        R_A_E @ _by_sitting(np.asarray(hand_E_m, np.float64), eye, rig, outline_sigma_px),
+    )
+
+
+def _by_sitting(hand_E_m: Float64, eye: Eye, rig: Rig, outline_sigma_px: float | None) -> Float64:
+    """Return the derivatives (3, 6), E axes, of the φ that is observed by a sitting's errors."""
+    display = rig.eyes[eye]
+    sigma_px = edges_of(rig).sigma_px if outline_sigma_px is None else outline_sigma_px
+    return shift_by_sitting(
+        hand_E_m,
+        display.z_C0_S_m,
+        sigma_px / rig.depth_intrinsics.fx,
+        shift_by_depth(hand_E_m, display, rig),
     )
 
 

@@ -174,7 +174,7 @@ def rotation_between(cursor_m: ArrayLike, hand_m: ArrayLike) -> Float64:
     >>> alignment = session.alignments[1]
     >>> rotation_rad = handcal.rotation_between(alignment.cursor_m, alignment.hand_m)
     >>> print(f"{np.degrees(np.linalg.norm(rotation_rad)):.1f}°")
-    1.3°
+    1.5°
     """
     guard = RotationGuard(check_cloud("cursor_m", cursor_m), settings=_ONCE)
     return guard.rotation(check_cloud("hand_m", hand_m))

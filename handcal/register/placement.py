@@ -20,12 +20,15 @@ from handcal.core.geometry import image_points, invert, project, transform
 from handcal.core.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
 from handcal.register.benefit import expected_arcmin
 from handcal.register.fuse import Observation, seen_by
-from handcal.register.prior import EyePrior, eye_prior, eye_slice, posterior
+from handcal.register.prior import eye_prior, eye_slice, posterior, with_sitting
 from handcal.register.results import Results, SolveSettings
+from handcal.register.sitting import sitting_prior
 from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes
 
 _OUTLINE_FROM_POINTS = 1500
+# More observations do not explain what no eye explains.
+_WITH_MISFIT = 2
 # Error of a registration, and its growth with the angle by which the camera sees the moved hand
 # from another side: its outline is then other points, on a rim of about this radius.
 _REGISTRATION_SIGMA_M = 3e-4
@@ -43,8 +46,9 @@ class PlacementSettings:
     """Largest such distance."""
     aside_m: tuple[float, ...] = (-0.03, 0.0, 0.03)
     """Places to choose from, to the right of the camera's line of sight to the raised hand."""
-    depths_m: tuple[float, ...] = (0.0, 0.04, 0.08)
-    """Places to choose from, beyond the nearest."""
+    depths_m: tuple[float, ...] = (0.0, 0.04, 0.08, 0.2)
+    """Places to choose from, beyond the nearest. The last tells what the wearer always sees wrongly
+    from the eyes, which pays if the prior of the sitting is wide."""
     shown_share: float = 0.6
     """Least share of the hand's outline within each display that is used."""
     fewest: int = 2
@@ -167,11 +171,14 @@ def _to_verify(
     settings: PlacementSettings,
 ) -> list[Eye]:
     """Return the eyes to verify: each once, and again while it is not accepted."""
+    most = settings.verifications
+    if results.evidence:
+        most = min(most, _WITH_MISFIT)
     return [
         eye
         for eye in usable_eyes
         if eye in results.verdicts
-        and counts.get(eye, 0) < settings.verifications
+        and counts.get(eye, 0) < most
         and (not counts.get(eye) or results.verdicts[eye].name in ("repeat", "keep"))
     ]
 
@@ -190,7 +197,7 @@ def _is_enough(
     if plan == "paper":
         return all(one.name != "repeat" for one in results.verdicts.values())
     # Alignments that cannot lead to accept are not made.
-    is_worthwhile = any(
+    is_worthwhile = not results.evidence and any(
         one.is_accepted and not one.verify and one.alignments <= settings.most - done
         for one in results.advice.values()
     )
@@ -263,10 +270,10 @@ def _expected_arcmin(
 ) -> float:
     """Return the mean expected error of both eyes after an alignment at a displacement."""
     T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
-    H, wearer_m2 = seen_by(
+    H, wearer_m2, by_sitting = seen_by(
         raised_m + place, outline_m + place, T_E_H, drawn_shift_m, eyes, rig, solve.fuse
     )
-    prior: EyePrior = eye_prior(solve.fuse.prior)
+    prior = with_sitting(eye_prior(solve.fuse.prior), sitting_prior(rig, solve.fuse.sitting))
     known: list[Observation] = []
     scale = 1.0
     line_m = raised_m.mean(axis=0) - rig.T_H_D[:3, 3]
@@ -277,7 +284,7 @@ def _expected_arcmin(
         fused = results.fused
         prior, scale = fused.prior, fused.wearer_scale
         known = list(fused.all_observed)
-    known.append(Observation(H, np.zeros(3), registration_m2, wearer_m2))
+    known.append(Observation(H, np.zeros(3), registration_m2, wearer_m2, by_sitting))
     _, covariance_m2 = posterior(prior, [one.at(scale) for one in known])
     return float(
         np.mean(

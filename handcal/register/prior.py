@@ -16,14 +16,20 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, transform
-from handcal.core.types import EYES, DepthCheck, Eye, EyeDisplay, EyeDistance, Float64, Rig
+from handcal.core.types import EYES, Eye, EyeDisplay, EyeDistance, Float64, Rig
+from handcal.register.sitting import SittingPrior
 
+FAR_M = 0.004
+"""A learned prior whose mean for an eye is farther from C0 than this is not used unasked: wearers
+differ by as much, their mean does not."""
 MIN_SESSIONS = 10
 """Fewer sessions than this do not make a prior."""
 # H (n, 6), what was seen (n,), and its covariance (n, n): a displacement, n = 3, or a distance.
+# With the derivatives by the errors of a sitting beside them, H is (n, 12).
 Observed: TypeAlias = tuple[Float64, Float64, Float64]
 
 _DEFAULT_WEIGHT = 4.0
@@ -50,6 +56,22 @@ class LearnedPrior:
         if not is_symmetric or np.linalg.eigvalsh(covariance)[0] <= 0.0:
             raise ValueError("the prior's covariance is not symmetric and positive definite")
 
+    @property
+    def offset_m(self) -> float:
+        """The larger distance of the mean of an eye from C0."""
+        return float(np.linalg.norm(np.reshape(self.mean_m, (2, 3)), axis=1).max())
+
+    @property
+    def warning(self) -> str:
+        """Reason not to use it before somebody has confirmed it; empty if there is none."""
+        if self.offset_m <= FAR_M:
+            return ""
+        return (
+            f"the mean of {self.sessions} sessions lies {1e3 * self.offset_m:.1f} mm from the "
+            "rig's viewpoint, which wearers do not explain: check the depth camera's edges and "
+            "the rig"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class PriorSettings:
@@ -63,18 +85,26 @@ class PriorSettings:
     (Gordon et al. 2014, ANSUR II)."""
     learned: LearnedPrior | None = None
     """Used instead, if there is one."""
+    unconfirmed: LearnedPrior | None = None
+    """Learned, but not used, as nobody has confirmed it (`LearnedPrior.warning`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyePrior:
-    """The prior on [φ_left; φ_right], Gaussian."""
+    """The prior on [φ_left; φ_right], Gaussian; errors of the sitting may follow.
+
+    With them (`with_sitting`) it has 12 unknowns; the last six have the units of
+    `handcal.register.sitting`.
+    """
 
     mean_m: Float64
-    """(6,)."""
+    """(6,) or (12,)."""
     covariance_m2: Float64
-    """(6, 6)."""
+    """(6, 6) or (12, 12)."""
     sessions: int = 0
     """Number of sessions it was learned from; 0 for the default."""
+    warning: str = ""
+    """Reason why a learned prior is not used; empty if there is none."""
 
 
 def eye_prior(settings: PriorSettings = PriorSettings()) -> EyePrior:
@@ -86,7 +116,8 @@ def eye_prior(settings: PriorSettings = PriorSettings()) -> EyePrior:
     information = np.kron(np.eye(2), np.eye(3) / settings.eye_box_sigma_m**2)
     apart = np.diag(1.0 / np.square(settings.eye_difference_sigma_m))
     information += np.kron([[1.0, -1.0], [-1.0, 1.0]], apart)
-    return EyePrior(np.zeros(6), np.asarray(np.linalg.inv(information)))
+    warning = "" if settings.unconfirmed is None else settings.unconfirmed.warning
+    return EyePrior(np.zeros(6), np.asarray(np.linalg.inv(information)), warning=warning)
 
 
 def widened(mean_m: Float64, covariance_m2: Float64, slip_m: Sequence[float]) -> LearnedPrior:
@@ -106,61 +137,64 @@ def widened(mean_m: Float64, covariance_m2: Float64, slip_m: Sequence[float]) ->
     )
 
 
+def with_sitting(prior: EyePrior, sitting: SittingPrior) -> EyePrior:
+    """Return the prior of the eyes and of the errors of the sitting together."""
+    return EyePrior(
+        np.concatenate([prior.mean_m, sitting.mean]),
+        block_diag(prior.covariance_m2, sitting.covariance),
+        prior.sessions,
+        prior.warning,
+    )
+
+
 def posterior(prior: EyePrior, observed: Sequence[Observed]) -> tuple[Float64, Float64]:
-    """Return the mean (6,) and covariance (6, 6) of [φ_left; φ_right] after observations."""
-    information, state = _information(observed)
-    known = np.linalg.inv(prior.covariance_m2)
-    covariance_m2 = np.asarray(np.linalg.inv(known + information))
-    return covariance_m2 @ (known @ prior.mean_m + state), covariance_m2
+    """Return mean and covariance of the prior's unknowns after observations.
 
-
-def depth_covariance_m2(
-    check: DepthCheck | None,
-    prior: EyePrior,
-    observed: Sequence[Observed],
-    by_depth: Sequence[Float64],
-) -> Float64:
-    """Return the covariance (6, 6) of [φ_left; φ_right] by errors of the depth camera.
-
-    They are common to all observations. The bias that the check found is not corrected, and counts
-    like an uncertainty of its size.
-
-    Parameters
-    ----------
-    check : DepthCheck or None
-        None: zero.
-    prior : EyePrior
-    observed : sequence of Observed
-    by_depth : sequence of (3, 2) float64
-        Of each, derivatives by scale and offset, m, of the measured depth.
+    An unknown without variance stays as it is.
     """
-    if check is None:
-        return np.zeros((6, 6))
-    bias = np.array([check.scale - 1.0, check.offset_m])
-    nothing = EyePrior(np.zeros(6), prior.covariance_m2)
-    moved = [
-        posterior(
-            nothing,
-            [(H, by[:, which], m2) for (H, _, m2), by in zip(observed, by_depth, strict=True)],
-        )[0]
-        for which in range(2)
-    ]
-    S = np.column_stack(moved)
-    return np.asarray(S @ (check.covariance + np.outer(bias, bias)) @ S.T, np.float64)
+    if not observed:
+        return prior.mean_m, prior.covariance_m2
+    H, seen_m, noise_m2 = stacked(observed, len(prior.mean_m))
+    common_m2 = prior.covariance_m2 @ H.T
+    gain = np.linalg.solve(H @ common_m2 + noise_m2, common_m2.T).T
+    covariance_m2 = prior.covariance_m2 - gain @ common_m2.T
+    return prior.mean_m + gain @ (seen_m - H @ prior.mean_m), 0.5 * (
+        covariance_m2 + covariance_m2.T
+    )
 
 
-def _information(observed: Sequence[Observed]) -> tuple[Float64, Float64]:
-    """Return the information matrix (6, 6) and vector (6,) of observations."""
-    information, state = np.zeros((6, 6)), np.zeros(6)
-    for H, seen_m, covariance_m2 in observed:
-        weighted = np.linalg.solve(covariance_m2, H).T
-        information += weighted @ H
-        state += weighted @ seen_m
-    return information, state
+def stacked(observed: Sequence[Observed], unknowns: int) -> Observed:
+    """Return several observations as one of the first unknowns; the others are taken as zero."""
+    H = np.zeros((sum(len(one[1]) for one in observed), unknowns))
+    row = 0
+    for by, _, _ in observed:
+        columns = min(unknowns, by.shape[1])
+        H[row : row + len(by), :columns] = by[:, :columns]
+        row += len(by)
+    return (
+        H,
+        np.concatenate([one[1] for one in observed]),
+        block_diag(*[one[2] for one in observed]),
+    )
+
+
+def _information(
+    observed: Sequence[Observed], sitting: SittingPrior | None
+) -> tuple[Float64, Float64]:
+    """Return the information (6, 6) and (6,) of one sitting's observations on [φ_left; φ_right]."""
+    H, seen_m, noise_m2 = stacked(observed, 12)
+    by_eyes, by_sitting = H[:, :6], H[:, 6:]
+    if sitting is not None:
+        seen_m = seen_m - by_sitting @ sitting.mean
+        noise_m2 = noise_m2 + by_sitting @ sitting.covariance @ by_sitting.T
+    weighted = np.linalg.solve(noise_m2, by_eyes).T
+    return weighted @ by_eyes, weighted @ seen_m
 
 
 def learn_prior(
-    sessions: Sequence[Sequence[Observed]], settings: PriorSettings = PriorSettings()
+    sessions: Sequence[Sequence[Observed]],
+    settings: PriorSettings = PriorSettings(),
+    sitting: SittingPrior | None = None,
 ) -> LearnedPrior | None:
     """Learn the prior from the observations of earlier sessions, each of another wearer.
 
@@ -171,6 +205,8 @@ def learn_prior(
         eye distance, if it was measured.
     settings : PriorSettings
         Of the default prior, which takes part as a few sessions.
+    sitting : SittingPrior, optional
+        Of the errors that the observations of one session have in common; without it, none.
 
     Returns
     -------
@@ -180,7 +216,7 @@ def learn_prior(
     if len(sessions) < MIN_SESSIONS:
         return None
     default = eye_prior(PriorSettings(settings.eye_box_sigma_m, settings.eye_difference_sigma_m))
-    known = [_information(observed) for observed in sessions]
+    known = [_information(observed, sitting) for observed in sessions]
     information, state = (np.array(parts) for parts in zip(*known, strict=True))
     count = len(sessions)
     mean_m, covariance_m2 = default.mean_m, default.covariance_m2
@@ -221,7 +257,7 @@ def observe_eye_distance(rig: Rig, eye_distance: EyeDistance, near_m: Float64) -
     H = np.zeros((1, 6))
     for eye, sign in zip(EYES, (-1.0, 1.0), strict=True):
         H[0, eye_slice(eye)] = sign * rig.eyes[eye].T_V_H[:3, :3] @ between_m / distance_m
-    seen_m = np.array([eye_distance.value_m - distance_m]) + H @ near_m
+    seen_m = np.array([eye_distance.value_m - distance_m]) + H @ near_m[:6]
     return H, seen_m, np.array([[eye_distance.sigma_m**2]])
 
 
@@ -230,7 +266,7 @@ def with_eye_distance(prior: EyePrior, rig: Rig, eye_distance: EyeDistance | Non
     if eye_distance is None:
         return prior
     observed = observe_eye_distance(rig, eye_distance, prior.mean_m)
-    return EyePrior(*posterior(prior, [observed]), prior.sessions)
+    return EyePrior(*posterior(prior, [observed]), prior.sessions, prior.warning)
 
 
 def shift_by_depth(point_E_m: Float64, display: EyeDisplay, rig: Rig) -> Float64:

@@ -36,15 +36,16 @@ from handcal.register.verdict import (
     MOST_ALIGNMENTS,
     Advice,
     VerdictSettings,
+    Verified,
     advise,
+    describe_verified,
     eye_benefit,
     eye_distance_m,
     judge,
-    measured_arcmin,
     planned_eyes,
 )
 
-RESULTS_VERSION = 2
+RESULTS_VERSION = 3
 USED: tuple[VerdictName, ...] = ("accept", "repeat")
 """Verdicts of eyes that are drawn with the solved φ; others keep the offline calibration."""
 
@@ -81,8 +82,14 @@ class Results:
     """Expected error after one more alignment with all solved eyes open."""
     fused: Fused
     """The observations and the prior behind `eyes`."""
-    measured_arcmin: Mapping[Eye, tuple[float, float]] = field(default_factory=dict)
-    """Error of each verified eye before its verification, and after it with all that is known."""
+    verified: Mapping[Eye, Verified] = field(default_factory=dict)
+    """The outcome of the verifications of each verified eye."""
+
+    @property
+    def evidence(self) -> tuple[str, ...]:
+        """Names of what in the observations speaks against the result."""
+        misfit = self.fused.misfit
+        return ("misfit",) if misfit is not None and misfit.ratio > 1.0 else ()
 
     @property
     def rendered_shift_m(self) -> Mapping[Eye, Float64]:
@@ -205,12 +212,12 @@ def conclude(
     aligned = [alignment.eyes for alignment, _ in pairs]
     ahead = [] if plan is None else _upcoming(plan, aligned, usable_eyes)
     advice = {eye: advise(rig, fused, eye, settings.verdict, ahead) for eye in fused.shifts}
-    measured = {
-        eye: measured_arcmin(rig, fused, eye, verified[eye])
+    checked = {
+        eye: describe_verified(rig, fused, eye, verified[eye])
         for eye in EYES
         if eye in fused.verified
     }
-    verdicts = judge(rig, fused, advice, settings.verdict, contradictions, measured)
+    verdicts = judge(rig, fused, advice, settings.verdict, contradictions, checked)
     another_m2 = fused.covariance_after_m2(tuple(fused.shifts), 1)
     return Results(
         method=settings.method,
@@ -230,7 +237,7 @@ def conclude(
             for eye in fused.shifts
         },
         fused=fused,
-        measured_arcmin=measured,
+        verified=checked,
     )
 
 
@@ -255,9 +262,11 @@ def results_json(results: Results) -> dict[str, Any]:
             | {"verdict": results.verdicts[eye].name, "reason": results.verdicts[eye].reason}
             | _benefit_json(results.benefits[eye])
             | {"advice": _advice_json(results.advice.get(eye))}
-            | _measured_json(results.measured_arcmin.get(eye))
+            | _verified_json(results.verified.get(eye))
             for eye, shift in results.eyes.items()
         },
+        "evidence": list(results.evidence),
+        "prior_warning": results.fused.prior.warning,
         "eye_distance_m": results.eye_distance_m,
         "measured_eye_distance": None if measured is None else asdict(measured),
         "observed": [
@@ -303,8 +312,12 @@ def _advice_json(advice: Advice | None) -> dict[str, Any] | None:
     return None if advice is None else asdict(advice) | {"eyes": list(advice.eyes)}
 
 
-def _measured_json(measured: tuple[float, float] | None) -> dict[str, Any]:
-    return {} if measured is None else {"measured_arcmin": list(measured)}
+def _verified_json(verified: Verified | None) -> dict[str, Any]:
+    if verified is None:
+        return {}
+    found = asdict(verified)
+    before_after = [found.pop("before_arcmin"), found.pop("now_arcmin")]
+    return {"measured_arcmin": before_after, "verification": found}
 
 
 def _shift_json(shift: EyeShift) -> dict[str, Any]:

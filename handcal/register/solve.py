@@ -87,7 +87,7 @@ def solve_eye_shift(
     ...     hand_cut=alignment.hand_is_cut,
     ... )
     >>> print(shift)
-    φ = (+3.59 ± 1.32, -4.09 ± 0.77, +1.07 ± 1.17) mm; rms 1.58 mm, 97 % inliers, converged
+    φ = (+5.20 ± 0.92, -4.64 ± 0.54, +3.84 ± 1.99) mm; rms 1.55 mm, 97 % inliers, converged
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}: choose from {', '.join(METHODS)}")

@@ -26,6 +26,10 @@ from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_position_m, eye_slice
 
 MOST_ALIGNMENTS = 10
+MISFIT = "drawing and hand differ in a way that no eye explains: check the rig's depth edges"
+"""Said of observations beyond what 95 % of usual wearers make."""
+# An eye whose calibration is as probably better as this is drawn with it, although not accepted.
+_LIKELY = 0.8
 # More than this are not worth it where the offline calibration is within the target.
 _FEW_ALIGNMENTS = 2
 # Each eye in turn, then both, which a wearer sees best and which determines the eyes' common part.
@@ -103,16 +107,33 @@ def eye_benefit(rig: Rig, fused: Fused, eye: Eye) -> Benefit:
     )
 
 
-def measured_arcmin(
-    rig: Rig, fused: Fused, eye: Eye, verification: Verification
-) -> tuple[float, float]:
-    """Return an eye's error before its first verification and now, from all that is known."""
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """The outcome of an eye's verifications."""
+
+    before_arcmin: float
+    now_arcmin: float
+    """Expected error before the first of them and now, from all that is known."""
+    moved_arcmin: float
+    moved_size: float
+    """By how much the wearer moved the drawing in the last one, and made it grow."""
+    changed_arcmin: float
+    """By how much all that is drawn has changed since the first one began."""
+
+
+def describe_verified(rig: Rig, fused: Fused, eye: Eye, verification: Verification) -> Verified:
+    """Return what an eye's verifications found, the last with the earlier ones."""
     display, shift = rig.eyes[eye], fused.shifts[eye]
     first = (*verification.earlier, verification)[0]
-    before_m = shift.shift_m - first.before_m
-    errors_m = before_m, np.zeros(3)
-    before, now = (expected_arcmin(display, one_m, shift.covariance_m2) for one_m in errors_m)
-    return before, now
+    changed_m = shift.shift_m - first.before_m
+    moved = np.add(verification.nudge_arcmin, verification.offset_arcmin)
+    return Verified(
+        before_arcmin=expected_arcmin(display, changed_m, shift.covariance_m2),
+        now_arcmin=expected_arcmin(display, np.zeros(3), shift.covariance_m2),
+        moved_arcmin=float(np.linalg.norm(moved)),
+        moved_size=verification.nudge_size + verification.offset_size,
+        changed_arcmin=expected_arcmin(display, changed_m, np.zeros((3, 3))),
+    )
 
 
 def advise(
@@ -173,7 +194,7 @@ def judge(
     advice: Mapping[Eye, Advice],
     settings: VerdictSettings,
     contradictions: Sequence[str] = (),
-    measured: Mapping[Eye, tuple[float, float]] = MappingProxyType({}),
+    verified: Mapping[Eye, Verified] = MappingProxyType({}),
 ) -> dict[Eye, Verdict]:
     """Judge every solved eye; the first reason that applies is given.
 
@@ -186,9 +207,8 @@ def judge(
     settings : VerdictSettings
     contradictions : sequence of str
         Sentences of evidence from outside the solver against the result.
-    measured : mapping of eye to (before, after)
-        Errors in arcmin by the wearer's verification, as `measured_arcmin` gives them. They are
-        part of `fused`, and so of the verdict; here they are added to the reason.
+    verified : mapping of eye to Verified
+        They are part of `fused`, and so of the verdict; here they are added to the reason.
     """
     apart_m = eye_distance_m(rig, fused.shifts)
     if contradictions:
@@ -206,13 +226,33 @@ def judge(
         )
         for eye, shift in fused.shifts.items()
     }
-    for eye, (before, _) in measured.items():
-        found = verdicts[eye]
-        corrected = "" if found.name == "keep" else " and corrected it"
-        told = f"the verification found an error of {before:.1f}′{corrected}; {found.reason}"
-        if found.name in ("accept", "repeat", "keep"):
-            verdicts[eye] = replace(found, reason=told)
+    for eye, verdict in verdicts.items():
+        if verdict.name in ("accept", "repeat", "keep"):
+            verdicts[eye] = _with_evidence(verdict, fused, eye, verified.get(eye))
     return verdicts
+
+
+def _with_evidence(verdict: Verdict, fused: Fused, eye: Eye, verified: Verified | None) -> Verdict:
+    """Return a verdict with what the verifications and the misfit add to it."""
+    reasons = []
+    if fused.misfit is not None and fused.misfit.ratio > 1.0:
+        reasons.append(MISFIT)
+        if verdict.name == "accept":
+            verdict = replace(verdict, name="repeat")
+    if (apart_arcmin := fused.apart_arcmin.get(eye)) is not None:
+        reasons.append(f"two verifications of this eye are {apart_arcmin:.1f}′ apart")
+    if verified is not None:
+        size = f"{100 * verified.moved_size:+.1f}".replace("-", "\N{MINUS SIGN}")
+        changed = (
+            ""
+            if verdict.name == "keep"
+            else (f"; what is drawn has changed by {verified.changed_arcmin:.1f}′ since")
+        )
+        reasons.append(
+            f"the wearer moved the drawing by {verified.moved_arcmin:.1f}′ and {size} % in "
+            f"size{changed}"
+        )
+    return replace(verdict, reason="; ".join([*reasons, verdict.reason]))
 
 
 def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) -> Verdict | None:
@@ -259,7 +299,9 @@ def _judge_benefit(gain: Benefit, advice: Advice, more: str, settings: VerdictSe
         )
     is_soon_accepted = advice.is_accepted and advice.alignments <= _FEW_ALIGNMENTS
     if gain.without_arcmin <= gain.after_arcmin or (
-        gain.without_arcmin <= settings.target_arcmin and not is_soon_accepted
+        gain.without_arcmin <= settings.target_arcmin
+        and gain.probability_better < _LIKELY
+        and not is_soon_accepted
     ):
         return Verdict(
             "keep",

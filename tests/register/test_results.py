@@ -43,9 +43,9 @@ def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None
     data = json.loads(json.dumps(results_json(results), allow_nan=False))
     assert set(data) == {
         "version", "method", "eyes", "eye_distance_m", "measured_eye_distance", "alignments",
-        "observed",
+        "observed", "evidence", "prior_warning",
     }  # fmt: skip
-    assert (data["version"], data["method"]) == (2, "consistent")
+    assert (data["version"], data["method"]) == (3, "consistent")
     assert list(data["eyes"]) == list(EYES)
     solved = {
         "shift_m", "covariance_m2", "rms_m", "inlier_ratio", "iterations", "converged",
