@@ -211,6 +211,7 @@ class Aligning:
             t_b_ns=hand.cloud.t_camera_ns,
             drawn_shift_m=dict(drawn_shift_m),
             time_sigma_m=time_sigma_m,
+            outline_sigma_px=self.cursor.cloud.outline_sigma_px,
         )
         facts = AlignmentFacts(
             match_age_s=1e-9 * abs(hand.t_host_ns - confirmation.t_host_ns),

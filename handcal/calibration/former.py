@@ -56,7 +56,7 @@ def read_former(path: Path, rig: Rig) -> Former:
     known = [one.at(fused.wearer_scale) for one in fused.all_observed]
     mean_m, covariance_m2 = posterior(fused.prior, known)
     shift_m = {eye: np.zeros(3) for eye in EYES} | dict(record.applied_shift_m)
-    return Former(shift_m, widened(mean_m, covariance_m2 + fused.by_depth_m2, SLIP_M))
+    return Former(shift_m, widened(mean_m[:6], covariance_m2[:6, :6], SLIP_M))
 
 
 _FAULTY = ("contradicted", "implausible")

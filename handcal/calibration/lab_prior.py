@@ -1,4 +1,7 @@
-"""The prior of wearers' eye positions, learned from a lab's finished sessions with one rig."""
+"""The priors learned from a lab's finished sessions with one rig.
+
+Where wearers' eyes are, and what wearers see wrongly in a whole sitting, are two things.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,8 @@ from handcal.register.prior import (
     observe_eye_distance,
 )
 from handcal.register.results import RESULTS_VERSION
+from handcal.register.sitting import SittingSettings, sitting_prior
+from handcal.register.wearers import LearnedWearers, learn_wearers
 from handcal.rig.rig_file import read_rig
 from handcal.session.facts import read_facts
 from handcal.session.journal import find_journals
@@ -30,7 +35,7 @@ from handcal.session.record import replay
 MAX_SESSIONS = 300
 """Only the newest sessions count: a headset's fit and a lab's wearers change."""
 _MAX_OBSERVATIONS = 100
-_OBSERVED_SHAPES = {"H": (3, 6), "seen_m": (3,), "covariance_m2": (3, 3)}
+_OBSERVED_SHAPES = {"H": (3, 12), "seen_m": (3,), "covariance_m2": (3, 3)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +44,13 @@ class LabPrior:
 
     learned: LearnedPrior | None
     """None if there are too few sessions."""
+    wearers: LearnedWearers | None
+    """The prior of what wearers see wrongly, from repeated sittings; None for too few."""
+    sittings: int
+    people: int
+    """Number of sittings of people with more than one, and of these people."""
     used: int
-    """Number of sessions it was, or would be, learned from."""
+    """Number of sessions that `learned` was, or would be, learned from."""
     left_out: Mapping[str, int]
     """Number of other sessions by the reason why they do not count."""
 
@@ -50,8 +60,9 @@ def run_learn_prior(
 ) -> LabPrior:
     """Learn the prior from the finished sessions in a folder that used one rig.
 
-    A session counts once, with its newest results; a wearer with several sessions counts with the
-    newest only. A session whose result was contradicted or implausible does not count.
+    A session counts once, with its newest results. For where eyes are, a wearer with several
+    sessions counts with the newest only; what wearers see wrongly is learned from all sessions of
+    wearers with several. A session whose result was contradicted or implausible does not count.
 
     Parameters
     ----------
@@ -81,7 +92,19 @@ def run_learn_prior(
     newest = {whose: observed for _, whose, observed in sorted(found, key=itemgetter(0))}
     if len(newest) < len(found):
         left_out["earlier sessions of the same wearer"] = len(found) - len(newest)
-    return LabPrior(learn_prior(list(newest.values()), settings), len(newest), left_out)
+    sitting = sitting_prior(rig, SittingSettings())
+    by_person: dict[str, list[list[Observed]]] = {}
+    for _, whose, observed in found:
+        by_person.setdefault(whose, []).append(observed)
+    people = [sittings for sittings in by_person.values() if len(sittings) > 1]
+    return LabPrior(
+        learn_prior(list(newest.values()), settings, sitting),
+        learn_wearers(people, sitting, progress),
+        sum(map(len, people)),
+        len(people),
+        len(newest),
+        left_out,
+    )
 
 
 class _NotUsableError(Exception):

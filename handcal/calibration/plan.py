@@ -348,7 +348,7 @@ class Plan:
 
     def _unverified(self) -> tuple[Eye, ...]:
         """Return the eyes to verify that have not been, nor were skipped."""
-        done = {*self._calibration.verifications, *self.skipped}
+        done = {*self._calibration.verifications, *self.skipped, *self._calibration.unmoved}
         return tuple(eye for eye in self.settings.usable_eyes if eye not in done)
 
     def _fault(self, *names: VerdictName) -> str:
@@ -380,7 +380,11 @@ class Plan:
         return next_verification(
             self._calibration.results,
             self._calibration.verifications,
-            usable_eyes=tuple(e for e in self.settings.usable_eyes if e not in self.skipped),
+            usable_eyes=tuple(
+                eye
+                for eye in self.settings.usable_eyes
+                if eye not in self.skipped | self._calibration.unmoved
+            ),
             settings=self.settings.placement,
         )
 

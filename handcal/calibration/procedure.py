@@ -49,9 +49,12 @@ from handcal.calibration.states import (
     State,
 )
 from handcal.calibration.verifying import (
+    SET_ASIDE_PROMPT,
     SKIPPED,
+    UNMOVED_PROMPT,
     Verifying,
     VerifyingView,
+    draw_offset,
     hand_centre_E_m,
     new_id,
     resumed,
@@ -152,6 +155,8 @@ class Calibration:
         The camera that gives the frames; set it before `step`.
     evidence : Evidence
         Evidence from outside the solver against the result.
+    unmoved : set of eye
+        Eyes whose verification ended without evidence: nobody moved the drawing.
     """
 
     def __init__(
@@ -182,6 +187,8 @@ class Calibration:
         self._looks_around = False
         self._before_verifying = State.SHOW_HAND
         self._apply_until_s = 0.0
+        self._rng = np.random.default_rng()
+        self.unmoved: set[Eye] = set()
         self._former_m = {eye: np.zeros(3) for eye in EYES} | as_shifts(former_m)
         self._drawing.shift_m |= self._former_m | dict(record.applied_shift_m)
         self._resume(record)
@@ -565,6 +572,7 @@ class Calibration:
             raise ProcedureError("the headset has not acknowledged its projections yet; wait")
         if self.verifying is not None:
             self._end_verifying(self.verifying.before_m)
+        self.unmoved.discard(eye)
         self._begin_verifying(
             Verifying(
                 VerifyRequest(new_id(), eye),
@@ -599,6 +607,8 @@ class Calibration:
     def verified(self) -> None:
         """Confirm for the wearer, who has told the technician, that the drawing covers the hand.
 
+        A drawing that nobody has moved is set aside first, and must be brought back.
+
         Raises
         ------
         ProcedureError
@@ -612,7 +622,10 @@ class Calibration:
             raise ProcedureError("the hand must be still and in view of the camera")
         if not self.is_applied:
             raise ProcedureError("the headset has not received the projection yet; wait")
-        self._accept_verification(verifying, hand)
+        if verifying.needs_proof:
+            self._set_aside(verifying)
+        else:
+            self._accept_verification(verifying, hand)
 
     def skip_verification(self) -> None:
         """End the verification without a result; the eye is drawn with the φ before it.
@@ -874,7 +887,10 @@ class Calibration:
         self._before_verifying, self.state = self.state, State.VERIFY
         self.verifying = verifying
         self.eyes = (verifying.eye,)
-        self._link.send_prompt(verify_prompt(verifying.eye), self.eyes)
+        is_aside = verifying.view().is_set_aside
+        self._link.send_prompt(
+            SET_ASIDE_PROMPT if is_aside else verify_prompt(verifying.eye), self.eyes
+        )
         self._link.send_verify(verifying.request)
 
     def _require_verifying(self, eye: Eye | None = None) -> Verifying:
@@ -912,9 +928,19 @@ class Calibration:
         judged = verifying.judge(fits, hands, self._settings.match_tolerance_s)
         if isinstance(judged, str):
             self._refuse_verification(verifying, judged)
+        elif verifying.needs_proof:
+            self._set_aside(verifying)
         else:
             self.evidence.drawn_as_sent()
             self._accept_verification(verifying, judged)
+
+    def _set_aside(self, verifying: Verifying) -> None:
+        """Move a drawing that nobody has moved, and ask the wearer to bring it back."""
+        offset = draw_offset(self._rng)
+        try:
+            self._nudge(lambda: verifying.set_aside(offset))
+        finally:  # also if the session cannot be written
+            self._link.send_prompt(SET_ASIDE_PROMPT, self.eyes)
 
     def _hear(self, nudge: Nudge, verifying: Verifying) -> None:
         step = verifying.hear(nudge)
@@ -932,7 +958,11 @@ class Calibration:
     def _accept_verification(self, verifying: Verifying, hand: PlacedHand) -> None:
         """Store and fuse a verification, and send what it leads to."""
         hand = merge_hold(self._sight.hands.held_at(hand), hand)
-        found = verifying.result(hand_centre_E_m(self.rig, verifying.eye, hand))
+        hand_E_m = hand_centre_E_m(self.rig, verifying.eye, hand)
+        if not verifying.is_moved:
+            self._end_unmoved(verifying)
+            return
+        found = verifying.result(hand_E_m, hand.cloud.outline_sigma_px)
         found = found.after(self.verifications.get(verifying.eye))
         self._end_verifying(verifying.shift_m)
         with suppress(FileError):  # the results, recorded next, raise it again
@@ -944,6 +974,13 @@ class Calibration:
                 usable_eyes = self._session.contents.facts.usable_eyes
                 # The other eye follows at once.
                 self.apply(keeps_hand=any(eye not in self.verifications for eye in usable_eyes))
+
+    def _end_unmoved(self, verifying: Verifying) -> None:
+        """End a verification in which nobody moved even the drawing that was set aside."""
+        self.unmoved.add(verifying.eye)
+        self._end_verifying(verifying.before_m)
+        self._link.send_prompt(UNMOVED_PROMPT, EYES)
+        self.record_skipped(verifying.eye)
 
     def _end_verifying(self, shift_m: Float64) -> None:
         """Draw the verified eye with φ, and return to the state before."""

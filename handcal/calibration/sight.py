@@ -12,10 +12,10 @@ from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import HandError, PoseError
 from handcal.core.types import CameraIdentity, Frame, HandCloud, Rig
+from handcal.hand.edges import edges_of
 from handcal.hand.outline import with_outline
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
-from handcal.hand.edges import edges_of
 
 
 class Sight:
@@ -47,7 +47,7 @@ class Sight:
         self._evidence = evidence
         self._clock = FrameClock(settings.camera_latency_s)
         self._finder = make_finder(settings.segment)
-        self._edges = edges_of(rig)
+        self._rig = rig
         self.delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D, settings.delay)
         self.hands = RecentHands(
             link.pose_at_host_ns, rig.T_H_D, settings.steady_s, settings.steady_m
@@ -93,7 +93,7 @@ class Sight:
             or self._evidence.see_delivery(is_drawing_lost)
             or self._see_world(frame, t_host_ns)
         )
-        cloud, problem = self._find(frame, contradiction)
+        cloud, problem = self._find(frame, camera, contradiction)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
         hand, not_placed = self.hands.add(cloud, t_host_ns, frame.T_W_D)
         return Observation(
@@ -108,7 +108,7 @@ class Sight:
         )
 
     def _find(
-        self, frame: Frame, contradiction: Contradiction | None
+        self, frame: Frame, camera: CameraIdentity, contradiction: Contradiction | None
     ) -> tuple[HandCloud | None, str]:
         """Return the hand in a frame, or None and the reason."""
         if contradiction is not None:
@@ -118,7 +118,7 @@ class Sight:
             cloud = self._finder.find(frame)
         except HandError as error:
             return None, str(error)
-        return with_outline(cloud, frame, self._edges), ""
+        return with_outline(cloud, frame, edges_of(self._rig, camera.model)), ""
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:
         """Compare the pose that a frame carries with that of the headset's app."""

@@ -22,6 +22,7 @@ _DTYPES = {
     "t_ns": "<i8",
     "eyes": "<U5",
     "time_sigma_m": "<f8",
+    "outline_sigma_px": "<f8",
 } | {f"{name}_{eye}": "<f8" for name in ("T_E_W", "drawn_shift_m") for eye in EYES}
 
 # Raised by zipfile, numpy's header parser and ndarray on damaged archives, besides ValueError.
@@ -39,8 +40,9 @@ def encode_alignment(alignment: Alignment) -> bytes:
     """Return `alignment` as a .npz archive.
 
     It contains `cursor_m`, `hand_m`, `cursor_is_cut`, `hand_is_cut` and `rotation_rad` as in
-    `Alignment`, `t_ns` (t_a, t_b), `eyes`, `time_sigma_m` unless it is 0, and for each eye that has
-    them `T_E_W` and `drawn_shift_m`, named `T_E_W_left` and so on.
+    `Alignment`, `t_ns` (t_a, t_b), `eyes`, `time_sigma_m` unless it is 0, `outline_sigma_px` if it
+    is known, and for each eye that has them `T_E_W` and `drawn_shift_m`, named `T_E_W_left` and so
+    on.
     """
     arrays: dict[str, Any] = {
         "cursor_m": alignment.cursor_m,
@@ -53,6 +55,8 @@ def encode_alignment(alignment: Alignment) -> bytes:
     }
     if alignment.time_sigma_m:
         arrays["time_sigma_m"] = alignment.time_sigma_m
+    if alignment.outline_sigma_px is not None:
+        arrays["outline_sigma_px"] = alignment.outline_sigma_px
     arrays |= {f"T_E_W_{eye}": T for eye, T in alignment.T_E_W.items()}
     arrays |= {f"drawn_shift_m_{eye}": shift for eye, shift in alignment.drawn_shift_m.items()}
     stream = io.BytesIO()
@@ -91,6 +95,9 @@ def decode_alignment(data: bytes) -> Alignment:
             t_a_ns=t_a_ns,
             t_b_ns=t_b_ns,
             time_sigma_m=float(arrays.get("time_sigma_m", 0.0)),
+            outline_sigma_px=(
+                float(arrays["outline_sigma_px"]) if "outline_sigma_px" in arrays else None
+            ),
         )
     except KeyError as error:
         raise ValueError(f"the alignment has no array {error}") from error

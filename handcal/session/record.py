@@ -82,8 +82,15 @@ class SessionRecord:
 
     @property
     def is_solvable(self) -> bool:
-        """True if it holds an alignment or a verification; a slipped headset is only verified."""
-        return bool(self.alignments or self.facts.verified)
+        """True if it holds an alignment or a verification; a slipped headset is only verified.
+
+        A verification in which nothing was moved, or whose place is unknown, is no evidence.
+        """
+        return bool(self.alignments) or any(
+            one.was_moved and one.hand_E_m is not None
+            for newest in self.facts.verified.values()
+            for one in (*newest.earlier, newest)
+        )
 
     @property
     def simulated(self) -> str:

@@ -15,7 +15,7 @@ from handcal.calibration.lab_prior import run_learn_prior
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Alignment, EyeDistance, Rig
 from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_position_m, eye_prior
-from handcal.register.results import SolveSettings, results_json, solve_session
+from handcal.register.results import RESULTS_VERSION, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
 from handcal.session.library import correct_wearer
 from handcal.session.repair import repair_session
@@ -106,7 +106,7 @@ def test_a_session_counts_by_its_start_and_under_its_corrected_name(
 ) -> None:
     counts: list[list[int]] = []  # of the observations of each session
     monkeypatch.setattr(
-        lab_prior, "learn_prior", lambda sessions, _: counts.append([*map(len, sessions)])
+        lab_prior, "learn_prior", lambda sessions, *_: counts.append([*map(len, sessions)])
     )
     _session(tmp_path, "old", alignment, wearer="p7", eye_distance=EyeDistance(0.065))
     _session(tmp_path, "new", alignment, wearer="P7")
@@ -138,8 +138,9 @@ def test_measured_eye_distances_are_learned_from(tmp_path: Path, alignment: Alig
 def test_results_of_another_version_or_without_observations_do_not_count(
     tmp_path: Path, alignment: Alignment
 ) -> None:
-    damaged = {"H": np.eye(3).tolist(), "seen_m": [0.0] * 3, "covariance_m2": [[1.0]]}
-    for version, observed in ((1, [damaged]), (3, [damaged]), (2, [damaged]), (2, [])):
+    damaged = {"H": np.eye(3, 6).tolist(), "seen_m": [0.0] * 3, "covariance_m2": [[1.0]]}
+    now = RESULTS_VERSION
+    for version, observed in ((now - 1, []), (now + 1, []), (now, [damaged]), (now, [])):
         with Session.create(tmp_path, RIG, {}) as session:
             session.save_alignment(alignment)
             session.save_results({"version": version, "eyes": {}, "observed": observed})

@@ -59,13 +59,20 @@ class Planned:
         self.stage.press()
 
     def fits(self, eye: Eye) -> None:
+        """Move the drawing by one press, and confirm that it fits."""
+        self._say(eye, fits=False)
+        self.stage.see()
+        self._say(eye, fits=True)
+
+    def _say(self, eye: Eye, fits: bool) -> None:
         eventually(lambda: self.stage.shown().verify is not None)
         eventually(lambda: self.stage.calibration.is_applied)
         shown = self.stage.shown()
         assert shown.verify is not None
         assert shown.verify.eye == eye
         t_ns = self.stage.t_ns + HEADSET_AHEAD_NS
-        self.stage.client.wait_acked(self.stage.client.nudge(t_ns, shown, NudgeSum(), True), 5.0)
+        nudge = self.stage.client.nudge(t_ns, shown, NudgeSum(1.0), fits)
+        self.stage.client.wait_acked(nudge, 5.0)
 
 
 @pytest.fixture

@@ -188,9 +188,9 @@ def test_one_eye_at_a_time_finds_each_eye(stage: Stage) -> None:
     assert results.eye_distance_m is not None
 
 
-@pytest.mark.parametrize("slip_m", [0.0, 0.002])
+@pytest.mark.parametrize(("slip_m", "left_over"), [(0.0, 0.95), (0.002, 0.7)])
 def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(
-    stage: Stage, slip_m: float
+    stage: Stage, slip_m: float, left_over: float
 ) -> None:
     """The wearer misses the first cursor by `slip_m` to one side, the second to the other."""
     true_m = np.array([0.004, -0.003, 0.002])
@@ -204,8 +204,9 @@ def test_a_second_alignment_is_drawn_with_the_first_and_improves_on_it(
     np.testing.assert_array_equal(drawn_m["right"], np.zeros(3))
     fused = stage.calibration.solve().eyes["left"]
     before_m, after_m = (float(np.linalg.norm(s.shift_m - true_m)) for s in (first, fused))
-    # Both are drawn towards the eye box's middle, the second less.
-    assert after_m < max(0.7 * before_m, 5e-4)
+    # Both are drawn towards the eye box's middle, the second less. What could be an error of the
+    # whole sitting, as the drawn outline's, a second alignment does not make more certain.
+    assert after_m < left_over * before_m
     if slip_m == 0.0:
         assert np.trace(fused.covariance_m2) < np.trace(first.covariance_m2)
 

@@ -8,6 +8,12 @@ import numpy as np
 import pytest
 
 from handcal.calibration.states import ProcedureError, State
+from handcal.calibration.verifying import (
+    SET_ASIDE_PROMPT,
+    UNMOVED_PROMPT,
+    draw_offset,
+    skipped_eyes,
+)
 from handcal.core.display import projection_matrix
 from handcal.core.errors import FileError
 from handcal.core.geometry import rigid
@@ -59,6 +65,32 @@ def fits(stage: Stage, moved: NudgeSum = STILL) -> None:
     drawn_px(stage, "left")
     press(stage, moved, fits=True)
     stage.calibration.wait_applied()
+
+
+def nudged(stage: Stage) -> None:
+    """Have the technician move the drawing, so that the wearer's word is evidence."""
+    stage.calibration.nudge("left", 1.0, 1.0)
+    eventually(lambda: stage.calibration.is_applied)
+    stage.hold()
+
+
+def set_aside(stage: Stage, eye: Eye = "left") -> NudgeSum:
+    """Have the wearer confirm a drawing that nobody moved; return where it was moved then."""
+    drawn_px(stage, eye)
+    press(stage, STILL, fits=True)
+    assert stage.state() is State.VERIFY
+    eventually(lambda: stage.shown().prompt == SET_ASIDE_PROMPT)
+    assert stage.calibration.verifying is not None
+    return stage.calibration.verifying.offset
+
+
+def whole(offset: NudgeSum) -> NudgeSum:
+    """Return presses that bring a drawing back to within half a press."""
+    return NudgeSum(
+        float(-round(offset.right_arcmin)),
+        float(-round(offset.down_arcmin)),
+        -0.002 * round(offset.size / 0.002),
+    )
 
 
 def test_the_headset_verifies_one_eye_and_shows_the_outline(stage: Stage) -> None:
@@ -206,6 +238,145 @@ def test_a_word_with_a_last_nudge_counts_only_once_the_wearer_has_seen_it(stage:
     assert stage.state() is State.APPLIED
 
 
+def test_a_drawing_that_fits_at_once_is_moved_aside_and_counts_once_it_is_brought_back(
+    stage: Stage, session: Session
+) -> None:
+    begin(stage)
+    before_m = stage.calibration.applied_shift_m["left"]
+    verifying = stage.calibration.verifying
+    assert verifying is not None
+    assert verifying.needs_proof
+    offset = set_aside(stage)
+    assert not verifying.needs_proof
+    assert not verifying.is_moved
+    assert verifying.view().is_set_aside
+    aside_m = nudged_shift_m(
+        RIG.eyes["left"],
+        before_m,
+        verifying.hand_E_m,
+        offset.right_arcmin,
+        offset.down_arcmin,
+        offset.size,
+    )
+    np.testing.assert_allclose(
+        drawn_px(stage, "left"), projection_matrix(RIG.eyes["left"], aside_m)
+    )
+    assert not stage.calibration.verifications
+    back = whole(offset)
+    press(stage, back)
+    fits(stage, back)
+    assert stage.state() is State.APPLIED
+    found = Session.open(session.path).facts.verified["left"]
+    assert found == stage.calibration.verifications["left"]
+    assert found.was_moved
+    assert found.nudge_arcmin == (back.right_arcmin, back.down_arcmin)
+    assert found.nudge_size == back.size
+    assert found.offset_arcmin == (offset.right_arcmin, offset.down_arcmin)
+    assert found.offset_size == offset.size
+    np.testing.assert_allclose(found.before_m, before_m)
+    # At half a metre, half a press is a tenth of a millimetre across and 0.7 mm along.
+    np.testing.assert_allclose(found.after_m[:2], before_m[:2], atol=3e-4)
+    assert found.after_m[2] == pytest.approx(before_m[2], abs=1.5e-3)
+    results = stage.calibration.results
+    assert results is not None
+    assert set(results.fused.verified) == {"left"}
+    assert results.verified["left"].moved_arcmin < 1.0
+
+
+def test_a_wearer_who_confirms_twice_without_moving_gives_no_evidence(
+    stage: Stage, session: Session
+) -> None:
+    begin(stage)
+    alone, before_m = stage.calibration.results, stage.calibration.applied_shift_m["left"]
+    set_aside(stage)
+    drawn_px(stage, "left")
+    press(stage, STILL, fits=True)
+    assert stage.state() is State.APPLIED
+    eventually(lambda: stage.shown().prompt == UNMOVED_PROMPT)
+    assert stage.calibration.unmoved == {"left"}
+    assert not stage.calibration.verifications
+    assert stage.calibration.results is alone
+    # The drawing does not stay where the program moved it.
+    np.testing.assert_array_equal(stage.calibration.applied_shift_m["left"], before_m)
+    np.testing.assert_allclose(
+        drawn_px(stage, "left"), projection_matrix(RIG.eyes["left"], before_m)
+    )
+    record = Session.open(session.path)
+    assert not record.facts.verified
+    assert skipped_eyes(record.events) == {"left"}
+    # The technician may ask for it once more.
+    stage.hold()
+    verify(stage, "left")
+    assert not stage.calibration.unmoved
+    press(stage, NudgeSum(1.0))
+    fits(stage, NudgeSum(1.0))
+    assert set(stage.calibration.verifications) == {"left"}
+
+
+def test_without_alignments_no_evidence_makes_no_result(stage: Stage, session: Session) -> None:
+    stage.hold()
+    verify(stage, "left")
+    set_aside(stage)
+    drawn_px(stage, "left")
+    press(stage, STILL, fits=True)
+    assert stage.state() is State.SHOW_HAND
+    assert stage.calibration.results is None
+    assert not Session.open(session.path).is_solvable
+    with pytest.raises(ProcedureError, match="align the hand"):
+        stage.calibration.solve()
+
+
+def test_the_technician_s_word_for_a_drawing_that_nobody_moved_is_not_enough(stage: Stage) -> None:
+    begin(stage)
+    stage.hold()
+    stage.calibration.verified()
+    assert stage.state() is State.VERIFY
+    eventually(lambda: stage.shown().prompt == SET_ASIDE_PROMPT)
+    verifying = stage.calibration.verifying
+    assert verifying is not None
+    back = whole(verifying.offset)
+    stage.calibration.nudge("left", back.right_arcmin, back.down_arcmin, back.size)
+    drawn_px(stage, "left")
+    stage.hold()
+    stage.calibration.verified()
+    stage.calibration.wait_applied()
+    found = stage.calibration.verifications["left"]
+    assert found.was_moved
+    assert any(found.offset_arcmin)
+
+
+def test_a_drawing_moved_there_and_back_is_still_unproven(stage: Stage) -> None:
+    begin(stage)
+    stage.calibration.nudge("left", 2.0, 0.0)
+    stage.calibration.undo_nudge()
+    assert stage.calibration.verifying is not None
+    assert stage.calibration.verifying.needs_proof
+    set_aside(stage)
+
+
+def test_a_skipped_verification_leaves_nothing_aside(stage: Stage) -> None:
+    begin(stage)
+    before_m = stage.calibration.applied_shift_m["left"]
+    set_aside(stage)
+    stage.calibration.skip_verification()
+    np.testing.assert_allclose(stage.calibration.applied_shift_m["left"], before_m)
+    assert not stage.calibration.verifications
+
+
+def test_drawings_are_moved_farther_than_a_wearer_overlooks_in_every_direction() -> None:
+    rng = np.random.default_rng(0)
+    offsets = [draw_offset(rng) for _ in range(400)]
+    right, down, size = np.array([[o.right_arcmin, o.down_arcmin, o.size] for o in offsets]).T
+    distance = np.hypot(right, down)
+    assert 8.0 <= distance.min() < 8.2
+    assert 11.8 < distance.max() <= 12.0
+    assert np.abs(size).min() >= 0.015
+    assert np.abs(size).max() <= 0.025
+    assert abs(np.mean(right)) < 1.5
+    assert abs(np.mean(down)) < 1.5
+    assert 0.4 < np.mean(size > 0.0) < 0.6
+
+
 def test_nothing_else_can_be_done_meanwhile(stage: Stage) -> None:
     with pytest.raises(ProcedureError, match="hold the hand up"):
         stage.calibration.verify("left")
@@ -251,11 +422,37 @@ def test_a_session_is_resumed_during_a_verification(
     assert last.calibration.verifications == again.calibration.verifications
 
 
+def test_a_session_is_resumed_while_a_drawing_is_moved_aside(
+    stage: Stage, server: HeadsetServer, client: HeadsetClient, session: Session
+) -> None:
+    begin(stage, "right")
+    offset = set_aside(stage, "right")
+    aside_m = stage.calibration.applied_shift_m["right"]
+    again = Stage(server, client, session)
+    assert again.state() is State.VERIFY
+    verifying = again.calibration.verifying
+    assert verifying is not None
+    assert (verifying.offset, verifying.moved) == (offset, STILL)
+    assert not verifying.needs_proof
+    np.testing.assert_allclose(again.calibration.applied_shift_m["right"], aside_m)
+    again.hold()
+    eventually(lambda: again.calibration.is_applied and again.shown().verify)
+    back = whole(offset)
+    again.calibration.nudge("right", back.right_arcmin, back.down_arcmin, back.size)
+    again.hold()
+    again.calibration.verified()
+    again.calibration.wait_applied()
+    found = again.calibration.verifications["right"]
+    assert found.nudge_arcmin == (back.right_arcmin, back.down_arcmin)
+    assert found.offset_arcmin == (offset.right_arcmin, offset.down_arcmin)
+    assert found.offset_size == offset.size
+
+
 def test_a_verification_that_cannot_be_written_is_sent_all_the_same(
     stage: Stage, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin(stage)
-    stage.hold()
+    nudged(stage)
 
     def refuse(*_: object) -> None:
         raise FileError("the disk is full")
@@ -277,7 +474,7 @@ def test_a_verification_stored_by_a_killed_program_is_not_resumed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     begin(stage)
-    stage.hold()
+    nudged(stage)
 
     def killed(*_: object) -> None:
         raise KeyboardInterrupt
