@@ -155,7 +155,7 @@ COMMANDS: Mapping[str, Entry] = {
     ),
     "solve": Entry("Solve a stored session again; the session itself is not changed.", "sessions"),
     "prior": Entry(
-        "Show the prior of the eyes' positions learned from the finished sessions with one rig.",
+        "Show what finished sessions with one rig tell of eyes, and of what wearers see wrongly.",
         "sessions",
     ),
     "export": Entry(

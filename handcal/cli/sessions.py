@@ -6,12 +6,16 @@ import argparse
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from handcal.cli.output import console, save, show_progress, table, triple
 from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
 from handcal.core.types import METHODS
 from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
+
+if TYPE_CHECKING:
+    from handcal.calibration.lab_prior import LabPrior
 
 _METRES = number(float, 1e-3, 1e6)
 
@@ -168,7 +172,7 @@ def inspect(arguments: argparse.Namespace) -> None:
     json=True,
 )
 def prior(arguments: argparse.Namespace) -> None:
-    """Show the prior of the eyes' positions learned from the finished sessions with one rig."""
+    """Show what finished sessions with one rig tell of eyes, and of what wearers see wrongly."""
     from dataclasses import asdict
 
     import numpy as np
@@ -192,7 +196,16 @@ def prior(arguments: argparse.Namespace) -> None:
         found = run_learn_prior(arguments.folder, rig, settings, progress)
     learned = asdict(found.learned) if found.learned else None
     left_out = dict(found.left_out)
-    save(arguments.json, {"used": found.used, "left_out": left_out, "learned": learned})
+    save(
+        arguments.json,
+        {
+            "used": found.used,
+            "left_out": left_out,
+            "learned": learned,
+            "warning": found.learned.warning if found.learned else "",
+            "wearers": asdict(found.wearers) if found.wearers else None,
+        },
+    )
     console.print(f"Sessions used: {found.used}")
     for reason, count in found.left_out.items():
         console.print(f"Left out: {count} {reason}")
@@ -204,4 +217,40 @@ def prior(arguments: argparse.Namespace) -> None:
     for eye in EYES:
         part = eye_slice(eye)
         shown.add_row(eye, triple(1e3 * used.mean_m[part]), triple(sigma_mm[part]))
+    console.print(shown)
+    if found.learned is not None and found.learned.warning:
+        console.print(
+            f"Not used before it is confirmed: {found.learned.warning}. If the headset does sit "
+            "so, choose 'even if far' in the preferences."
+        )
+    _print_wearers(found)
+
+
+def _print_wearers(found: LabPrior) -> None:
+    """Print what wearers see wrongly in a whole sitting, beside the default."""
+    from math import radians
+
+    from handcal.register.sitting import SittingSettings
+    from handcal.register.wearers import MIN_PEOPLE, MIN_SITTINGS
+
+    console.print(f"Repeated sittings: {found.sittings} of {found.people} people")
+    wearers, usual = found.wearers, SittingSettings()
+    if wearers is None:
+        console.print(
+            f"What wearers always see wrongly takes {MIN_SITTINGS} sittings of {MIN_PEOPLE} people "
+            "to learn; until then the default is used."
+        )
+        return
+    arcmin = radians(1.0 / 60.0)
+    rows = (
+        ("direction, right", "′", arcmin, usual.direction_sigma_arcmin),
+        ("direction, down", "′", arcmin, usual.direction_sigma_arcmin),
+        ("size", " %", 0.01, 100.0 * usual.size_sigma),
+    )
+    shown = table("always seen wrongly", "σ", "95 % interval", "default")
+    for (name, unit, one, default), sigma, low, high in zip(
+        rows, wearers.sigma, wearers.sigma_low, wearers.sigma_high, strict=True
+    ):
+        interval = f"{low / one:.2f} to {high / one:.2f}{unit}"
+        shown.add_row(name, f"{sigma / one:.2f}{unit}", interval, f"{default:g}{unit}")
     console.print(shown)

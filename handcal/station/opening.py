@@ -18,13 +18,18 @@ from handcal.camera.recordings import open_recording
 from handcal.core.errors import CameraError, FileError
 from handcal.core.types import EYES, PlanName, Rig
 from handcal.io.settings import settings_json
-from handcal.register.prior import PriorSettings
+from handcal.register.fuse import FuseSettings
 from handcal.rig.rig_file import read_rig
 from handcal.session.journal import JOURNAL, JOURNAL_END
 from handcal.session.record import replay
 from handcal.session.session import Session
 from handcal.session.state import SessionEvent
-from handcal.sim.camera import CAMERA_FAULTS, SyntheticCamera
+from handcal.sim.camera import (
+    CAMERA_FAULTS,
+    SyntheticCamera,
+    SyntheticSettings,
+    sensor_settings,
+)
 from handcal.sim.process import VirtualHeadset
 from handcal.sim.simulation import Simulation
 from handcal.station.settings import StationSettings
@@ -39,7 +44,7 @@ def resume_or_create(
 ) -> Iterator[tuple[Session, StationSettings]]:
     """Resume a session, or create one, which is removed if its station cannot be opened.
 
-    Also return the settings with the session's prior: a session keeps the prior that it began with,
+    Also return the settings with the session's priors: a session keeps those that it began with,
     so that resuming does not change its results. A resumed one keeps the lab's target, too.
 
     Raises
@@ -51,14 +56,14 @@ def resume_or_create(
         with Session(resume) as session:
             stored = stored_solve_settings(session.contents)
             target_arcmin = stored.verdict.target_arcmin
-            yield session, _with_prior(settings, stored.fuse.prior, target_arcmin)
+            yield session, _with_fuse(settings, stored.fuse, target_arcmin)
         return
     solve = settings.calibration.solve
     if begun.prior is not None:
-        prior = replace(solve.fuse.prior, learned=begun.prior)
+        fuse = replace(solve.fuse, prior=replace(solve.fuse.prior, learned=begun.prior))
     else:
-        prior = _lab_prior(settings)
-    settings = _with_prior(settings, prior, solve.verdict.target_arcmin)
+        fuse = _lab_fuse(settings)
+    settings = _with_fuse(settings, fuse, solve.verdict.target_arcmin)
     rig = read_rig(settings.rig_path)
     station = settings_json(settings)
     stored_settings = {"calibration": station.pop("calibration"), "station": station}
@@ -71,13 +76,13 @@ def resume_or_create(
             raise
 
 
-def _with_prior(
-    settings: StationSettings, prior: PriorSettings, target_arcmin: float
+def _with_fuse(
+    settings: StationSettings, fuse: FuseSettings, target_arcmin: float
 ) -> StationSettings:
     calibration = settings.calibration
     solve = replace(
         calibration.solve,
-        fuse=replace(calibration.solve.fuse, prior=prior),
+        fuse=fuse,
         verdict=replace(calibration.solve.verdict, target_arcmin=target_arcmin),
     )
     return replace(settings, calibration=replace(calibration, solve=solve))
@@ -156,7 +161,10 @@ def open_camera(settings: StationSettings, simulation: Simulation | None, worn_r
         simulation.scene,
         depth_intrinsics=worn_rig.depth_intrinsics,
         seed=settings.seed,
-        settings=CAMERA_FAULTS.get(settings.fault),
+        settings=replace(
+            CAMERA_FAULTS.get(settings.fault, SyntheticSettings()),
+            sensor=sensor_settings(settings.sensor, settings.fatten_px),
+        ),
     )
 
 
@@ -196,10 +204,21 @@ def start_headset(
     )
 
 
-def _lab_prior(settings: StationSettings) -> PriorSettings:
-    """Return the prior for a new session, learned from the lab's earlier ones if wanted."""
-    prior = settings.calibration.solve.fuse.prior
-    if not settings.learn_prior or prior.learned is not None:
-        return prior
+def _lab_fuse(settings: StationSettings) -> FuseSettings:
+    """Return the priors for a new session, learned from the lab's earlier ones if wanted.
+
+    One whose mean is far from the viewpoint is only shown, unless somebody has confirmed it.
+    """
+    fuse = settings.calibration.solve.fuse
+    if not (settings.learn_prior or settings.learn_wearers):
+        return fuse
+    prior, sitting = fuse.prior, fuse.sitting
     found = run_learn_prior(settings.sessions_path, read_rig(settings.rig_path), prior)
-    return replace(prior, learned=found.learned)
+    if settings.learn_prior and prior.learned is None and found.learned is not None:
+        if settings.use_far_prior or not found.learned.warning:
+            prior = replace(prior, learned=found.learned)
+        else:
+            prior = replace(prior, unconfirmed=found.learned)
+    if settings.learn_wearers and sitting.learned is None and found.wearers is not None:
+        sitting = replace(sitting, learned=found.wearers.learned)
+    return replace(fuse, prior=prior, sitting=sitting)

@@ -14,6 +14,7 @@ from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
 from handcal.io.files import user_path
 from handcal.io.resources import resource_path
 from handcal.sim.hand import Side
+from handcal.sim.sensor import SensorName
 from handcal.station.faults import Fault
 
 Source = Literal["simulator", "recording", "realsense", "hololens2", "oak", "orbbec"]
@@ -53,6 +54,10 @@ class StationSettings:
     """Share of the virtual headset's datagrams lost, and reordered, in each direction."""
     fault: Fault = ""
     """Fault of the simulated camera or the virtual headset; empty: none."""
+    sensor: SensorName = "d415"
+    """The kind of simulated camera."""
+    fatten_px: float | None = None
+    """By how much the edges in the images of a simulated stereo camera grow, px; None: as usual."""
     side: Side | None = None
     """The hand that the simulated wearer raises; None: drawn from the seed."""
     slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -64,6 +69,10 @@ class StationSettings:
     learn_prior: bool = True
     """Learn where wearers' eyes are from the finished sessions in this folder with the same rig,
     once there are enough."""
+    use_far_prior: bool = False
+    """Use what was learned although its mean is far from the rig's viewpoint."""
+    learn_wearers: bool = False
+    """Learn from them what wearers see wrongly in a whole sitting, too."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
 
