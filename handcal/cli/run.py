@@ -38,6 +38,21 @@ KEYS = file_option(
     "file of the paired headsets (default: the key in the environment variable "
     "HANDCAL_PAIRING_KEY, else the file of the desktop program)",
 )
+SENSOR_OPTIONS = (
+    arg(
+        "--sensor",
+        choices=("d415", "ahat", "exact"),
+        default="d415",
+        help="the simulated depth camera: a stereo camera with its faults at edges, a "
+        "time-of-flight camera, or a stereo camera whose edges are right (default: d415)",
+    ),
+    value(
+        "--fatten-px",
+        number(float, 0.0, 20.0),
+        "P",
+        "by how much the edges of near surfaces grow in the depth image, in its pixels",
+    ),
+)
 ALIGNMENT_OPTIONS = (
     value(
         "--alignments",

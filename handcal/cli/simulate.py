@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
-from handcal.cli.run import ALIGNMENT_OPTIONS
+from handcal.cli.run import ALIGNMENT_OPTIONS, SENSOR_OPTIONS
 from handcal.cli.terminal import (
     arg,
     command,
@@ -81,6 +81,8 @@ _LINK = (
     *_LINK,
     _RIG,
     file_option("--worn-rig", "true rig of the simulated headset (default: the same as --rig)"),
+    *SENSOR_OPTIONS,
+    flag("--known-fat", "the rig knows how fat the camera's edges are, as from a depth check"),
     arg(
         "--fault",
         choices=FAULTS,
@@ -114,6 +116,9 @@ def demo(arguments: argparse.Namespace) -> None:
         worn_rig=str(arguments.worn_rig or ""),
         fault=arguments.fault or "",
         eye_distance=arguments.eye_distance,
+        sensor=arguments.sensor,
+        fatten_px=arguments.fatten_px,
+        is_fat_known=arguments.known_fat,
     )
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         rig = _rig_path(arguments.rig)

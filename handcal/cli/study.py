@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
+from handcal.cli.run import SENSOR_OPTIONS
 from handcal.cli.terminal import (
     Option,
     arg,
@@ -136,7 +137,8 @@ def methods(arguments: argparse.Namespace) -> None:
         metavar="NAME",
         default=("plain",),
         help="people: plain, fingers-only, palm-only, by-distance, heavy-tails, drift, "
-        "late-presses",
+        "late-presses, fits-at-once, opens, known-fat-2mm, unmeasured, fat-2mm, fat-1mm, "
+        "constant-size, constant-direction",
     ),
     arg(
         "--scale",
@@ -156,8 +158,15 @@ def methods(arguments: argparse.Namespace) -> None:
         "--prior",
         choices=("none", "learned"),
         default="none",
-        help="learned: from simulated earlier sessions",
+        help="of the eyes; learned: from simulated earlier sessions",
     ),
+    arg(
+        "--wearer-prior",
+        choices=("default", "learned"),
+        default="default",
+        help="of what wearers always see wrongly; learned: from 20 sittings of each of 30 others",
+    ),
+    *SENSOR_OPTIONS,
     *(option for name, option in _STUDY_OPTIONS.items() if name != "--quick"),
     folder_option(
         "--output",
@@ -178,6 +187,9 @@ def procedures(arguments: argparse.Namespace) -> None:
         scales=tuple(arguments.scale),
         eye_distance=arguments.eye_distance,
         prior=arguments.prior,
+        wearer_prior=arguments.wearer_prior,
+        sensor=arguments.sensor,
+        fatten_px=arguments.fatten_px,
         processes=arguments.workers or 0,
         scheduler=arguments.scheduler or "",
         output=str(arguments.output or ""),

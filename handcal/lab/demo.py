@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import numpy as np
@@ -23,11 +25,21 @@ from handcal.calibration.states import Observation
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Eye, EyeDistance, EyePlan, Float64, PlanName, Rig
+from handcal.core.types import (
+    EYES,
+    DepthEdges,
+    Eye,
+    EyeDistance,
+    EyePlan,
+    Float64,
+    PlanName,
+    Rig,
+)
 from handcal.register.prior import eye_position_m
 from handcal.register.solve import solve_alignment
-from handcal.rig.rig_file import read_rig
+from handcal.rig.rig_file import read_rig, write_rig
 from handcal.sim.hand import Side
+from handcal.sim.sensor import D415_FATTEN_PX, EDGE_SIGMA_PX, SensorName, border_px
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.faults import Fault
@@ -39,7 +51,7 @@ from handcal.station.station import Station
 # A slow computer gets more time.
 _PATIENCE = Patience(60.0, frames=300)
 _RULER_SIGMA_M = 0.001
-_RULER, _SLIP = 1, 2  # their random numbers are not the wearer's
+_RULER, _SLIP, _CHECK = 1, 2, 3  # their random numbers are not the wearer's
 _LASTING_S = 4.0
 """Passing evidence, such as a late camera on a busy computer, counts if it lasts this long."""
 
@@ -72,6 +84,12 @@ class DemoSettings:
     """Path of the rig that the wearer really looks through; empty: the rig of the calibration."""
     fault: Fault = ""
     """Fault of the camera or the headset; empty: none."""
+    sensor: SensorName = "d415"
+    """The kind of simulated camera."""
+    fatten_px: float | None = None
+    """As in `StationSettings`."""
+    is_fat_known: bool = False
+    """True if the rig knows the camera's edges, as from a depth check."""
     eye_distance: Literal["none", "ruler", "headset"] = "none"
     """Measurement of the wearer's eye distance, with 1 mm of error: typed, or by the headset."""
 
@@ -111,6 +129,8 @@ def run_demo(
         loss=settings.loss,
         reorder=settings.reorder,
         fault=settings.fault,
+        sensor=settings.sensor,
+        fatten_px=settings.fatten_px,
         eye_distance_m=(
             measured.value_m if measured and settings.eye_distance == "headset" else None
         ),
@@ -120,7 +140,12 @@ def run_demo(
         plan=with_eyes(_plan(settings), settings.eyes),
     )
     former = Path(settings.former) if settings.former else None
-    with Station(station_settings, "Simulated wearer", former=former) as station:
+    with ExitStack() as stack:
+        if settings.is_fat_known:
+            folder = Path(stack.enter_context(TemporaryDirectory()))
+            write_rig(folder / "rig.yaml", _checked(read_rig(rig_path), settings))
+            station_settings = replace(station_settings, rig=str(folder / "rig.yaml"))
+        station = stack.enter_context(Station(station_settings, "Simulated wearer", former=former))
         if settings.eye_distance == "ruler":
             station.calibration.set_eye_distance(measured)
         begun_m = dict(station.calibration.applied_shift_m)
@@ -188,6 +213,17 @@ def _contradicted(
             for eye in EYES
         },
     }
+
+
+def _checked(rig: Rig, settings: DemoSettings) -> Rig:
+    """Return the rig with its camera's edges, as a depth check finds them."""
+    usual_px = D415_FATTEN_PX if settings.sensor == "d415" else 0.0
+    fatten_px = usual_px if settings.fatten_px is None else settings.fatten_px
+    error_px = np.random.default_rng([settings.seed, _CHECK]).normal(0.0, EDGE_SIGMA_PX)
+    edges = DepthEdges(
+        border_px(fatten_px) + error_px, EDGE_SIGMA_PX, "measured", views=10, made="simulated"
+    )
+    return replace(rig, depth_edges=edges)
 
 
 def _slip_m(settings: DemoSettings) -> tuple[float, float, float]:
@@ -300,7 +336,10 @@ def _judge(
                 "error_mm": float(1e3 * np.linalg.norm(shift.shift_m - truth_m[eye])),
                 "verdict": results.verdicts[eye].name,
                 "reason": results.verdicts[eye].reason,
-                "evidence": [one.name for one in calibration.evidence.contradictions],
+                "evidence": [
+                    *(one.name for one in calibration.evidence.contradictions),
+                    *calibration.results.evidence,
+                ],
                 "verified": _verified(calibration, eye),
                 "depth": asdict(results.benefits[eye].depth),
                 "reprojection_arcmin": errors_arcmin((eye,)),
@@ -320,13 +359,17 @@ def _verified(calibration: Calibration, eye: Eye) -> dict[str, Any] | None:
     found = calibration.verifications.get(eye)
     if found is None or calibration.results is None:
         return None
-    right_arcmin, down_arcmin = found.nudge_arcmin
-    before, after = calibration.results.measured_arcmin[eye]
+    checked = calibration.results.verified.get(eye)
+    if checked is None:  # nothing was moved
+        return None
     return {
-        "nudge_arcmin": [right_arcmin, down_arcmin],
+        "nudge_arcmin": list(found.nudge_arcmin),
         "nudge_size": found.nudge_size,
-        "before_arcmin": before,
-        "after_arcmin": after,
+        "before_arcmin": checked.before_arcmin,
+        "after_arcmin": checked.now_arcmin,
+        "moved_arcmin": checked.moved_arcmin,
+        "moved_size": checked.moved_size,
+        "changed_arcmin": checked.changed_arcmin,
     }
 
 

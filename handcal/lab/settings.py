@@ -16,6 +16,7 @@ from handcal.hand.settings import Roi
 from handcal.io.files import user_path
 from handcal.report.write import may_be_replaced
 from handcal.session.journal import JOURNAL, find_journals
+from handcal.sim.sensor import SensorName
 
 Size: TypeAlias = Literal["full", "quick"]
 """``quick`` runs few trials, as a smoke test; its results are not meaningful."""
@@ -69,7 +70,13 @@ class ProcedureStudySettings:
     eye_distance: Literal["none", "ruler", "headset"] = "none"
     """Source of the wearer's eye distance."""
     prior: Literal["none", "learned"] = "none"
-    """``learned``: from simulated earlier sessions."""
+    """Of the eyes; ``learned``: from simulated earlier sessions."""
+    wearer_prior: Literal["default", "learned"] = "default"
+    """Of what wearers see wrongly; ``learned``: from repeated sittings of other people of the
+    variant."""
+    sensor: SensorName = "d415"
+    fatten_px: float | None = None
+    """The depth camera, and by how much the edges in its images grow; None: as usual."""
     processes: int = 0
     scheduler: str = ""
     output: str = ""

@@ -28,7 +28,7 @@ from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
-from handcal.sim.sensor import SensorSettings, sense_depth
+from handcal.sim.sensor import D415_FATTEN_PX, SensorSettings, sense_depth
 
 Input = TypeVar("Input")
 
@@ -93,7 +93,7 @@ def noisy_frames(T_D_hand: Float64, count: int) -> list[Frame]:
         From the hand's frame to the depth camera's.
     count : int
     """
-    camera, sensor = example_rig().depth_intrinsics, SensorSettings()
+    camera, sensor = example_rig().depth_intrinsics, SensorSettings(fatten_px=D415_FATTEN_PX)
     depth_m, color = render(World(make_hand(1), make_room(1)), np.eye(4), T_D_hand, camera)
     return [
         Frame(

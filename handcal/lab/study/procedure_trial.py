@@ -1,20 +1,25 @@
-"""One simulated wearer led through one plan, by the functions that the live procedure calls."""
+"""One simulated wearer led through one plan, by the functions that the live procedure calls.
+
+The wearer sees the true hand, and what the headset draws of the measured one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 
-from handcal.core.display import arcmin_from_px, eye_projection, projection_matrix, view_of_eye
-from handcal.core.geometry import invert, project, rigid, transform
+from handcal.calibration.verifying import draw_offset
+from handcal.core.display import projection_matrix, view_of_eye
+from handcal.core.errors import HandError
+from handcal.core.geometry import invert, rigid, transform
 from handcal.core.types import (
     EYES,
     Alignment,
-    Bool,
     Eye,
     EyeDistance,
     EyeShift,
@@ -22,44 +27,50 @@ from handcal.core.types import (
     PlanName,
     Verification,
 )
+from handcal.lab.study.seeing import See, SeenHand
 from handcal.lab.study.wearers import StudyWearer
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.register.fuse import FuseSettings
-from handcal.register.guard import GuardSettings
+from handcal.register.guard import GuardSettings, RotationGuard
 from handcal.register.nudge import nudged_shift_m
 from handcal.register.placement import PlacementSettings, next_alignment, next_verification
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.register.results import Results, SolveSettings, conclude
+from handcal.register.sitting import LearnedSitting, SittingSettings
 from handcal.register.solve import solve_alignment
-from handcal.register.surface import describe_surface
 from handcal.sim.people import (
     Sitting,
     draw_error,
     draw_movement_m,
     draw_perception,
     is_balanced,
+    misplaced,
+    opened,
 )
-from handcal.sim.placement import apply_placement_error, overlay_hand, view_through
-from handcal.sim.raster import visible_points
+from handcal.sim.placement import apply_placement_error
+from handcal.sim.sensor import SensorName
+from handcal.sim.silhouette import overlay_outline, view_outline
+from handcal.sim.verifying import SeenDifference, presses_for, see_difference
 from handcal.sim.wearer_settings import WearerSettings
 
 EyeDistanceSource: TypeAlias = Literal["none", "ruler", "headset"]
+T = TypeVar("T")
 
-See: TypeAlias = Callable[[np.random.Generator, StudyWearer, Float64], tuple[Float64, Bool]]
-"""Returns, for the hand's pose T_H_hand (4, 4), points (N, 3) in H, and which are beside a cut."""
-
-_OUTLINE_FROM_POINTS = 1500
-_FOREARM_M = 0.04
 _EYE_DISTANCE_SIGMA_M = 0.001
+# A pose in which the camera cannot segment the hand, or that the guard refuses, is tried again.
+_TRIES = 8
+_MOST_LOOKS = 6
+_FARTHER = 0.45
+"""Of the hand's distance, by how much a stretched arm holds it farther away."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProcedureModel:
     """The simulated wearers and their time."""
 
-    points: int = 1500
-    """Number of points of each cloud."""
-    depth_sigma_m: float = 0.001
-    """Standard deviation of each point's depth."""
+    sensor: SensorName = "d415"
+    fatten_px: float | None = None
+    """Of every D415's images; None: as drawn for each wearer."""
     hands: int = 12
     """Number of different hands."""
     perceived_arcmin: float = 1.5
@@ -70,9 +81,8 @@ class ProcedureModel:
     """The wearer's time for the verification of one eye; an assumption."""
     eye_distance: EyeDistanceSource = "none"
     prior: LearnedPrior | None = None
+    sitting: LearnedSitting | None = None
     """As learned from earlier sessions; None for the default."""
-    see: See | None = None
-    """Measures the hand with a simulated camera; None: `points` of its ideal surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,14 +100,14 @@ class _Raised:
     """The raised hand, in H."""
 
     T_H_hand: Float64
-    points_m: Float64
-    is_cut: Bool
-    outline_m: Float64
+    seen: SeenHand
+    guard: RotationGuard
 
 
 def lead_through(
     rng: np.random.Generator,
     wearer: StudyWearer,
+    see: See,
     sitting: Sitting,
     model: ProcedureModel,
     plan: PlanName,
@@ -105,23 +115,35 @@ def lead_through(
     verify: bool,
     placement: PlacementSettings,
     usable_eyes: tuple[Eye, ...] = EYES,
+    farther_too: bool = False,
 ) -> Calibrated:
-    """Lead a wearer through a plan: raise, align, and verify each eye if `verify`."""
+    """Lead a wearer through a plan: raise, align, and verify each eye if `verify`.
+
+    If `farther_too`, each eye is verified once more at the end with the arm stretched, as a lab
+    does that learns what its wearers always see wrongly.
+    """
     usual = sitting.settings
-    solve = SolveSettings(fuse=FuseSettings(prior=PriorSettings(learned=model.prior)))
+    solve = SolveSettings(
+        fuse=FuseSettings(
+            prior=PriorSettings(learned=model.prior),
+            sitting=SittingSettings(learned=model.sitting),
+        )
+    )
     eye_distance = _eye_distance(rng, wearer, model.eye_distance)
-    raised = _raise(rng, wearer, model)
+    raised = _raise(rng, wearer, see)
     seconds = 2.0 * usual.movement_s
     shift_m: dict[Eye, Float64] = {eye: np.zeros(3) for eye in EYES}
     solved: list[tuple[Alignment, Mapping[Eye, EyeShift]]] = []
     verified: dict[Eye, Verification] = {}
     results: Results | None = None
     at_rest_m = raised.T_H_hand
-    to_verify = partial(next_verification, usable_eyes=usable_eyes, settings=placement)
+    skipped: set[Eye] = set()
+    again = 0
+    farther = list(usable_eyes) if farther_too else []
     while True:
         planned = next_alignment(
-            raised.points_m,
-            raised.is_cut,
+            raised.seen.points_m,
+            raised.seen.is_cut,
             np.eye(4),
             wearer.rig,
             results,
@@ -133,13 +155,38 @@ def lead_through(
             solve=solve,
         )
         if planned is not None:
-            alignment, at_rest_m = _align(
-                rng, wearer, sitting, model, raised, planned.displacement_W_m, planned.eyes, shift_m
-            )
+            try:
+                alignment, at_rest_m = _align(
+                    rng,
+                    wearer,
+                    see,
+                    sitting,
+                    raised,
+                    planned.displacement_W_m,
+                    planned.eyes,
+                    shift_m,
+                )
+            except HandError:
+                again += 1
+                if again > _TRIES:
+                    raise
+                raised = _raise(rng, wearer, see)
+                seconds += 2.0 * usual.movement_s
+                continue
             solved.append((alignment, solve_alignment(alignment, wearer.rig)))
             seconds += usual.reaction_s + usual.movement_s + usual.dwell_s
-        elif verify and (eye := to_verify(results, verified)) is not None:
-            found = _verify(rng, wearer, sitting, model, eye, shift_m[eye], at_rest_m)
+        elif verify and (eye := _to_verify(results, verified, usable_eyes, skipped, placement)):
+            found = _verify(rng, wearer, see, sitting, model, eye, shift_m[eye], at_rest_m, raised)
+            seconds += model.verify_s * (2.0 if any(found.offset_arcmin) else 1.0)
+            if not found.was_moved:
+                skipped.add(eye)
+                continue
+            verified[eye] = found.after(verified.get(eye))
+        elif farther:
+            eye = farther.pop()
+            line_m = at_rest_m[:3, 3] - wearer.eye_m(eye)
+            T_H_far = rigid(translation_m=_FARTHER * line_m) @ at_rest_m
+            found = _verify(rng, wearer, see, sitting, model, eye, shift_m[eye], T_H_far, raised)
             verified[eye] = found.after(verified.get(eye))
             seconds += model.verify_s
         else:
@@ -157,39 +204,57 @@ def lead_through(
         shift_m |= results.rendered_shift_m
 
 
-def _raise(rng: np.random.Generator, wearer: StudyWearer, model: ProcedureModel) -> _Raised:
+def _to_verify(
+    results: Results | None,
+    verified: Mapping[Eye, Verification],
+    usable_eyes: tuple[Eye, ...],
+    skipped: set[Eye],
+    placement: PlacementSettings,
+) -> Eye | None:
+    """Return the eye to verify next, as the live plan does."""
+    asked = tuple(eye for eye in usable_eyes if eye not in skipped)
+    return next_verification(results, verified, usable_eyes=asked, settings=placement)
+
+
+def _raise(rng: np.random.Generator, wearer: StudyWearer, see: See) -> _Raised:
     usual = WearerSettings()
     viewpoints_m = [invert(wearer.T_E_H(eye))[:3, 3] for eye in EYES]
-    palm_m = np.mean(viewpoints_m, axis=0) + usual.raise_m
-    palm_m += rng.uniform(-1.0, 1.0, 3) * usual.raise_spread_m
-    T_H_hand = rigid(rng.normal(0.0, usual.raise_turn_rad, 3), palm_m)
-    points_m, is_cut = _see(rng, wearer, model, T_H_hand)
-    surface = describe_surface(points_m, is_cut, _OUTLINE_FROM_POINTS)
-    return _Raised(T_H_hand, points_m, is_cut, surface.points_m[surface.outline])
+    middle_m = np.mean(viewpoints_m, axis=0) + usual.raise_m
+
+    def attempt() -> _Raised:
+        palm_m = middle_m + rng.uniform(-1.0, 1.0, 3) * usual.raise_spread_m
+        T_H_hand = rigid(rng.normal(0.0, usual.raise_turn_rad, 3), palm_m)
+        seen = see(rng, wearer.hand, wearer.rig, T_H_hand)
+        return _Raised(T_H_hand, seen, RotationGuard(seen.points_m, seen.is_cut))
+
+    return _tried_again(attempt)
 
 
-def _see(
-    rng: np.random.Generator, wearer: StudyWearer, model: ProcedureModel, T_H_hand: Float64
-) -> tuple[Float64, Bool]:
-    if model.see is not None:
-        return model.see(rng, wearer, T_H_hand)
-    points_D_m, is_cut = visible_points(
-        wearer.hand,
-        invert(wearer.rig.T_H_D) @ T_H_hand,
-        model.points,
-        rng,
-        intrinsics=wearer.rig.depth_intrinsics,
-        forearm_m=_FOREARM_M,
-        depth_sigma_m=model.depth_sigma_m,
-    )
-    return transform(wearer.rig.T_H_D, points_D_m), is_cut
+def _tried_again(attempt: Callable[[], T]) -> T:
+    """Return what an attempt returns; it may be refused a few times, as a live one may."""
+    for _ in range(_TRIES - 1):
+        with suppress(HandError):
+            return attempt()
+    return attempt()
+
+
+def _in_view(
+    rng: np.random.Generator, wearer: StudyWearer, see: See, T_H_hand: Float64, raised: _Raised
+) -> tuple[Float64, SeenHand]:
+    """Return a resting hand as measured, moved toward where it was raised if it is out of view."""
+    back_m = raised.T_H_hand[:3, 3] - T_H_hand[:3, 3]
+    for share in np.linspace(0.0, 1.0, _TRIES):
+        T = rigid(translation_m=share * back_m) @ T_H_hand
+        with suppress(HandError):
+            return T, see(rng, wearer.hand, wearer.rig, T)
+    return raised.T_H_hand, raised.seen
 
 
 def _align(
     rng: np.random.Generator,
     wearer: StudyWearer,
+    see: See,
     sitting: Sitting,
-    model: ProcedureModel,
     raised: _Raised,
     displacement_m: Float64,
     eyes: tuple[Eye, ...],
@@ -198,82 +263,110 @@ def _align(
     """Let the wearer overlay the hand on the moved cursor; return the hand's pose, too."""
     rig = wearer.rig
     T_H_cursor = rigid(translation_m=displacement_m) @ raised.T_H_hand
-    shown_m = raised.outline_m + displacement_m
-    on_hand_m = transform(invert(T_H_cursor), shown_m)
-    kept = is_balanced(on_hand_m, wearer.hand, sitting)
+    shown_m = raised.seen.outline_m + displacement_m
     views = [
-        view_through(
+        view_outline(
             rig.eyes[eye],
             wearer.true_shift_m[eye],
             np.eye(4),
             projection_matrix(rig.eyes[eye], drawn_m[eye]) @ rig.eyes[eye].T_V_H,
-            shown_m[kept],
+            shown_m,
         )
         for eye in eyes
     ]
     eye_m = np.mean([wearer.eye_m(eye) for eye in eyes], axis=0)
     distance_m = float(np.linalg.norm(shown_m.mean(axis=0) - eye_m))
-    error = draw_error(rng, sitting, distance_m, GuardSettings().limit_rad)
-    placed = overlay_hand(on_hand_m[kept], T_H_cursor @ rigid(error.rotation_rad), views)
-    assert placed is not None, "the cursor is on the displays"
-    T_H_hand = apply_placement_error(placed[0], eye_m, error)
-    T_H_hand = rigid(translation_m=draw_movement_m(rng, sitting)) @ T_H_hand
-    hand_m, hand_is_cut = _see(rng, wearer, model, T_H_hand)
-    return (
-        Alignment(
-            cursor_m=raised.points_m + displacement_m,
-            hand_m=hand_m,
-            cursor_is_cut=raised.is_cut,
-            hand_is_cut=hand_is_cut,
-            T_E_W={eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES},
-            eyes=eyes,
-            rotation_rad=rig.T_H_D[:3, :3].T @ T_H_cursor[:3, :3] @ error.rotation_rad,
-            t_a_ns=0,
-            t_b_ns=1,
-            drawn_shift_m=drawn_m,
-        ),
-        T_H_hand,
-    )
+    balanced = partial(is_balanced, hand=wearer.hand, sitting=sitting)
+
+    def attempt() -> tuple[Alignment, Float64]:
+        hand = opened(rng, wearer.hand, sitting)
+        error = draw_error(rng, sitting, distance_m, GuardSettings().limit_rad)
+        turned = T_H_cursor @ rigid(error.rotation_rad)
+        placed = overlay_outline(hand, turned, views, balanced)
+        assert placed is not None, "the cursor is on the displays"
+        T_H_hand = apply_placement_error(placed[0], eye_m, error)
+        T_H_hand = misplaced(T_H_hand, eye_m, sitting.sees_hand)
+        T_H_hand = rigid(translation_m=draw_movement_m(rng, sitting)) @ T_H_hand
+        seen = see(rng, hand, rig, T_H_hand)
+        rotation_rad = raised.guard.rotation(seen.points_m, seen.is_cut)
+        shape = raised.guard.shape_change(seen.points_m, seen.is_cut)
+        limits = GuardSettings()
+        if np.linalg.norm(rotation_rad) > limits.limit_rad or shape.rms_m > limits.shape_limit_m:
+            raise HandError("turned, or of another shape")
+        return (
+            Alignment(
+                cursor_m=raised.seen.points_m + displacement_m,
+                hand_m=seen.points_m,
+                cursor_is_cut=raised.seen.is_cut,
+                hand_is_cut=seen.is_cut,
+                T_E_W={eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES},
+                eyes=eyes,
+                rotation_rad=rig.T_H_D[:3, :3].T @ rotation_rad,
+                t_a_ns=0,
+                t_b_ns=1,
+                drawn_shift_m=drawn_m,
+            ),
+            T_H_hand,
+        )
+
+    return _tried_again(attempt)
 
 
 def _verify(
     rng: np.random.Generator,
     wearer: StudyWearer,
+    see: See,
     sitting: Sitting,
     model: ProcedureModel,
     eye: Eye,
     drawn_m: Float64,
     T_H_hand: Float64,
+    raised: _Raised,
 ) -> Verification:
     """Let the wearer move the drawing of the resting hand until it seems to cover the hand.
 
-    The movement is the mean, and the growth the least-squares scale, from the measured points as
-    drawn to the same points as the eye sees them.
+    If it fits at once, it is moved aside, and the wearer is asked to bring it back.
     """
-    display = wearer.rig.eyes[eye]
-    points_m, _ = _see(rng, wearer, model, T_H_hand)
-    kept = is_balanced(transform(invert(T_H_hand), points_m), wearer.hand, sitting)
-    points_E_m = transform(wearer.T_E_H(eye), points_m)
-    drawn_px = project(eye_projection(display, drawn_m), points_E_m[kept])
-    seen_px = project(eye_projection(display, wearer.true_shift_m[eye]), points_E_m[kept])
-    moved_px = (seen_px - drawn_px).mean(axis=0)
-    centred_px = drawn_px - drawn_px.mean(axis=0)
-    growth = float(np.sum(centred_px * (seen_px - seen_px.mean(axis=0))) / np.sum(centred_px**2))
-    error_arcmin, error_size = draw_perception(
-        rng, sitting, model.perceived_arcmin, model.perceived_size
-    )
-    moved_arcmin = np.sign(moved_px) * arcmin_from_px(display, np.abs(moved_px)) + error_arcmin
-    size = growth - 1.0 + error_size
-    hand_E_m = points_E_m[kept].mean(axis=0)
-    after_m = nudged_shift_m(
-        display, drawn_m, hand_E_m, float(moved_arcmin[0]), float(moved_arcmin[1]), size
-    )
+    hand, display = wearer.hand, wearer.rig.eyes[eye]
+    T_H_hand, seen = _in_view(rng, wearer, see, T_H_hand, raised)
+    hand_E_m = transform(wearer.T_E_H(eye), seen.points_m).mean(axis=0)
+    error = draw_perception(rng, sitting, model.perceived_arcmin, model.perceived_size)
+    balanced = partial(is_balanced, hand=hand, sitting=sitting)
+    request = VerifyRequest(1, eye)
+
+    def look(shown_m: Float64) -> SeenDifference:
+        drawn = projection_matrix(display, shown_m) @ display.T_V_H
+        true_m = wearer.true_shift_m[eye]
+        found = see_difference(
+            display, true_m, drawn, np.eye(4), hand, T_H_hand, seen.outline_m, balanced
+        )
+        assert found is not None, "the outline is on the display"
+        return found
+
+    def shown(moved: NudgeSum, offset: NudgeSum) -> Float64:
+        total = moved.plus(offset.right_arcmin, offset.down_arcmin, offset.size)
+        return nudged_shift_m(
+            display, drawn_m, hand_E_m, total.right_arcmin, total.down_arcmin, total.size
+        )
+
+    moved = offset = NudgeSum()
+    while True:
+        for _ in range(_MOST_LOOKS):
+            presses = presses_for(look(shown(moved, offset)), error, request)
+            if sitting.variant == "fits-at-once" or not any(presses):
+                break
+            moved = moved.plus(*presses)
+        if moved != NudgeSum() or offset != NudgeSum():
+            break
+        offset = draw_offset(rng)
     return Verification(
         before_m=_three(drawn_m),
-        nudge_arcmin=(float(moved_arcmin[0]), float(moved_arcmin[1])),
-        after_m=_three(after_m),
-        nudge_size=size,
+        nudge_arcmin=(moved.right_arcmin, moved.down_arcmin),
+        after_m=_three(shown(moved, offset)),
+        nudge_size=moved.size,
         hand_E_m=_three(hand_E_m),
+        offset_arcmin=(offset.right_arcmin, offset.down_arcmin),
+        offset_size=offset.size,
     )
 
 

@@ -6,9 +6,10 @@ do not depend on the other plans.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -17,24 +18,39 @@ from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Eye, Float64, Intrinsics
+from handcal.core.types import EYES, CameraIdentity, DepthEdges, Eye, Float64
+from handcal.hand.edges import edges_of
 from handcal.lab.methods.spaam import solve_spaam
 from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study.procedure_trial import Calibrated, ProcedureModel, lead_through
 from handcal.lab.study.run import Case, Study
+from handcal.lab.study.seeing import See, seen_with
 from handcal.lab.study.store import StudyRow
+from handcal.lab.study.trials import study_hand
 from handcal.lab.study.wearers import StudyWearer, align_points, draw_wearer
 from handcal.register.benefit import depth_error_m
 from handcal.register.placement import PlacementSettings
-from handcal.register.prior import LearnedPrior, learn_prior
+from handcal.register.prior import LearnedPrior, Observed, learn_prior
+from handcal.register.sitting import LearnedSitting, SittingSettings, sitting_prior
+from handcal.register.wearers import learn_wearers
+from handcal.rig.example import example_rig
 from handcal.sim.people import VARIANTS, Variant, begin_sitting
+from handcal.sim.raster import D415
+from handcal.sim.sensor import EDGE_SIGMA_PX, fatten_for
+from handcal.sim.sensor import border_px as sensor_border_px
+from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 
 EARLIER_SESSIONS = 20
 """Number of simulated sessions that a learned prior is from."""
+PEOPLE, SITTINGS = 30, 20
+"""People, and sittings of each, that a learned prior of wearers is from."""
 
-# A D415's smaller images, which are drawn three times as fast, show enough points.
-_CAMERA = Intrinsics(width=640, height=360, fx=502.5, fy=502.5, cx=319.5, cy=179.5)
+# Of each wearer's camera, px: they differ as the real frames of docs/segmentation.md do.
+_BORDER_PX = 1.4, 2.2
+# Of the variants: by how much more, half a metre away, than is typical of such cameras.
+_FAT_M: dict[Variant, float] = {"known-fat-2mm": 0.002, "fat-2mm": 0.002, "fat-1mm": 0.001}
+_PX_PER_M = D415.fx / 0.5
 _PLAIN = "paper", "recommended", "recommended-unverified"
 # `MethodSettings.pointing_sigma_arcmin` for people whose errors are 1.33 times the usual.
 _POINTING_ARCMIN = 5.9 / 1.33
@@ -49,6 +65,9 @@ class ProcedureSettings:
 
     seed: int
     model: ProcedureModel
+    sittings: Mapping[Variant, LearnedSitting] = field(default_factory=dict)
+    """For people of a variant, the prior of what they see wrongly, as learned from others; the
+    default for those not there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +119,11 @@ def procedure_cases(settings: ProcedureStudySettings, progress: Progress = Progr
     for variant in settings.variants:
         if variant not in VARIANTS:
             raise HandcalError(f"unknown variant {variant!r}: choose from {', '.join(VARIANTS)}")
-    model = ProcedureModel(eye_distance=settings.eye_distance)
+    model = ProcedureModel(
+        sensor=settings.sensor,
+        fatten_px=settings.fatten_px,
+        eye_distance=settings.eye_distance,
+    )
     if settings.prior == "learned":
         model = replace(model, prior=_learn(settings.seed, progress))
     cases: list[Case] = [
@@ -111,6 +134,53 @@ def procedure_cases(settings: ProcedureStudySettings, progress: Progress = Progr
         for scale in settings.scales
     ]
     return Study("procedures", ProcedureSettings(settings.seed, model), cases, procedure_trial)
+
+
+def sitting_cases(settings: ProcedureSettings, variant: Variant, scale: float) -> Study:
+    """Return the study of the repeated sittings from which `learn_sittings` learns."""
+    cases: list[Case] = [
+        {"person": person, "sitting": sitting, "variant": variant, "scale": scale}
+        for person in range(PEOPLE)
+        for sitting in range(SITTINGS)
+    ]
+    return Study("sittings", settings, cases, sitting_trial)
+
+
+def sitting_trial(settings: ProcedureSettings, case: Case) -> list[StudyRow]:
+    """Calibrate a person once more; the row holds what was observed."""
+    person, number = int(case["person"]), int(case["sitting"])
+    rng = np.random.default_rng([settings.seed, person, 3, number])
+    own = np.random.default_rng([settings.seed, person, 3])
+    usual = WearerSettings()
+    own_m = draw_eyes(own, replace(usual, headset_sigma_m=(0.0, 0.0, 0.0)))
+    fit_m = rng.normal(0.0, usual.headset_sigma_m)
+    wearer = StudyWearer(
+        example_rig(),
+        study_hand(person % settings.model.hands),
+        {eye: shift_m + fit_m for eye, shift_m in own_m.items()},
+    )
+    variant = cast("Variant", case["variant"])
+    scale = float(case["scale"])
+    found = _calibrate(rng, settings, wearer, "recommended", variant, scale, farther_too=True)
+    fused = found.results.fused
+    observed = [
+        [part.tolist() for part in one.at(fused.wearer_scale)] for one in fused.all_observed
+    ]
+    return [{"person": person, "observed": json.dumps(observed)}]
+
+
+def learn_sittings(rows: Sequence[StudyRow]) -> LearnedSitting:
+    """Learn what people see wrongly from the rows of `sitting_cases`."""
+    people: dict[object, list[list[Observed]]] = {}
+    for row in rows:
+        sitting = [
+            (np.array(H), np.array(seen_m), np.array(covariance_m2))
+            for H, seen_m, covariance_m2 in json.loads(str(row["observed"]))
+        ]
+        people.setdefault(row["person"], []).append(sitting)
+    found = learn_wearers(list(people.values()), sitting_prior(example_rig(), SittingSettings()))
+    assert found is not None, "there are enough sittings"
+    return found.learned
 
 
 def procedure_trial(settings: ProcedureSettings, case: Case) -> list[StudyRow]:
@@ -193,20 +263,26 @@ def _calibrate(
     plan: str,
     variant: Variant,
     scale: float,
+    *,
+    farther_too: bool = False,
 ) -> Calibrated:
     sitting = begin_sitting(rng, WearerSettings(), variant, scale)
+    wearer, see = _with_camera(rng, wearer, settings.model, variant)
+    model = replace(settings.model, sitting=settings.sittings.get(variant))
     if plan == "paper":
         return lead_through(
-            rng, wearer, sitting, settings.model, "paper", verify=False, placement=_PAPER
+            rng, wearer, see, sitting, model, "paper", verify=False, placement=_PAPER
         )
     return lead_through(
         rng,
         wearer,
+        see,
         sitting,
-        settings.model,
+        model,
         "recommended",
         verify=plan == "recommended",
         placement=PlacementSettings() if plan == "recommended" else _UNVERIFIED,
+        farther_too=farther_too,
     )
 
 
@@ -225,8 +301,33 @@ def _told(calibrated: Calibrated, eye: Eye) -> dict[str, Any]:
 
 def _wearer(settings: ProcedureSettings, number: int) -> StudyWearer:
     rng = np.random.default_rng([settings.seed, number, 0])
-    wearer = draw_wearer(rng, number % settings.model.hands, WearerSettings())
-    return replace(wearer, rig=replace(wearer.rig, depth_intrinsics=_CAMERA))
+    return draw_wearer(rng, number % settings.model.hands, WearerSettings())
+
+
+def _with_camera(
+    rng: np.random.Generator, wearer: StudyWearer, model: ProcedureModel, variant: Variant
+) -> tuple[StudyWearer, See]:
+    """Return a wearer with a depth camera on the headset, and what the camera measures.
+
+    The rig knows the camera's edges with the error of a depth check, unless nobody made one.
+    """
+    model_name = "AHAT" if model.sensor == "ahat" else "RealSense D415"
+    typical = replace(wearer.rig, depth_camera=CameraIdentity(model_name))
+    border_px = float(rng.uniform(*_BORDER_PX))
+    found_px = rng.normal(0.0, EDGE_SIGMA_PX)
+    if model.sensor == "exact":
+        border_px = sensor_border_px(0.0)
+    elif model.sensor == "ahat":
+        border_px = edges_of(typical).fatten_px
+    elif model.fatten_px is not None:
+        border_px = sensor_border_px(model.fatten_px)
+    elif variant in _FAT_M:
+        border_px = edges_of(typical).fatten_px + _FAT_M[variant] * _PX_PER_M
+    is_known = variant not in ("unmeasured", "fat-2mm", "fat-1mm")
+    edges = DepthEdges(border_px + found_px, EDGE_SIGMA_PX, "measured") if is_known else None
+    return replace(wearer, rig=replace(typical, depth_edges=edges)), seen_with(
+        model.sensor, fatten_for(border_px)
+    )
 
 
 def _rendered(wearer: StudyWearer, eye: Eye, shift_m: Float64) -> Float64:
@@ -289,4 +390,4 @@ def _learn(seed: int, progress: Progress) -> LearnedPrior | None:
         found = _calibrate(rng, settings, earlier, "recommended", "plain", 1.33)
         fused = found.results.fused
         sessions.append([one.at(fused.wearer_scale) for one in fused.all_observed])
-    return learn_prior(sessions)
+    return learn_prior(sessions, sitting=sitting_prior(example_rig(), SittingSettings()))

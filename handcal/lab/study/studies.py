@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 from handcal.core.progress import Progress
 from handcal.lab.settings import (
@@ -19,14 +20,23 @@ from handcal.lab.study.methods import QUICK_METHODS, MethodSettings, methods_stu
 from handcal.lab.study.methods_report import methods_report
 from handcal.lab.study.noise import QUICK_NOISE, NoiseSettings, noise_study
 from handcal.lab.study.noise_report import noise_report
-from handcal.lab.study.procedures import ProcedureRow, procedure_cases, procedure_rows
+from handcal.lab.study.procedures import (
+    ProcedureRow,
+    learn_sittings,
+    procedure_cases,
+    procedure_rows,
+    sitting_cases,
+)
 from handcal.lab.study.run import Study, resumable, run_study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE
 from handcal.lab.study.wearer_noise import NoiseFit, fit_noise
 from handcal.report.document import Report
 from handcal.report.write import write_report
+from handcal.sim.people import Variant
 
+_OTHERS = 2_000_003
+"""Added to the seed for people who are not judged."""
 STUDY_SHARE = 0.95
 """Share of the time that the cases take; the rest is the report."""
 
@@ -77,13 +87,25 @@ def run_procedure_study(settings: ProcedureStudySettings, progress: Progress) ->
     """
     study = procedure_cases(settings, progress)
     with TemporaryDirectory() as scratch:
-        rows = run_study(
-            study,
-            output_folder(settings.output) if settings.output else Path(scratch),
+        folder = output_folder(settings.output) if settings.output else Path(scratch)
+        run = partial(
+            run_study,
             workers=settings.processes or None,
             scheduler=settings.scheduler or None,
-            progress=progress,
         )
+        if settings.wearer_prior == "learned":
+            progress, learning = progress.part(0.5, 1.0), progress.part(0.0, 0.5)
+            sittings = {}
+            for variant in dict.fromkeys(cast("Variant", case["variant"]) for case in study.cases):
+                others = sitting_cases(
+                    replace(study.settings, seed=settings.seed + _OTHERS),
+                    variant,
+                    settings.scales[0],
+                )
+                rows = run(others, folder / f"sittings-{variant}", progress=learning)
+                sittings[variant] = learn_sittings(rows)
+            study = replace(study, settings=replace(study.settings, sittings=sittings))
+        rows = run(study, folder / "procedures", progress=progress)
     return procedure_rows(rows)
 
 
