@@ -36,9 +36,20 @@ _THEMES: dict[Theme, str] = {
 }
 
 _TARGET_HELP = tr("Largest expected error of an eye that is accepted, in arcminutes.")
+_LEARNED = {
+    "": tr("Nothing"),
+    "eyes": tr("Where eyes are"),
+    "eyes far": tr("Where eyes are, even if far"),
+    "eyes wearers": tr("Eyes, and what is seen wrongly"),
+    "eyes far wearers": tr("All of it, even if far"),
+}
+"""Words for what is learned from earlier sessions, and their text."""
 _LEARN_HELP = tr(
-    "Learn where wearers' eyes are from the finished sessions in this folder with the same rig,\n"
-    "once there are enough."
+    "Learn from the finished sessions in this folder with the same rig, once there are enough:\n"
+    "where wearers' eyes are; and from wearers with several sessions, how far beside, and how\n"
+    "much larger, people see the hand than it is (otherwise 1′ and 0.25 % are assumed). A mean of\n"
+    "the eyes more than 4 mm from the rig's viewpoint is used only with 'even if far': a fault of\n"
+    "the rig or of the depth camera's edges is more likely."
 )
 _SLICER = {
     "": tr("Off"),
@@ -79,9 +90,7 @@ class PreferencesDialog(QDialog):
         self._sessions_found.hide()
         self._calibration = CalibrationFields(explains=True)
         self._target = number("target", 1.0, 60.0, 0.5, " ′", _TARGET_HELP)
-        self._learn = with_name(
-            QCheckBox(tr("&Learn from earlier sessions")), "learnPrior", help_text=_LEARN_HELP
-        )
+        self._learn = choice("learnPrior", tr("Learned"), _LEARNED, _LEARN_HELP)
         host = preferences.bridges.slicer_host
         hosts = _SLICER if host in _SLICER else {**_SLICER, host: host}  # typed into the file
         self._slicer = choice("slicer", "OpenIGTLink", hosts, _SLICER_HELP)
@@ -111,6 +120,7 @@ class PreferencesDialog(QDialog):
         calibration = self._calibration.take(station.calibration)
         solve = calibration.solve
         verdict = replace(solve.verdict, target_arcmin=self._target.value())
+        learned = self._learn.currentData().split()
         return replace(
             self._preferences,
             theme=self._theme.currentData(),
@@ -120,7 +130,9 @@ class PreferencesDialog(QDialog):
             station=replace(
                 station,
                 sessions=self._sessions.path or station.sessions,
-                learn_prior=self._learn.isChecked(),
+                learn_prior="eyes" in learned,
+                use_far_prior="far" in learned,
+                learn_wearers="wearers" in learned,
                 calibration=replace(calibration, solve=replace(solve, verdict=verdict)),
             ),
         )
@@ -147,7 +159,13 @@ class PreferencesDialog(QDialog):
         self._sessions.set_path(station.sessions)
         self._calibration.show_settings(station.calibration)
         self._target.setValue(station.calibration.solve.verdict.target_arcmin)
-        self._learn.setChecked(station.learn_prior)
+        words = {
+            "eyes": station.learn_prior,
+            "far": station.use_far_prior,
+            "wearers": station.learn_wearers,
+        }
+        learned = " ".join(word for word, is_set in words.items() if is_set)
+        self._learn.setCurrentIndex(max(0, self._learn.findData(learned)))
         self._slicer.setCurrentIndex(self._slicer.findData(bridges.slicer_host))
         self._port.setValue(bridges.slicer_port)
         self._port.setEnabled(bool(bridges.slicer_host))
@@ -195,7 +213,7 @@ class PreferencesDialog(QDialog):
             self._target,
             tr("Largest expected error of an accepted eye; 60′ is 1°."),
         )
-        add(tr("Eye box"), self._learn, tr("Learns from earlier wearers where eyes are."))
+        add(tr("&Learned"), self._learn, tr("What earlier sessions tell of the next wearer."))
         self._calibration.add_heading(tr("Sent to other programs by the next calibrations"))
         add("Open&IGTLink", self._slicer, tr("Poses and results, for 3D Slicer; no password."))
         add(tr("&Port"), self._port, tr("TCP port of OpenIGTLink on this computer."))

@@ -66,10 +66,9 @@ def eye_results(results: Results, trials: Mapping[Eye, EyeTrials] = {}) -> list[
         is_used = verdict.name in USED
         before = Bar(tr("Before, expected"), benefit.without_arcmin, is_judged=False)
         after_name = tr("After, expected") if is_used else tr("This result, not used")
-        if eye in results.measured_arcmin:
-            verified, left = results.measured_arcmin[eye]
-            after = Bar(after_name, left, is_used)
-            bars = [before, Bar(tr("Verification found"), verified), after]
+        if (verified := results.verified.get(eye)) is not None:
+            after = Bar(after_name, verified.now_arcmin, is_used)
+            bars = [before, Bar(tr("Verification found"), verified.before_arcmin), after]
         else:
             after = Bar(after_name, benefit.after_arcmin, is_used)
             bars = [before, after, Bar(tr("Verification"), None, absent=tr("not verified"))]

@@ -179,6 +179,8 @@ def result_rows(results: Results, trials: Row | None = None) -> list[Row]:
         rows.append(
             Row(tr("Prior"), (learned,), tr("Where eyes are expected before any alignment"))
         )
+    if warning := results.fused.prior.warning:
+        rows.append(Row(tr("Learned prior"), (tr("not used"),), tr("Not used: {}").format(warning)))
     alignments, verified = len(results.alignments), len(results.fused.verified)
     fused = pluralize(alignments, tr("alignment"), tr("alignments"))
     if not alignments:

@@ -182,7 +182,11 @@ def verification_view(snapshot: Snapshot, verifying: VerifyingView) -> WizardVie
         "Close the {} eye. Move the outline onto the hand: in the headset, or here with the "
         "arrow keys, + and −."
     ).format(EYE_WORDS[other])
-    if eye in snapshot.record.facts.verified:
+    if verifying.is_set_aside:
+        text = tr("It was moved aside on purpose: bringing it back is the evidence. {}").format(
+            text
+        )
+    elif eye in snapshot.record.facts.verified:
         text = tr("Once more, to be sure. {}").format(text)
     total_arcmin = float(np.hypot(moved.right_arcmin, moved.down_arcmin))
     seen_ns = snapshot.t_host_ns - verifying.began_host_ns

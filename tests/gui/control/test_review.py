@@ -146,7 +146,7 @@ def test_the_example_is_opened_from_the_start_page(
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
     numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
-    assert "Trials\t5.8′ n=3\t3.8′ n=3" in numbers
+    assert "Trials\t2.4′ n=3\t7.5′ n=3" in numbers
     assert program.window.findChild(QLabel, "reviewNote") is None
     program.show_start()
     assert program.start.new.settings.sessions == entered  # kept for the next wearer
@@ -166,7 +166,7 @@ def test_other_results_than_those_of_solving_again_are_named(
     program.open_session(path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
-    assert "Trials\t5.8′ n=3\t3.8′ n=3" in numbers
+    assert "Trials\t2.4′ n=3\t7.5′ n=3" in numbers
     assert child(program, QLabel, "reviewNote").text() == (
         "Solved again by this version; when it was recorded, the verdict was left eye ↻ Repeat."
     )

@@ -62,11 +62,18 @@ def test_what_is_changed_is_returned(qtbot: QtBot) -> None:
     theme.setCurrentIndex(theme.findData("dark"))
     folder.set_path("/b")
     guard.setValue(10.5)
-    target, learn = dialog.findChild(QDoubleSpinBox, "target"), dialog.findChild(QCheckBox)
+    target, learn = (
+        dialog.findChild(QDoubleSpinBox, "target"),
+        dialog.findChild(QComboBox, "learnPrior"),
+    )
     assert isinstance(target, QDoubleSpinBox)
-    assert isinstance(learn, QCheckBox)
+    assert isinstance(learn, QComboBox)
     target.setValue(6.5)
-    learn.click()
+    assert learn.currentText() == "Where eyes are"
+    learn.setCurrentIndex(learn.findText("All of it, even if far"))
+    station = dialog.preferences().station
+    assert (station.learn_prior, station.use_far_prior, station.learn_wearers) == (True,) * 3
+    learn.setCurrentIndex(learn.findText("Nothing"))
     slicer, port = dialog.findChild(QComboBox, "slicer"), dialog.findChild(QSpinBox, "slicerPort")
     lsl = dialog.findChild(QCheckBox, "lsl")
     assert isinstance(slicer, QComboBox)

@@ -66,8 +66,12 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     program.wizard_panel.hold(False)
     align_shown(technician, studio)
     technician.wait_for_state(State.VERIFY)
+    technician.wait(lambda: technician.can(Action.VERIFIED))
+    QTest.keyClick(program.window, Qt.Key.Key_Right)
+    wizard_fact = technician.child(QLabel, "wizardFact")
+    technician.wait(lambda: "1.0′ right" in wizard_fact.text())
     technician.press_space_for(Action.VERIFIED)
-    technician.wait(lambda: technician.can(Action.VERIFY_LEFT))  # once is not enough
+    technician.wait(lambda: technician.can(Action.ANOTHER))  # once is not enough
     solved_m = technician.snapshot.procedure.applied_shift_m["left"]
     assert solved_m.any()
 
@@ -80,7 +84,7 @@ def test_the_station_follows_its_plan_from_begin_to_a_verification(
     technician.wait(
         lambda: bool((technician.snapshot.procedure.applied_shift_m["left"] == solved_m).all())
     )
-    technician.wait(lambda: technician.can(Action.VERIFY_LEFT))
+    technician.wait(lambda: technician.can(Action.ANOTHER))
     button(program.window, QPushButton, "Finish a&s it is").click()
     technician.press_space_for(Action.FINISH)
     technician.wait(lambda: technician.can(Action.NEXT_WEARER))

@@ -137,7 +137,7 @@ def test_an_eye_is_verified_by_keys_and_the_error_found_is_shown(
     technician.wait_for_state(State.APPLIED)
     results = technician.snapshot.procedure.results
     assert results is not None
-    found, _ = results.measured_arcmin["left"]
+    found = results.verified["left"].before_arcmin
     live_text = technician.program.wizard_panel.picture.result
     technician.wait(lambda: f"Verification found: {found:.1f}′" in live_text.text())
     assert technician.record.facts.verified["left"].nudge_arcmin == (2.0, 0.0)
