@@ -19,7 +19,7 @@ from handcal.session.trial import make_trial
 from handcal.sim.wearer_settings import WearerSettings
 
 TARGET = Path(__file__).parents[1] / "resources/example_session"
-SEED = 3
+SEED = 13
 """Of a wearer whose eyes are both accepted after one alignment each; most need more."""
 POINTS, DEPTH_SIGMA_M = 5000, 0.001
 BY_HAND_SIGMA_M = 0.0005

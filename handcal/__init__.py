@@ -4,7 +4,7 @@
 >>> session = handcal.open_session("resources/example_session")
 >>> results = handcal.solve(session)
 >>> print(results.eyes["left"])
-φ = (+3.16 ± 1.29, -4.42 ± 0.92, +0.99 ± 1.86) mm; rms 1.58 mm, 97 % inliers, converged
+φ = (+4.20 ± 1.14, -4.39 ± 0.96, +0.91 ± 2.54) mm; rms 1.55 mm, 97 % inliers, converged
 
 Lengths are in metres, angles in radians, axes OpenCV's; `handcal.core.types` names the frames.
 """

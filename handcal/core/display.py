@@ -147,7 +147,7 @@ def projections(rig: Rig, results: Solved) -> dict[Eye, Float64]:
     (3, 4)
     >>> u, v, depth = P["left"] @ [0.0, 0.0, 0.5, 1.0]  # half a metre ahead of V
     >>> print(f"{u / depth:.0f} {v / depth:.0f} px")
-    618 370 px
+    614 369 px
     """
     solved = results.eyes
     return {

@@ -98,7 +98,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
     ...     hand_cut=hand_cut,
     ... )
     >>> print(shift)
-    φ = (+3.59 ± 1.32, -4.09 ± 0.77, +1.07 ± 1.17) mm; rms 1.58 mm, 97 % inliers, converged
+    φ = (+5.20 ± 0.92, -4.64 ± 0.54, +3.84 ± 1.99) mm; rms 1.55 mm, 97 % inliers, converged
     """
     path = Path(path)
     if path.suffix.lower() not in _FORMATS:

@@ -21,8 +21,8 @@ from handcal.core.types import (
     Rig,
     RigPart,
 )
-from handcal.report.cells import signed
 from handcal.hand.edges import edges_of
+from handcal.report.cells import signed
 
 _EYE_DISTANCE_M = 0.050, 0.075
 _FOCAL_DISTANCE_M = 0.3, 10.0
