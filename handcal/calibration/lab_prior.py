@@ -26,7 +26,6 @@ from handcal.register.prior import (
 )
 from handcal.register.results import RESULTS_VERSION
 from handcal.register.sitting import SittingSettings, sitting_prior
-from handcal.register.wearers import LearnedWearers, learn_wearers
 from handcal.rig.rig_file import read_rig
 from handcal.session.facts import read_facts
 from handcal.session.journal import find_journals
@@ -44,11 +43,9 @@ class LabPrior:
 
     learned: LearnedPrior | None
     """None if there are too few sessions."""
-    wearers: LearnedWearers | None
-    """The prior of what wearers see wrongly, from repeated sittings; None for too few."""
-    sittings: int
-    people: int
-    """Number of sittings of people with more than one, and of these people."""
+    repeated: tuple[tuple[list[Observed], ...], ...]
+    """The observations of each sitting of each person with more than one, from which
+    `handcal.register.wearers` learns."""
     used: int
     """Number of sessions that `learned` was, or would be, learned from."""
     left_out: Mapping[str, int]
@@ -92,16 +89,12 @@ def run_learn_prior(
     newest = {whose: observed for _, whose, observed in sorted(found, key=itemgetter(0))}
     if len(newest) < len(found):
         left_out["earlier sessions of the same wearer"] = len(found) - len(newest)
-    sitting = sitting_prior(rig, SittingSettings())
     by_person: dict[str, list[list[Observed]]] = {}
     for _, whose, observed in found:
         by_person.setdefault(whose, []).append(observed)
-    people = [sittings for sittings in by_person.values() if len(sittings) > 1]
     return LabPrior(
-        learn_prior(list(newest.values()), settings, sitting),
-        learn_wearers(people, sitting, progress),
-        sum(map(len, people)),
-        len(people),
+        learn_prior(list(newest.values()), settings, sitting_prior(rig, SittingSettings())),
+        tuple(tuple(sittings) for sittings in by_person.values() if len(sittings) > 1),
         len(newest),
         left_out,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
 
 if TYPE_CHECKING:
-    from handcal.calibration.lab_prior import LabPrior
+    from handcal.register.wearers import LearnedWearers
 
 _METRES = number(float, 1e-3, 1e6)
 
@@ -182,6 +183,8 @@ def prior(arguments: argparse.Namespace) -> None:
     from handcal.core.types import EYES
     from handcal.io.resources import resource_path
     from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior, eye_slice
+    from handcal.register.sitting import SittingSettings, sitting_prior
+    from handcal.register.wearers import learn_wearers
     from handcal.rig.rig_file import read_rig
 
     if not arguments.folder.is_dir():
@@ -193,7 +196,9 @@ def prior(arguments: argparse.Namespace) -> None:
     settings = PriorSettings()
     with show_progress() as progress:
         rig = read_rig(arguments.rig or resource_path("example_rig.yaml"))
-        found = run_learn_prior(arguments.folder, rig, settings, progress)
+        found = run_learn_prior(arguments.folder, rig, settings, progress.part(0.0, 0.5))
+        sitting = sitting_prior(rig, SittingSettings())
+        wearers = learn_wearers(found.repeated, sitting, progress.part(0.5, 1.0))
     learned = asdict(found.learned) if found.learned else None
     left_out = dict(found.left_out)
     save(
@@ -203,7 +208,7 @@ def prior(arguments: argparse.Namespace) -> None:
             "left_out": left_out,
             "learned": learned,
             "warning": found.learned.warning if found.learned else "",
-            "wearers": asdict(found.wearers) if found.wearers else None,
+            "wearers": asdict(wearers) if wearers else None,
         },
     )
     console.print(f"Sessions used: {found.used}")
@@ -223,18 +228,19 @@ def prior(arguments: argparse.Namespace) -> None:
             f"Not used before it is confirmed: {found.learned.warning}. If the headset does sit "
             "so, choose 'even if far' in the preferences."
         )
-    _print_wearers(found)
+    _print_wearers(found.repeated, wearers)
 
 
-def _print_wearers(found: LabPrior) -> None:
+def _print_wearers(repeated: Sequence[Sequence[object]], wearers: LearnedWearers | None) -> None:
     """Print what wearers see wrongly in a whole sitting, beside the default."""
     from math import radians
 
     from handcal.register.sitting import SittingSettings
     from handcal.register.wearers import MIN_PEOPLE, MIN_SITTINGS
 
-    console.print(f"Repeated sittings: {found.sittings} of {found.people} people")
-    wearers, usual = found.wearers, SittingSettings()
+    sittings = sum(map(len, repeated))
+    console.print(f"Repeated sittings: {sittings} of {len(repeated)} people")
+    usual = SittingSettings()
     if wearers is None:
         console.print(
             f"What wearers always see wrongly takes {MIN_SITTINGS} sittings of {MIN_PEOPLE} people "

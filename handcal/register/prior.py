@@ -178,17 +178,59 @@ def stacked(observed: Sequence[Observed], unknowns: int) -> Observed:
     )
 
 
-def _information(
-    observed: Sequence[Observed], sitting: SittingPrior | None
+def information_of(
+    observed: Sequence[Observed], kept: int, mean: Float64, covariance: Float64
 ) -> tuple[Float64, Float64]:
-    """Return the information (6, 6) and (6,) of one sitting's observations on [φ_left; φ_right]."""
+    """Return the information (K, K) and (K,) of one sitting's observations on the first unknowns.
+
+    Parameters
+    ----------
+    observed : sequence of Observed
+    kept : int
+        Number K of unknowns.
+    mean, covariance : (12 - K,), (12 - K, 12 - K) float64
+        Of the other unknowns.
+    """
     H, seen_m, noise_m2 = stacked(observed, 12)
-    by_eyes, by_sitting = H[:, :6], H[:, 6:]
-    if sitting is not None:
-        seen_m = seen_m - by_sitting @ sitting.mean
-        noise_m2 = noise_m2 + by_sitting @ sitting.covariance @ by_sitting.T
-    weighted = np.linalg.solve(noise_m2, by_eyes).T
-    return weighted @ by_eyes, weighted @ seen_m
+    by_kept, by_others = H[:, :kept], H[:, kept:]
+    noise_m2 = noise_m2 + by_others @ covariance @ by_others.T
+    weighted = np.linalg.solve(noise_m2, by_kept).T
+    return weighted @ by_kept, weighted @ (seen_m - by_others @ mean)
+
+
+def fit_population(
+    known: Sequence[tuple[Float64, Float64]],
+    start: Float64,
+    default: Float64,
+    iterations: int,
+    independent: int | None = None,
+) -> tuple[Float64, Float64]:
+    """Return mean (K,) and covariance (K, K) among sittings, by expectation maximisation.
+
+    Parameters
+    ----------
+    known : sequence of (information, state)
+        As `information_of` gives them, of each sitting.
+    start, default : (K,), (K, K) float64
+        Mean and covariance that take part as a few sittings.
+    iterations : int
+    independent : int, optional
+        The first so many unknowns are independent of the others.
+    """
+    information, state = (np.array(parts) for parts in zip(*known, strict=True))
+    mean, covariance = start, default
+    for _ in range(iterations):
+        common = np.linalg.inv(covariance)
+        each2 = np.linalg.inv(common + information)
+        each = np.einsum("nij,nj->ni", each2, common @ mean + state)
+        mean = (each.sum(axis=0) + _MEAN_WEIGHT * start) / (len(known) + _MEAN_WEIGHT)
+        apart = each - mean
+        scatter = each2.sum(axis=0) + apart.T @ apart
+        scatter += _MEAN_WEIGHT * np.outer(mean - start, mean - start)
+        covariance = (_DEFAULT_WEIGHT * default + scatter) / (_DEFAULT_WEIGHT + len(known))
+        if independent is not None:
+            covariance[:independent, independent:] = covariance[independent:, :independent] = 0.0
+    return mean, covariance
 
 
 def learn_prior(
@@ -216,23 +258,15 @@ def learn_prior(
     if len(sessions) < MIN_SESSIONS:
         return None
     default = eye_prior(PriorSettings(settings.eye_box_sigma_m, settings.eye_difference_sigma_m))
-    known = [_information(observed, sitting) for observed in sessions]
-    information, state = (np.array(parts) for parts in zip(*known, strict=True))
-    count = len(sessions)
-    mean_m, covariance_m2 = default.mean_m, default.covariance_m2
-    for _ in range(_ITERATIONS):
-        common = np.linalg.inv(covariance_m2)
-        each_m2 = np.linalg.inv(common + information)
-        each_m = np.einsum("nij,nj->ni", each_m2, common @ mean_m + state)
-        mean_m = each_m.sum(axis=0) / (count + _MEAN_WEIGHT)
-        apart_m = each_m - mean_m
-        scatter_m2 = each_m2.sum(axis=0) + apart_m.T @ apart_m
-        scatter_m2 += _MEAN_WEIGHT * np.outer(mean_m, mean_m)
-        covariance_m2 = (_DEFAULT_WEIGHT * default.covariance_m2 + scatter_m2) / (
-            _DEFAULT_WEIGHT + count
-        )
+    others = (
+        (np.zeros(6), np.zeros((6, 6))) if sitting is None else (sitting.mean, sitting.covariance)
+    )
+    known = [information_of(observed, 6, *others) for observed in sessions]
+    mean_m, covariance_m2 = fit_population(
+        known, default.mean_m, default.covariance_m2, _ITERATIONS
+    )
     symmetric = 0.5 * (covariance_m2 + covariance_m2.T)
-    return LearnedPrior(tuple(mean_m.tolist()), tuple(symmetric.ravel().tolist()), count)
+    return LearnedPrior(tuple(mean_m.tolist()), tuple(symmetric.ravel().tolist()), len(sessions))
 
 
 def eye_slice(eye: Eye) -> slice:

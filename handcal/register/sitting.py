@@ -18,11 +18,8 @@ import numpy as np
 
 from handcal.core.types import Float64, Rig
 
-ERRORS = "right", "down", "size", "edges", "depth scale", "depth offset"
-"""The six: direction to the right and down, rad, and relative size of what the wearer sees; width
-of the drawn outline beyond the hand, in its standard deviations, which differ between observations;
-scale and offset, m, of depth."""
 OF_WEARER = slice(0, 3)
+"""Those of the wearer among the six errors."""
 OUTLINE = 9
 """Place of the outline among the twelve unknowns, after φ of both eyes."""
 
@@ -67,7 +64,12 @@ class SittingSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SittingPrior:
-    """The prior on the errors of a sitting, Gaussian."""
+    """The prior on the errors of a sitting, Gaussian.
+
+    They are direction to the right and down, rad, and relative size of what the wearer sees; width
+    of the drawn outline beyond the hand, in its standard deviations, which differ between
+    observations; scale and offset, m, of depth.
+    """
 
     mean: Float64
     """(6,)."""

@@ -18,16 +18,20 @@ from scipy.linalg import block_diag
 
 from handcal.core.progress import Progress
 from handcal.core.types import Float64
-from handcal.register.prior import Observed, PriorSettings, eye_prior, stacked
+from handcal.register.prior import (
+    Observed,
+    PriorSettings,
+    eye_prior,
+    fit_population,
+    information_of,
+)
 from handcal.register.sitting import LearnedSitting, SittingPrior
 
 MIN_SITTINGS, MIN_PEOPLE = 30, 5
 """Fewer than these do not make a prior of wearers."""
-_DEFAULT_WEIGHT = 4.0
-_MEAN_WEIGHT = 2.0
 _ITERATIONS = 200
 _RESAMPLED = 40
-_EYES, _WEARER = slice(0, 6), slice(6, 9)
+_WEARER = slice(6, 9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +47,9 @@ class LearnedWearers:
     """Its 95 % interval over people."""
 
 
-def learn_wearers(
-    people: Sequence[Sequence[Sequence[Observed]]],
-    sitting: SittingPrior,
-    progress: Progress = Progress(),
-) -> LearnedWearers | None:
+def fit_wearers(
+    people: Sequence[Sequence[Sequence[Observed]]], sitting: SittingPrior
+) -> LearnedSitting | None:
     """Learn the prior from repeated sittings of several people.
 
     Parameters
@@ -56,70 +58,66 @@ def learn_wearers(
         The observations of each sitting of each person, as `Fused.all_observed` has them.
     sitting : SittingPrior
         The default prior, which takes part as a few sittings.
-    progress : Progress
 
     Returns
     -------
-    LearnedWearers or None
+    LearnedSitting or None
         None for fewer than `MIN_SITTINGS` sittings or `MIN_PEOPLE` people.
+    """
+    count = sum(map(len, people))
+    if count < MIN_SITTINGS or len(people) < MIN_PEOPLE:
+        return None
+    known = [_information(observed, sitting) for person in people for observed in person]
+    mean, covariance = _fit(known, sitting)
+    return LearnedSitting(
+        tuple(mean[_WEARER].tolist()), tuple(covariance[_WEARER, _WEARER].ravel().tolist()), count
+    )
+
+
+def learn_wearers(
+    people: Sequence[Sequence[Sequence[Observed]]],
+    sitting: SittingPrior,
+    progress: Progress = Progress(),
+) -> LearnedWearers | None:
+    """Learn the prior as `fit_wearers` does, with its interval, which takes 40 times as long.
 
     Raises
     ------
     CancelledError
         If it was cancelled.
     """
-    count = sum(map(len, people))
-    if count < MIN_SITTINGS or len(people) < MIN_PEOPLE:
+    learned = fit_wearers(people, sitting)
+    if learned is None:
         return None
     known = [[_information(observed, sitting) for observed in person] for person in people]
-    mean, covariance = _fit([one for person in known for one in person], sitting)
     rng = np.random.default_rng(0)
     sizes = []
     for done in range(_RESAMPLED):
         progress.at(done / _RESAMPLED, "Learning what wearers see wrongly")
         drawn = rng.integers(len(known), size=len(known))
-        sizes.append(_size(*_fit([one for k in drawn for one in known[k]], sitting)))
+        mean, covariance = _fit([one for k in drawn for one in known[k]], sitting)
+        sizes.append(_size(mean[_WEARER], covariance[_WEARER, _WEARER]))
     low, high = np.quantile(sizes, [0.025, 0.975], axis=0)
-    learned = LearnedSitting(
-        tuple(mean[_WEARER].tolist()), tuple(covariance[_WEARER, _WEARER].ravel().tolist()), count
-    )
-    return LearnedWearers(
-        learned, len(people), _three(_size(mean, covariance)), _three(low), _three(high)
-    )
+    size = _size(np.array(learned.mean), np.reshape(learned.covariance, (3, 3)))
+    return LearnedWearers(learned, len(people), _three(size), _three(low), _three(high))
 
 
 def _information(observed: Sequence[Observed], sitting: SittingPrior) -> tuple[Float64, Float64]:
     """Return what a sitting says on φ of both eyes and the wearer's errors: (9, 9) and (9,)."""
-    H, seen_m, noise_m2 = stacked(observed, 12)
-    H, by_camera = H[:, :9], H[:, 9:]
-    noise_m2 = noise_m2 + by_camera @ sitting.covariance[3:, 3:] @ by_camera.T
-    weighted = np.linalg.solve(noise_m2, H).T
-    return weighted @ H, weighted @ (seen_m - by_camera @ sitting.mean[3:])
+    return information_of(observed, 9, sitting.mean[3:], sitting.covariance[3:, 3:])
 
 
 def _fit(
     known: Sequence[tuple[Float64, Float64]], sitting: SittingPrior
 ) -> tuple[Float64, Float64]:
     """Return mean (9,) and covariance (9, 9), in which eyes and wearer are independent."""
-    information, state = (np.array(parts) for parts in zip(*known, strict=True))
     default = block_diag(eye_prior(PriorSettings()).covariance_m2, sitting.covariance[:3, :3])
     start = np.concatenate([np.zeros(6), sitting.mean[:3]])
-    mean, covariance = start, default
-    for _ in range(_ITERATIONS):
-        common = np.linalg.inv(covariance)
-        each2 = np.linalg.inv(common + information)
-        each = np.einsum("nij,nj->ni", each2, common @ mean + state)
-        mean = (each.sum(axis=0) + _MEAN_WEIGHT * start) / (len(known) + _MEAN_WEIGHT)
-        apart = each - mean
-        scatter = each2.sum(axis=0) + apart.T @ apart
-        scatter += _MEAN_WEIGHT * np.outer(mean - start, mean - start)
-        full = (_DEFAULT_WEIGHT * default + scatter) / (_DEFAULT_WEIGHT + len(known))
-        covariance = block_diag(full[_EYES, _EYES], full[_WEARER, _WEARER])
-    return mean, covariance
+    return fit_population(known, start, default, _ITERATIONS, independent=6)
 
 
 def _size(mean: Float64, covariance: Float64) -> Float64:
-    return np.sqrt(np.diag(covariance)[_WEARER] + mean[_WEARER] ** 2)
+    return np.sqrt(np.diag(covariance) + mean**2)
 
 
 def _three(values: Float64) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from the disparity d = f B / z to the right imager, so that σz = z² σd / (f B
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import cv2
 import numpy as np
@@ -16,7 +16,6 @@ from scipy.special import ndtri
 from handcal.core.types import Bool, Float32, UInt16
 
 SensorName: TypeAlias = Literal["d415", "ahat", "exact"]
-SENSORS: tuple[SensorName, ...] = get_args(SensorName)
 """A stereo camera with its faults at edges, a time-of-flight camera, and a stereo camera whose
 edges are where those of the hand are."""
 

@@ -19,6 +19,8 @@ from handcal.core.errors import CameraError, FileError
 from handcal.core.types import EYES, PlanName, Rig
 from handcal.io.settings import settings_json
 from handcal.register.fuse import FuseSettings
+from handcal.register.sitting import sitting_prior
+from handcal.register.wearers import fit_wearers
 from handcal.rig.rig_file import read_rig
 from handcal.session.journal import JOURNAL, JOURNAL_END
 from handcal.session.record import replay
@@ -213,12 +215,13 @@ def _lab_fuse(settings: StationSettings) -> FuseSettings:
     if not (settings.learn_prior or settings.learn_wearers):
         return fuse
     prior, sitting = fuse.prior, fuse.sitting
-    found = run_learn_prior(settings.sessions_path, read_rig(settings.rig_path), prior)
+    rig = read_rig(settings.rig_path)
+    found = run_learn_prior(settings.sessions_path, rig, prior)
     if settings.learn_prior and prior.learned is None and found.learned is not None:
         if settings.use_far_prior or not found.learned.warning:
             prior = replace(prior, learned=found.learned)
         else:
             prior = replace(prior, unconfirmed=found.learned)
-    if settings.learn_wearers and sitting.learned is None and found.wearers is not None:
-        sitting = replace(sitting, learned=found.wearers.learned)
+    if settings.learn_wearers and sitting.learned is None:
+        sitting = replace(sitting, learned=fit_wearers(found.repeated, sitting_prior(rig, sitting)))
     return replace(fuse, prior=prior, sitting=sitting)

@@ -15,7 +15,8 @@ from handcal.core.types import EYES, Verification
 from handcal.register.nudge import nudged_shift_m
 from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
 from handcal.register.results import SolveSettings, conclude, results_json
-from handcal.register.wearers import MIN_PEOPLE, MIN_SITTINGS
+from handcal.register.sitting import SittingSettings, sitting_prior
+from handcal.register.wearers import MIN_PEOPLE, MIN_SITTINGS, learn_wearers
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.session.session import Session
@@ -71,9 +72,10 @@ def test_what_wearers_always_see_wrongly_is_learned_from_those_with_several_sess
             session(tmp_path, f"P{person}", 0.001)
     session(tmp_path, "once", 0.001)
     found = run_learn_prior(tmp_path, RIG, PriorSettings())
-    assert (found.people, found.sittings) == (MIN_PEOPLE, MIN_PEOPLE * sittings)
+    assert [len(person) for person in found.repeated] == [sittings] * MIN_PEOPLE
     assert found.used == MIN_PEOPLE + 1
-    assert found.wearers is not None
+    wearers = learn_wearers(found.repeated, sitting_prior(RIG, SittingSettings()))
+    assert wearers is not None
     settings = StationSettings(sessions=str(tmp_path), learn_wearers=True)
     with resume_or_create(settings, "new", None, Former()) as (_, began):
-        assert began.calibration.solve.fuse.sitting.learned == found.wearers.learned
+        assert began.calibration.solve.fuse.sitting.learned == wearers.learned

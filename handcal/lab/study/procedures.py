@@ -32,7 +32,7 @@ from handcal.register.benefit import depth_error_m
 from handcal.register.placement import PlacementSettings
 from handcal.register.prior import LearnedPrior, Observed, learn_prior
 from handcal.register.sitting import LearnedSitting, SittingSettings, sitting_prior
-from handcal.register.wearers import learn_wearers
+from handcal.register.wearers import fit_wearers
 from handcal.rig.example import example_rig
 from handcal.sim.people import VARIANTS, Variant, begin_sitting
 from handcal.sim.raster import D415
@@ -178,9 +178,9 @@ def learn_sittings(rows: Sequence[StudyRow]) -> LearnedSitting:
             for H, seen_m, covariance_m2 in json.loads(str(row["observed"]))
         ]
         people.setdefault(row["person"], []).append(sitting)
-    found = learn_wearers(list(people.values()), sitting_prior(example_rig(), SittingSettings()))
+    found = fit_wearers(list(people.values()), sitting_prior(example_rig(), SittingSettings()))
     assert found is not None, "there are enough sittings"
-    return found.learned
+    return found
 
 
 def procedure_trial(settings: ProcedureSettings, case: Case) -> list[StudyRow]:
