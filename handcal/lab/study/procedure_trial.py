@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 
-from handcal.calibration.verifying import draw_offset
+from handcal.calibration.verifying import Verifying, draw_offset
 from handcal.core.display import projection_matrix, view_of_eye
 from handcal.core.errors import HandError
 from handcal.core.geometry import invert, rigid, transform
@@ -27,12 +27,12 @@ from handcal.core.types import (
     PlanName,
     Verification,
 )
+from handcal.hand.edges import edges_of
 from handcal.lab.study.seeing import See, SeenHand
 from handcal.lab.study.wearers import StudyWearer
-from handcal.link.nudges import NudgeSum, VerifyRequest
+from handcal.link.nudges import VerifyRequest
 from handcal.register.fuse import FuseSettings
 from handcal.register.guard import GuardSettings, RotationGuard
-from handcal.register.nudge import nudged_shift_m
 from handcal.register.placement import PlacementSettings, next_alignment, next_verification
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.register.results import Results, SolveSettings, conclude
@@ -343,36 +343,16 @@ def _verify(
         assert found is not None, "the outline is on the display"
         return found
 
-    def shown(moved: NudgeSum, offset: NudgeSum) -> Float64:
-        total = moved.plus(offset.right_arcmin, offset.down_arcmin, offset.size)
-        return nudged_shift_m(
-            display, drawn_m, hand_E_m, total.right_arcmin, total.down_arcmin, total.size
-        )
-
-    moved = offset = NudgeSum()
+    verifying = Verifying(request, display, drawn_m, hand_E_m)
     while True:
         for _ in range(_MOST_LOOKS):
-            presses = presses_for(look(shown(moved, offset)), error, request)
+            presses = presses_for(look(verifying.shift_m), error, request)
             if sitting.variant == "fits-at-once" or not any(presses):
                 break
-            moved = moved.plus(*presses)
-        if moved != NudgeSum() or offset != NudgeSum():
-            break
-        offset = draw_offset(rng)
-    return Verification(
-        before_m=_three(drawn_m),
-        nudge_arcmin=(moved.right_arcmin, moved.down_arcmin),
-        after_m=_three(shown(moved, offset)),
-        nudge_size=moved.size,
-        hand_E_m=_three(hand_E_m),
-        offset_arcmin=(offset.right_arcmin, offset.down_arcmin),
-        offset_size=offset.size,
-    )
-
-
-def _three(values_m: Float64) -> tuple[float, float, float]:
-    x, y, z = values_m.tolist()
-    return x, y, z
+            verifying.nudge(*presses)
+        if not verifying.needs_proof:
+            return verifying.result(hand_E_m, edges_of(wearer.rig).sigma_px)
+        verifying.set_aside(draw_offset(rng))
 
 
 def _eye_distance(
