@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from handcal.core.frozen import readonly
 from handcal.core.geometry import invert, project, rigid, transform
-from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Rig, Solved
+from handcal.core.types import EYES, Bool, Eye, EyeDisplay, Float64, Rig, Solved
 
 TARGET_SIDE_M = 0.08
 TARGET_DEPTHS_M = (0.4, 0.5, 0.6)
@@ -156,6 +156,12 @@ def projections(rig: Rig, results: Solved) -> dict[Eye, Float64]:
         else projection_matrix(display)
         for eye, display in rig.eyes.items()
     }
+
+
+def is_on_display(display: EyeDisplay, pixels: Float64) -> Bool:
+    """Return (N,): True for pixels (N, 2) within the display."""
+    last_px = display.width_px - 0.5, display.height_px - 0.5
+    return np.asarray(((pixels >= -0.5) & (pixels <= last_px)).all(axis=1))
 
 
 def arcmin_from_px(display: EyeDisplay, error_px: ArrayLike) -> Float64:

@@ -33,14 +33,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri, softmax
 
-from handcal.core.display import eye_projection
+from handcal.core.display import eye_projection, is_on_display
 from handcal.core.geometry import project, transform
 from handcal.core.types import (
     EYES,
     Alignment,
-    Bool,
     Eye,
-    EyeDisplay,
     EyeDistance,
     EyeShift,
     Float64,
@@ -424,7 +422,8 @@ def seen_by(
         display = rig.eyes[eye]
         R_A_E = R_W_A.T @ T_E_W[eye][:3, :3].T
         outline_E = transform(T_E_W[eye], outline_m)
-        shown = _is_shown(outline_E, display, drawn_shift_m[eye])
+        drawn_px = project(eye_projection(display, drawn_shift_m[eye]), outline_E)
+        shown = is_on_display(display, drawn_px)
         normals[eye] = R_A_E @ _pixel_normal(outline_E[shown]) @ R_A_E.T
         depth_m = float(transform(T_E_W[eye], middle_m[None])[0, 2])
         sigmas = settings.lateral_sigma_arcmin, settings.depth_sigma
@@ -481,13 +480,6 @@ def _common_axes(T_E_W: Mapping[Eye, Float64]) -> Float64:
     The left eye's E is as good as any, and the same for every position of the head.
     """
     return next(T_E_W[eye] for eye in EYES if eye in T_E_W)[:3, :3].T
-
-
-def _is_shown(points_E_m: Float64, display: EyeDisplay, drawn_shift_m: Float64) -> Bool:
-    """Return (N,): True for points that the headset draws within the display."""
-    pixels = project(eye_projection(display, drawn_shift_m), points_E_m)
-    last_px = display.width_px - 0.5, display.height_px - 0.5
-    return np.asarray(((pixels >= -0.5) & (pixels <= last_px)).all(axis=1))
 
 
 def _pixel_normal(points_E_m: Float64) -> Float64:

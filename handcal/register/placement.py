@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.display import eye_projection, is_on_display, view_of_eye
 from handcal.core.geometry import image_points, invert, project, transform
 from handcal.core.types import EYES, Bool, Eye, Float64, PlanName, Rig, Verification
 from handcal.register.benefit import expected_arcmin
@@ -251,9 +251,7 @@ def _is_visible(
     for eye in eyes:
         display = rig.eyes[eye]
         drawn = eye_projection(display, drawn_shift_m[eye]) @ view_of_eye(display, np.eye(4))
-        pixels = project(drawn, outline_m)
-        last_px = display.width_px - 0.5, display.height_px - 0.5
-        if ((pixels >= -0.5) & (pixels <= last_px)).all(axis=1).mean() < settings.shown_share:
+        if is_on_display(display, project(drawn, outline_m)).mean() < settings.shown_share:
             return False
     return True
 

@@ -49,6 +49,13 @@ class DepthView:
     """RMS distance of the measured points from the plane through them, without outliers."""
 
 
+def board_in_depth(seen: BoardView, frame: Frame) -> Float64:
+    """Return the board's pose (4, 4) in the depth camera, from a frame's colour image."""
+    if frame.color_intrinsics is None:
+        raise ValueError("the frame needs colour")
+    return invert(frame.T_C_D) @ board_pose(seen, frame.color_intrinsics)
+
+
 def depth_view(seen: BoardView, frame: Frame) -> DepthView:
     """Compare the measured depth of a board with its pose.
 
@@ -64,9 +71,7 @@ def depth_view(seen: BoardView, frame: Frame) -> DepthView:
     BoardError
         If the depth image shows too little of the board.
     """
-    if frame.color_intrinsics is None:
-        raise ValueError("the frame needs colour")
-    T_D_B = invert(frame.T_C_D) @ board_pose(seen, frame.color_intrinsics)
+    T_D_B = board_in_depth(seen, frame)
     camera = frame.depth_intrinsics
     hull_px = cv2.convexHull(
         image_points(transform(T_D_B, seen.points_m), camera).astype(np.float32)

@@ -14,15 +14,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.core.geometry import image_points, invert, transform
+from handcal.core.geometry import image_points, transform
 from handcal.core.types import DepthEdges, Float64, Frame, Intrinsics, UInt16
 from handcal.hand.color_edge import find_color_edge
 from handcal.hand.outline import inward_normals
 from handcal.hand.surface import solid_surface
 from handcal.hand.view import Box
 from handcal.rig.boards.board import BoardError, BoardView
+from handcal.rig.depth import board_in_depth
 from handcal.rig.displays.display import undistort
-from handcal.rig.lens.viewpoint import board_pose
 
 MIN_BORDER_VIEWS = 5
 # As in the segmentation of hands, whose borders this is about.
@@ -64,10 +64,8 @@ def border_outside_px(seen: BoardView, frame: Frame) -> float:
     BoardError
         If too little of the border is seen.
     """
-    if frame.color_intrinsics is None:
-        raise ValueError("the frame needs colour")
     camera = frame.depth_intrinsics
-    T_D_B = invert(frame.T_C_D) @ board_pose(seen, frame.color_intrinsics)
+    T_D_B = board_in_depth(seen, frame)
     corners_px = image_points(transform(T_D_B, seen.points_m), camera)
     x0, y0, x1, y1 = _around(corners_px, camera)
     depth_m = frame.depth_scale_m * frame.depth[y0:y1, x0:x1].astype(np.float64)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.display import eye_projection, is_on_display, view_of_eye
 from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.types import EyeDisplay, Float64
 from handcal.sim.hand import HandModel
@@ -116,8 +116,7 @@ def view_through(
     """
     seen = eye_projection(display, true_shift_m) @ view_of_eye(display, T_W_H)
     drawn_px = project(drawn @ invert(T_W_H), cursor_m)
-    size_px = display.width_px - 0.5, display.height_px - 0.5
-    drawn_px[~np.all((drawn_px >= -0.5) & (drawn_px <= size_px), axis=1)] = np.nan
+    drawn_px[~is_on_display(display, drawn_px)] = np.nan
     return CursorView(seen, drawn_px)
 
 

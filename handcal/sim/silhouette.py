@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from handcal.core.display import eye_projection, view_of_eye
+from handcal.core.display import eye_projection, is_on_display, view_of_eye
 from handcal.core.geometry import image_points, invert, project, rigid, transform
 from handcal.core.types import Bool, EyeDisplay, Float64, Intrinsics
 from handcal.sim.hand import HandModel
@@ -143,8 +143,7 @@ def view_outline(
         normals /= np.linalg.norm(normals, axis=1)[:, None] + 1e-12
     every = -(-len(drawn_px) // _MOST_POINTS)
     drawn_px, normals = drawn_px[::every].copy(), normals[::every]
-    size_px = display.width_px - 0.5, display.height_px - 0.5
-    drawn_px[~((drawn_px >= -0.5) & (drawn_px <= size_px)).all(axis=1)] = np.nan
+    drawn_px[~is_on_display(display, drawn_px)] = np.nan
     return OutlineView(
         eye_projection(display, true_shift_m) @ T_E_W,
         transform(invert(T_E_W), true_shift_m[None])[0],
