@@ -39,7 +39,13 @@ from handcal.register.prior import eye_position_m
 from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.sim.hand import Side
-from handcal.sim.sensor import D415_FATTEN_PX, EDGE_SIGMA_PX, SensorName, border_px
+from handcal.sim.sensor import (
+    EDGE_SIGMA_PX,
+    PHASE_BORDER_PX,
+    SensorName,
+    border_px,
+    fatten_of,
+)
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.faults import Fault
@@ -217,12 +223,11 @@ def _contradicted(
 
 def _checked(rig: Rig, settings: DemoSettings) -> Rig:
     """Return the rig with its camera's edges, as a depth check finds them."""
-    usual_px = D415_FATTEN_PX if settings.sensor == "d415" else 0.0
-    fatten_px = usual_px if settings.fatten_px is None else settings.fatten_px
+    found_px = border_px(fatten_of(settings.sensor, settings.fatten_px))
+    if settings.sensor == "ahat":
+        found_px = PHASE_BORDER_PX
     error_px = np.random.default_rng([settings.seed, _CHECK]).normal(0.0, EDGE_SIGMA_PX)
-    edges = DepthEdges(
-        border_px(fatten_px) + error_px, EDGE_SIGMA_PX, "measured", views=10, made="simulated"
-    )
+    edges = DepthEdges(found_px + error_px, EDGE_SIGMA_PX, "measured", views=10, made="simulated")
     return replace(rig, depth_edges=edges)
 
 

@@ -19,7 +19,7 @@ from handcal.sim.raster import D415
 from handcal.sim.render import World, render
 from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
-from handcal.sim.sensor import D415_FATTEN_PX, SensorName, SensorSettings, sense_depth
+from handcal.sim.sensor import SensorName, SensorSettings, fatten_of, sense_depth
 
 _POLL_S = 0.002
 # What rendering takes longer is the computer's doing, of which a camera knows nothing: if it
@@ -59,8 +59,7 @@ def sensor_settings(
     """Return the settings of a sensor; `fatten_px` replaces how much a D415's edges grow."""
     if name == "ahat":
         return AhatSettings()
-    usual = D415_FATTEN_PX if name == "d415" else 0.0
-    return SensorSettings(fatten_px=usual if fatten_px is None else fatten_px)
+    return SensorSettings(fatten_px=fatten_of(name, fatten_px))
 
 
 CAMERA_FAULTS: Mapping[str, SyntheticSettings] = {

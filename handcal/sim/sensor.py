@@ -62,6 +62,17 @@ D415_FATTEN_PX = 2.35
 1.8 px (docs/segmentation.md)."""
 
 
+PHASE_BORDER_PX = -0.5
+"""Distance of that border outside the hand with a camera without matching windows, the centres of
+whose outermost pixels lie inside."""
+
+
+def fatten_of(name: SensorName, fatten_px: float | None) -> float:
+    """Return how much the edges of a stereo camera grow, px, unless it is given."""
+    usual_px = D415_FATTEN_PX if name == "d415" else 0.0
+    return usual_px if fatten_px is None else fatten_px
+
+
 EDGE_SIGMA_PX = 0.2
 """Standard deviation with which a depth check finds `border_px`."""
 
