@@ -1568,10 +1568,6 @@ As in the paper: the cursor is the hand where it is held; you choose the eyes in
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>No eye explains what was seen. Check the rig&apos;s depth edges; more does not help.</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
         <source>a fine-tuned φ</source>
         <translation type="unfinished"></translation>
     </message>

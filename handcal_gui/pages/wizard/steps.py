@@ -364,18 +364,12 @@ def _not_accepted_view(preconditions: tuple[Precondition, ...], snapshot: Snapsh
         others.insert(0, ButtonSpec(Action.ANOTHER, tr("&Add alignment")))
         label = tr("Verify the {} eye").format(EYE_WORDS[again[0]])
         main = ButtonSpec(first.action, label, can_do)
-    if results is not None and results.evidence:
-        text = tr("No eye explains what was seen. Check the rig's depth edges; more does not help.")
-        others = [ButtonSpec(Action.ANOTHER, tr("&Add alignment")), *_more(snapshot)[1:]]
-        main = ButtonSpec(Action.NEXT, tr("Finish as it is"))
-    else:
-        others.append(ButtonSpec(Action.NEXT, tr("Finish a&s it is")))
     return WizardView(
         Step.VERIFY,
         text,
         (hand_found(snapshot), hand_still(snapshot), *preconditions),
         main,
-        tuple(others),
+        (*others, ButtonSpec(Action.NEXT, tr("Finish a&s it is"))),
     )
 
 

@@ -11,7 +11,6 @@ import pytest
 from handcal.calibration.plan import PlanSettings, StepName
 from handcal.calibration.states import State
 from handcal.core.types import EYES, Eye, EyeShift, Verdict, VerdictName, Verification
-from handcal.register.fuse import Misfit
 from handcal.register.verdict import Advice
 from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.snapshot import Snapshot
@@ -185,19 +184,6 @@ def test_a_verification_before_the_last_alignment_is_not_of_the_result(snapshot:
     assert begun().view(solving).step is Step.VERIFY
     solving = replace(solving, record=aligned.record)
     assert begun().view(solving).step is Step.SOLVE
-
-
-def test_what_no_eye_explains_does_not_offer_more_alignments_first(snapshot: Maker) -> None:
-    done = planned_snapshot(snapshot, StepName.DONE, verified=BOTH)
-    done = with_verdicts(done, "repeat", "repeat")
-    results = done.procedure.results
-    assert results is not None
-    misfit = replace(results, fused=replace(results.fused, misfit=Misfit(100.0, 12)))
-    done = replace(done, procedure=replace(done.procedure, results=misfit))
-    view = begun().view(done)
-    assert "Check the rig's depth edges" in view.sentence
-    assert (view.main.action, view.main.label) == (Action.NEXT, "Finish as it is")
-    assert view.others[0].action is Action.ANOTHER
 
 
 def test_the_end_says_which_eye_to_verify_again(snapshot: Maker) -> None:
