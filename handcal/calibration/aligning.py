@@ -14,7 +14,7 @@ from handcal.calibration.states import CalibrationSettings, Observation
 from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import INFORM_NS
 from handcal.core.display import view_of_eye
-from handcal.core.errors import HandError, PoseError, PosePendingError
+from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError
 from handcal.core.geometry import invert
 from handcal.core.types import EYES, Alignment, Eye, Float64, Rig
 from handcal.link.server import Confirmation, HeadsetServer
@@ -24,6 +24,8 @@ from handcal.session.facts import AlignmentFacts
 
 KEEP_PROMPT = "Keep your hand up."
 """Shown if the next cursor or verification follows at once."""
+OUT_OF_VIEW = "out of view"
+"""The journal's reason of a refusal after which the cursor is withdrawn."""
 # The prompt says what to balance when the hand is turned.
 _MOVE = "Move your hand under the cursor, both finger tips and wrist, then confirm."
 ADVISE_EVERY_NS = 1_000_000_000
@@ -187,6 +189,13 @@ class Aligning:
             shape = self._guard.shape_change(hand.points_W_m, hand.cloud.is_cut)
         except PosePendingError:
             return None
+        except OutOfViewError as error:
+            # The hand covers the cursor only there, so another cursor is needed.
+            return Refused(
+                f"The camera saw only a part of your hand: {error}. Lower it, and raise it again "
+                "there.",
+                OUT_OF_VIEW,
+            )
         except (HandError, PoseError) as error:
             was = str(error).partition("; ")[0] if isinstance(error, HandError) else ""
             return Refused(f"{error}. Align and confirm again.", "no hand", was=was)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handcal.core.errors import HandError, PoseError, PosePendingError
+from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError
 from handcal.core.geometry import transform
 from handcal.core.types import Float64, HandCloud
 
@@ -74,14 +74,20 @@ class RecentHands:
         self._keep_ns = round(1e9 * (steady_s + _KEEP_S))
         self._placed: deque[PlacedHand] = deque()
         self._unplaced: deque[tuple[HandCloud, int, Float64 | None]] = deque()
+        self._missed: deque[tuple[int, HandError]] = deque()
         self._seen_ns = 0
 
     def add(
-        self, cloud: HandCloud | None, t_host_ns: int, T_W_D: Float64 | None = None
+        self,
+        cloud: HandCloud | None,
+        t_host_ns: int,
+        T_W_D: Float64 | None = None,
+        missed_for: HandError | None = None,
     ) -> tuple[PlacedHand | None, str]:
         """Add the cloud of a new frame, None if it shows no hand, and place the clouds that can be.
 
-        If the frame carries its camera's pose T_W_D (4, 4), no other is needed.
+        If the frame carries its camera's pose T_W_D (4, 4), no other is needed. `missed_for`: why it
+        shows no hand.
 
         Returns
         -------
@@ -91,6 +97,8 @@ class RecentHands:
         self._seen_ns = t_host_ns
         if cloud is not None:
             self._unplaced.append((cloud, t_host_ns, T_W_D))
+        elif missed_for is not None:
+            self._missed.append((t_host_ns, missed_for))
         self._forget_old()
         hand, problem = None, ""
         while self._unplaced:
@@ -146,11 +154,17 @@ class RecentHands:
         return self._placed[-1].t_host_ns if self._placed else 0
 
     def nearest(self, t_host_ns: int, tolerance_s: float) -> PlacedHand:
-        """Return the hand nearest in time; HandError if none is within the tolerance."""
+        """Return the hand nearest in time; HandError if none is within the tolerance.
+
+        OutOfViewError if the camera saw only a part of it then.
+        """
         near = [
             hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= 1e9 * tolerance_s
         ]
         if not near:
+            missed = min(self._missed, key=lambda one: abs(one[0] - t_host_ns), default=(0, None))
+            if isinstance(missed[1], OutOfViewError):
+                raise missed[1]
             raise HandError("The camera did not see your hand")
         return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 
@@ -171,6 +185,7 @@ class RecentHands:
         """Forget all hands."""
         self._placed.clear()
         self._unplaced.clear()
+        self._missed.clear()
 
     def _place(self, cloud: HandCloud, t_host_ns: int, told: Float64 | None) -> PlacedHand:
         T_W_D = self._pose_at_host_ns(t_host_ns) @ self._T_H_D if told is None else told
@@ -187,3 +202,5 @@ class RecentHands:
             self._placed.popleft()
         while self._unplaced and self._unplaced[0][1] < oldest_ns:
             self._unplaced.popleft()
+        while self._missed and self._missed[0][0] < oldest_ns:
+            self._missed.popleft()

@@ -34,7 +34,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.calibration.aligning import KEEP_PROMPT, Accepted, Aligning, Refused, align_prompt
+from handcal.calibration.aligning import (
+    KEEP_PROMPT,
+    OUT_OF_VIEW,
+    Accepted,
+    Aligning,
+    Refused,
+    align_prompt,
+)
 from handcal.calibration.drawing import Drawing
 from handcal.calibration.evidence import Contradiction, Evidence
 from handcal.calibration.hands import PlacedHand
@@ -181,6 +188,7 @@ class Calibration:
         self._sight = Sight(self.rig, link, self._settings, self.evidence)
         self._drawing = Drawing(self.rig, link, record.wearer)
         self._aligning: Aligning | None = None
+        self._withdrawn_for = ""
         self._cursor_id = 0
         self._sent_cursor: Outgoing | None = None
         self._headset: HeadsetIdentity | None = None
@@ -223,7 +231,7 @@ class Calibration:
     def refusal(self) -> str:
         """Reason why the wearer's last confirmation was refused; else empty."""
         present = self.verifying or self._aligning
-        return "" if present is None else present.refusal
+        return self._withdrawn_for if present is None else present.refusal
 
     @property
     def refused_for(self) -> str:
@@ -355,6 +363,7 @@ class Calibration:
         self.raised = None if displacement_W_m is None else hand
         hand = hand if displacement_W_m is None else _moved(hand, displacement_W_m)
         self._aligning = Aligning(hand, self._cursor_id + 1, tuple(eyes), self.rig, self._settings)
+        self._withdrawn_for = ""
         self._cursor_id += 1
         self.eyes = tuple(eyes)
         self.state = State.ALIGN
@@ -801,6 +810,9 @@ class Calibration:
 
     def _refuse(self, refused: Refused, aligning: Aligning) -> None:
         aligning.refusal, aligning.refused_for = refused.prompt, refused.was
+        if refused.reason == OUT_OF_VIEW:
+            self._show_hand_again()
+            self._withdrawn_for = refused.prompt
         self._link.send_prompt(refused.prompt, self.eyes)
         self._session.record(
             "refused",

@@ -47,7 +47,6 @@ class Sight:
         self._evidence = evidence
         self._clock = FrameClock(settings.camera_latency_s)
         self._finder = make_finder(settings.segment)
-        self._rig = rig
         self.delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D, settings.delay)
         self.hands = RecentHands(
             link.pose_at_host_ns, rig.T_H_D, settings.steady_s, settings.steady_m
@@ -95,11 +94,11 @@ class Sight:
         )
         cloud, problem = self._find(frame, camera, contradiction)
         segment_ms = 1e3 * (time.perf_counter() - started_s)
-        hand, not_placed = self.hands.add(cloud, t_host_ns, frame.T_W_D)
+        hand, not_placed = self.hands.add(cloud, t_host_ns, frame.T_W_D, problem)
         return Observation(
             state,
             hand,
-            "" if hand else problem or not_placed,
+            "" if hand else str(problem or not_placed),
             self.hands.steady() is not None and not self.delay.is_needed,
             cloud,
             segment_ms=segment_ms,
@@ -109,16 +108,16 @@ class Sight:
 
     def _find(
         self, frame: Frame, camera: CameraIdentity, contradiction: Contradiction | None
-    ) -> tuple[HandCloud | None, str]:
+    ) -> tuple[HandCloud | None, HandError | None]:
         """Return the hand in a frame, or None and the reason."""
         if contradiction is not None:
             self.hands.clear()
-            return None, contradiction.text
+            return None, HandError(contradiction.text)
         try:
             cloud = self._finder.find(frame)
         except HandError as error:
-            return None, str(error)
-        return with_outline(cloud, frame, edges_of(self._rig, camera.model)), ""
+            return None, error
+        return with_outline(cloud, frame, edges_of(self._rig, camera.model)), None
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:
         """Compare the pose that a frame carries with that of the headset's app."""

@@ -21,6 +21,10 @@ class HandError(HandcalError):
     """No hand could be segmented in a frame; the text says why."""
 
 
+class OutOfViewError(HandError):
+    """The camera sees only a part of the hand, which must be held elsewhere."""
+
+
 class LinkError(HandcalError):
     """The headset could not be reached, or did not acknowledge."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handcal.core.errors import HandError
+from handcal.core.errors import HandError, OutOfViewError
 from handcal.core.types import Bool, Frame, UInt8
 from handcal.hand.locate import PART_M2, LocatedHand
 from handcal.hand.settings import SegmentSettings
@@ -56,8 +56,10 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
 
     Raises
     ------
+    OutOfViewError
+        If the image border cuts the hand.
     HandError
-        If the image does not show the whole hand.
+        If the depth image does not show the hand for another reason.
     """
     view, is_hand, may_be_hand, may_be_arm = _full_resolution(located, frame)
     jump = round(settings.edge_jump_m / view.scale_m)
@@ -78,7 +80,7 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
                 "arm and body cannot be told apart in the depth image; hold the arm clear of the "
                 "body and of other things"
             )
-        raise HandError("hand cut by the image border; move it toward the middle")
+        raise OutOfViewError("hand cut by the image border; move it toward the middle")
     cut = on_border(surface) | goes_on(surface, solid & ~surface, view.depth, jump)
     return HandMask(view, surface, filled, outline, cut, pitch_m)
 

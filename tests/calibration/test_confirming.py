@@ -139,6 +139,21 @@ def test_a_confirmation_without_a_hand_is_refused(stage: Stage, session: Session
     assert events(session)[-1][1]["reason"] == "no hand"
 
 
+def test_a_cursor_that_leads_out_of_view_is_withdrawn(stage: Stage, session: Session) -> None:
+    stage.make_cursor()
+    for _ in range(3):
+        seen = stage.see(rigid([-0.2, 0.0, 0.0], [0.26, 0.0, 0.5]))
+    assert "cut by the image border" in seen.problem
+    stage.press()
+    assert stage.see(None).state is State.SHOW_HAND
+    assert "only a part of your hand" in stage.calibration.refusal
+    eventually(lambda: stage.calibration.refusal == stage.shown().prompt)
+    assert events(session)[-1][1]["reason"] == "out of view"
+    stage.align()
+    assert stage.state() is State.ALIGNED
+    assert not stage.calibration.refusal
+
+
 def test_the_frame_nearest_the_confirmation_is_taken_at_its_own_pose(stage: Stage) -> None:
     """Hand and head both move; neither the newest frame nor the newest pose will do."""
     stage.make_cursor()

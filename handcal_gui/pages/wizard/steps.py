@@ -280,6 +280,7 @@ def _raise_view(planned: NextStep, snapshot: Snapshot) -> WizardView:
         (hand_found(snapshot), hand_still(snapshot)),
         ButtonSpec(Action.TAKE_STEP, awaited, False),
         _ways_out(planned, snapshot),
+        snapshot.procedure.refusal,
     )
 
 

@@ -47,6 +47,7 @@ _REASONS = {
     "moved": tr("Last: moved too fast."),
     "shape changed": tr("Last: shape changed."),
     "no hand": tr("Last: no hand."),
+    "out of view": tr("Last: hand partly out of view."),
     "drawn otherwise": tr("Last: the drawn φ had changed."),
 }
 """Reasons of the journal."""
