@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +12,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from handcal.cli.main import main
-from handcal.core.conventions import opengl_transform, slicer_points_mm
+from handcal.core.conventions import slicer_points_mm
 from handcal.core.errors import FileError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.outcome import SessionOutcome, load_outcome
-from handcal.export.tools import write_northstar, write_openxr, write_slicer, write_unity
+from handcal.export.tools import write_openxr, write_slicer, write_unity
 from handcal.session.session import SessionRecord
 
 POINTS_H_M = np.array([[0.02, 0.06, 0.4], [-0.05, 0.12, 0.6], [0.06, 0.25, 2.0]])
@@ -75,39 +73,6 @@ def test_openxr_refuses_a_skewed_projection(tmp_path: Path, record: SessionRecor
     rig = Rig("skewed", eyes, record.rig.T_H_D, record.rig.depth_intrinsics)
     with pytest.raises(FileError, match=r"skew or rotation .left eye.; export json"):
         write_openxr(tmp_path / "openxr.json", load_outcome(replace(record, rig=rig)))
-
-
-def bearing_at(data: Mapping[str, Any], eye: Eye, u: float, v: float) -> Float64:
-    """Interpolate as Monado's u_compute_distortion_ns_meshgrid, between four nodes."""
-    columns, rows = data["num_grid_points_x"], data["num_grid_points_y"]
-    grid = np.array(data[eye]["grid"])
-    assert grid.shape == (rows, columns, 2)
-    i, j = int(v * (rows - 1)), int(u * (columns - 1))
-    down, right = v * (rows - 1) - i, u * (columns - 1) - j
-    top = (1.0 - right) * grid[i, j] + right * grid[i, j + 1]
-    bottom = (1.0 - right) * grid[i + 1, j] + right * grid[i + 1, j + 1]
-    found: Float64 = (1.0 - down) * top + down * bottom
-    return found
-
-
-def test_north_star_sees_each_point_in_its_bearing(tmp_path: Path, outcome: SessionOutcome) -> None:
-    write_northstar(tmp_path / "n.json", outcome)
-    assert (tmp_path / "n.json").stat().st_size < 3 * 2**20  # Monado's limit
-    data = json.loads((tmp_path / "n.json").read_text())
-    assert (data["type"], data["version"]) == ("Moses Turner's distortion correction", 2)
-    assert 45.0 < data["ipd"] < 85.0
-    T_H_N = opengl_transform(np.array(data["handcal"]["rig_from_head"]))
-    points_N_m = transform(invert(T_H_N), POINTS_H_M) @ UP
-    left, right, up, down = np.tan(data["fov"])
-    for eye, side in zip(EYES, (-0.5, 0.5), strict=True):
-        display = outcome.record.rig.eyes[eye]
-        seen = points_N_m - [side * data["ipd"] / 1e3, 0.0, 0.0]
-        for (u_px, v_px), (x, y, z) in zip(wanted_px(outcome, eye), seen, strict=True):
-            u, v = (u_px + 0.5) / display.width_px, (v_px + 0.5) / display.height_px
-            found = bearing_at(data, eye, u, v)
-            np.testing.assert_allclose(found, [x / -z, y / -z], atol=1e-5)  # 0.03 arcmin
-            assert left < found[0] < right
-            assert down < found[1] < up
 
 
 def read_itk(path: Path) -> Float64:
