@@ -86,8 +86,8 @@ class RecentHands:
     ) -> tuple[PlacedHand | None, str]:
         """Add the cloud of a new frame, None if it shows no hand, and place the clouds that can be.
 
-        If the frame carries its camera's pose T_W_D (4, 4), no other is needed. `missed_for`: why it
-        shows no hand.
+        If the frame carries its camera's pose T_W_D (4, 4), no other is needed. `missed_for` says
+        why it shows no hand.
 
         Returns
         -------
