@@ -88,18 +88,27 @@ def solve(arguments: argparse.Namespace) -> None:
     ),
     value("--near-m", _METRES, "M", "near clipping plane for OpenGL, metres", default=0.1),
     value("--far-m", _METRES, "M", "far clipping plane for OpenGL, metres", default=100.0),
+    file_option(
+        "--into", "North Star configuration to write northstar into; its trackers stay in it"
+    ),
 )
 def export(arguments: argparse.Namespace) -> None:
     """Export a session: report, tables, calibration, clouds, and the session as one file."""
     from handcal.export.export import ExportSettings, export_session
+    from handcal.export.north_star import replace_configuration
     from handcal.session.session import Session
 
     try:
         settings = ExportSettings(
-            tuple(arguments.format or FORMATS), arguments.near_m, arguments.far_m
+            tuple(arguments.format or FORMATS),
+            arguments.near_m,
+            arguments.far_m,
+            arguments.into,
         )
     except ValueError as error:
         fail(str(error), 2)
+    if arguments.into and "northstar" not in settings.formats:
+        fail("--into is for --format northstar", 2)
     record = Session.open(arguments.session)
     _say_what_is_left_out(record)
     folder = arguments.output or Path("results/export") / record.path.absolute().name
@@ -107,6 +116,9 @@ def export(arguments: argparse.Namespace) -> None:
         files = export_session(record, folder, settings, progress)
     for file in files:
         console.print(str(file))
+    if arguments.into:
+        kept = replace_configuration(arguments.into, folder / "northstar.json")
+        console.print(f"{arguments.into}, as it was in {kept}", markup=False)
 
 
 @command(arg("session", type=Path, help="session folder"), json=True)

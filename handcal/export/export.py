@@ -32,6 +32,8 @@ class ExportSettings:
     near_m: float = 0.1
     far_m: float = 100.0
     """Clipping distances of the OpenGL and Unity matrices."""
+    northstar_into: Path | None = None
+    """A North Star configuration whose other contents are kept."""
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.formats if name not in _ALL]
@@ -135,7 +137,7 @@ def _write(
         case "openxr":
             write_openxr(place / "openxr.json", outcome)
         case "northstar":
-            write_northstar(place / "northstar.json", outcome)
+            write_northstar(place, outcome, settings.northstar_into)
         case "slicer":
             write_slicer(place / "slicer", outcome, progress)
 

@@ -43,7 +43,7 @@ TOOL_FORMATS: Mapping[Format, FormatInfo] = MappingProxyType(
     {
         "unity": FormatInfo("Unity", ("unity.json",)),
         "openxr": FormatInfo("OpenXR", ("openxr.json",)),
-        "northstar": FormatInfo("North Star (Monado)", ("northstar.json",)),
+        "northstar": FormatInfo("North Star (Monado)", ("northstar.json", "northstar_mesh.json")),
         "slicer": FormatInfo(
             "3D Slicer",
             (

@@ -135,8 +135,8 @@ def test_they_are_written_only_if_named(
     main()
     written = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
     assert written == {
-        "unity.json", "openxr.json", "northstar.json", "slicer/LeftEyeToHead.tfm",
-        "slicer/RightEyeToHead.tfm", *(
+        "unity.json", "openxr.json", "northstar.json", "northstar_mesh.json",
+        "slicer/LeftEyeToHead.tfm", "slicer/RightEyeToHead.tfm", *(
             f"slicer/alignment-{number}-{kind}.vtk"
             for number in record.alignments for kind in ("hand", "cursor")
         ),
