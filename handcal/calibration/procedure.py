@@ -56,6 +56,7 @@ from handcal.calibration.states import (
     State,
 )
 from handcal.calibration.verifying import (
+    CHANGED,
     SET_ASIDE_PROMPT,
     SKIPPED,
     UNMOVED_PROMPT,
@@ -961,6 +962,9 @@ class Calibration:
                 self._nudge(lambda: verifying.nudge(*step))
             except ProcedureError as error:
                 self._refuse_verification(verifying, f"{error}.")
+                return
+            if nudge.fits:  # the wearer has not seen what this press moves
+                self._refuse_verification(verifying, CHANGED)
 
     def _refuse_verification(self, verifying: Verifying, prompt: str) -> None:
         verifying.refusal = prompt

@@ -26,6 +26,8 @@ from handcal.session.journal import Event
 from handcal.session.state import VERIFYING, SessionEvent
 
 SKIPPED = "verification_skipped"
+CHANGED = "The drawing has changed. Look and confirm again."
+"""Shown if a confirmation is of another drawing than the present one."""
 _OFFSET_ARCMIN = 8.0, 12.0
 _OFFSET_SIZE = 0.015, 0.025
 _ENDS = (
@@ -162,7 +164,7 @@ class Verifying:
             Largest time between the confirmation and the hand.
         """
         if fits.problem:
-            return "The drawing has changed. Look and confirm again."
+            return CHANGED
         try:
             hand = hands.nearest(fits.t_host_ns, tolerance_s)
         except HandError as error:

@@ -234,6 +234,7 @@ def test_a_word_with_a_last_nudge_counts_only_once_the_wearer_has_seen_it(stage:
     begin(stage)
     press(stage, NudgeSum(1.0), fits=True)
     assert stage.state() is State.VERIFY
+    eventually(lambda: "Look and confirm again" in stage.shown().prompt)
     fits(stage, NudgeSum(1.0))
     assert stage.state() is State.APPLIED
 

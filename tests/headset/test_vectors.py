@@ -28,6 +28,8 @@ def told(ask: Ask) -> dict[str, list[str]]:
         PUBLISHED["pc_nonce"],
         vectors.COOKIE.hex(),
         *(one["datagram"] for one in PUBLISHED["to_headset"]),
+        "",
+        PUBLISHED["removed"],
     ]
     found = defaultdict(list)
     for line in ask("vectors", text="\n".join(lines) + "\n").splitlines():
@@ -53,7 +55,7 @@ def test_the_digests(told: dict[str, list[str]]) -> None:
 
 
 def test_the_mac_is_checked(told: dict[str, list[str]]) -> None:
-    assert told["authentic"] == ["True False"] * len(PUBLISHED["to_headset"])
+    assert told["authentic"] == ["True False"] * (len(PUBLISHED["to_headset"]) + 1)
 
 
 def test_what_it_reads(told: dict[str, list[str]]) -> None:

@@ -194,7 +194,9 @@ def test_the_digest(published: dict[str, Any]) -> None:
         header, _, body = opened(bytes.fromhex(one["datagram"]), key)
         bodies[header[2]] = body
 
-    def digest(eyes: tuple[int, ...], has_cursor: bool, P_field: int = 2) -> str:
+    _, _, removed = opened(bytes.fromhex(published["removed"]), key)
+
+    def digest(eyes: tuple[int, ...], cursor: FIELDS | None, P_field: int = 2) -> str:
         content = b""
         for slot in (3, 4):
             if slot not in eyes:
@@ -203,17 +205,32 @@ def test_the_digest(published: dict[str, Any]) -> None:
             body = bodies[slot]
             content += b"\1" + body[P_field][0] + body[5][0]
             content += struct.pack("<II", body[3][0], body[4][0])
-        if has_cursor:
-            cursor = bodies[1]
+        if cursor is not None:
             points = fields(cursor[2][0])
-            content += struct.pack("<I", cursor[1][0]) + points[1][0] + points[2][0]
+            offsets = points.get(2, [b""])[0]  # none if there are no points
+            content += struct.pack("<I", cursor[1][0]) + points[1][0] + offsets
         else:
             content += bytes(4)
         return hashlib.sha256(content).hexdigest()[:32]
 
     assert published["digest"] == {
-        "nothing": digest((), False),
-        "left_eye_only": digest((3,), False),
-        "both_and_cursor": digest((3, 4), True),
-        "both_and_cursor_offline": digest((3, 4), True, P_field=6),
+        "nothing": digest((), None),
+        "left_eye_only": digest((3,), None),
+        "both_and_cursor": digest((3, 4), bodies[1]),
+        "both_and_cursor_offline": digest((3, 4), bodies[1], P_field=6),
+        "both_and_cursor_removed": digest((3, 4), removed),
     }
+
+
+def test_a_message_in_fragments(published: dict[str, Any]) -> None:
+    key = keys_of(published, "session", "to_headset")
+    message = b""
+    for index, part in enumerate(published["fragments"]):
+        datagram = bytes.fromhex(part)
+        header = struct.unpack(">2sBBQQIHH", datagram[:28])
+        session = int(published["session"], 16)
+        assert header == (b"hC", 2, 1, session, 1 + index, 1, index, 2)
+        assert datagram[-16:] == hmac.new(key, datagram[:-16], hashlib.sha256).digest()[:16]
+        message += datagram[28:-16]
+    cursor = fields(fields(message)[7][0])
+    assert (cursor[1][0], len(fields(cursor[2][0])[2][0])) == (7, 6 * 240)

@@ -54,6 +54,7 @@ def build() -> dict[str, Any]:
         for eye, shift in shifts.items()
     }
     drawn = drawn_digest(drawn_projections(projections, is_offline=False), cursor.cursor)
+    removed = messages.cursor(np.empty((0, 3)), 7, [])
     target = Target("right", np.arange(12.0).reshape(4, 3) / 10)
     shape = Shape(np.arange(24.0).reshape(8, 3) / 10, ("left",))
     request = VerifyRequest(3, "right", 1.0, 0.002)
@@ -105,13 +106,16 @@ def build() -> dict[str, Any]:
             _greeting(greeting.to_headset, greetings.welcome(WELCOME)),
         ],
         "refused": _greeting(greeting.to_headset, busy),
+        "fragments": _fragments(session.to_headset),
         "to_headset": _messages(session.to_headset, to_headset),
+        "removed": wire.seal(session.to_headset, _after(to_headset, removed)).hex(),
         "to_pc": _messages(session.to_pc, to_pc),
         "digest": {
             "nothing": drawn_digest({}, None).hex(),
             "left_eye_only": drawn_digest({"left": projections["left"]}, None).hex(),
             "both_and_cursor": drawn.hex(),
             "both_and_cursor_offline": offline.hex(),
+            "both_and_cursor_removed": drawn_digest(projections, removed.cursor).hex(),
         },
     }
 
@@ -129,10 +133,30 @@ def _pairing_by_digits() -> dict[str, str]:
         "headset_secret": f"{SECRET:064x}",
         "pc_secret": f"{PC_SECRET:064x}",
         "pair": request["datagram"],
+        "refused": _greeting(keys.to_headset, greetings.refused_code(NONCE))["datagram"],
         "paired": answer["datagram"],
         "proof": agreed.proof.hex(),
         "pairing_key": agreed.key,
     }
+
+
+def _after(sent: list[tuple[Slot, pb.Envelope]], envelope: pb.Envelope) -> Packet:
+    """Return the cursor that follows the messages of a session."""
+    number = len(sent) + 1
+    payload = envelope.SerializeToString()
+    return Packet(payload, WELCOME.session, number, Slot.CURSOR, message_id=number)
+
+
+def _fragments(key: bytes) -> list[str]:
+    """Return the datagrams of a message of two fragments, as the first of a session."""
+    points = np.column_stack([np.linspace(-0.1, 0.1, 240), np.zeros(240), np.full(240, 0.5)])
+    parts = wire.split(messages.cursor(points, 7, ["right"]).SerializeToString())
+    return [
+        wire.seal(
+            key, Packet(part, WELCOME.session, 1 + index, Slot.CURSOR, 1, index, len(parts))
+        ).hex()
+        for index, part in enumerate(parts)
+    ]
 
 
 def _hex(keys: Keys) -> dict[str, str]:

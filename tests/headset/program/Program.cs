@@ -132,7 +132,8 @@ namespace Handcal.Link.Tests
 
         /// <summary>
         /// Reads pairing key, identity, session, the two nonces and the cookie, then the PC's
-        /// datagrams of the session, in hexadecimal; prints everything that the headset makes of it.
+        /// datagrams of the session, an empty line, and the datagram that removes the cursor, in
+        /// hexadecimal; prints everything that the headset makes of it.
         /// </summary>
         public static void Print(TextReader input)
         {
@@ -192,6 +193,9 @@ namespace Handcal.Link.Tests
             var outbox = new HMACSHA256(keys.ToPc);
             for (int i = 0; i < outgoing.Count; i++)
                 Tell("to_pc", Seal(outbox, session, (ulong)i + 1, outgoing[i].Key, outgoing[i].Value));
+            Take(state, inbox, Bytes(input.ReadLine()));
+            state.IsOffline = false;
+            Tell("both_and_cursor_removed", Hex(state.Digest()));
         }
 
         /// <summary>Reads digits, identity, nonce, secret, name and the PC's answer; returns request and key.</summary>
