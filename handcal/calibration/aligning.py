@@ -172,6 +172,8 @@ class Aligning:
         drawn_shift_m: Mapping[Eye, Float64],
     ) -> Accepted | Refused | None:
         """Accept or refuse a confirmation; None while the pose of its time is not yet known."""
+        if not confirmation.is_timed:
+            return Refused("The headset's clock was set. Confirm again.", "clock set")
         if confirmation.problem:
             return Refused(
                 "The headset does not show what it should. Confirm again; if this keeps "

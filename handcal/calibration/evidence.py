@@ -123,6 +123,16 @@ class Evidence:
             "the headset does not acknowledge the projections sent to it; restart its app",
         )
 
+    def see_clock(self, step_s: float) -> Contradiction | None:
+        """Return what forbids using frames just after the headset's clock was set."""
+        if step_s == 0.0:
+            return None
+        return Contradiction(
+            "clock-step",
+            f"the headset's clock was set by {step_s:+.2f} s; wait a moment, and if this happens "
+            "again, restart the headset's app",
+        )
+
     def see_poses(self, by_camera: Float64, by_app: Float64) -> None:
         """Compare T_W_D (4, 4) as the camera reports it and as it follows from the app's pose."""
         difference = invert(by_camera) @ by_app

@@ -307,6 +307,11 @@ class Calibration:
             is_drawing_lost=self._drawing.is_lost and self._link.connected,
         )
         self._ask_to_look_around()
+        contradiction = observation.contradiction
+        if self.state is State.ALIGN and contradiction and contradiction.name == "clock-step":
+            self._show_hand_again()  # the cursor may have been placed by a pose of another time
+            self._withdrawn_for = "The headset's clock was set. Raise your hand again."
+            self._link.send_prompt(self._withdrawn_for, self.eyes)
         if self._aligning is not None and self.state is State.ALIGN:
             observation = self._guide(observation, self._aligning)
             with suppress(FileError):

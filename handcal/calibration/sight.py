@@ -90,6 +90,7 @@ class Sight:
             self._evidence.see(frame, camera, is_used=is_used)
             or self._evidence.see_delay(self.delay.delay_s, self.delay.largest_delay_s)
             or self._evidence.see_delivery(is_drawing_lost)
+            or self._evidence.see_clock(self._link.clock_step_s)
             or self._see_world(frame, t_host_ns)
         )
         cloud, problem = self._find(frame, camera, contradiction)

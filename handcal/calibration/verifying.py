@@ -163,6 +163,8 @@ class Verifying:
         tolerance_s : float
             Largest time between the confirmation and the hand.
         """
+        if not fits.is_timed:
+            return "The headset's clock was set. Look and confirm again."
         if fits.problem:
             return CHANGED
         try:

@@ -255,6 +255,7 @@ def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> st
         "stop after this time (default: run until terminated)",
     ),
     flag("--lose-start", "fault: the first projections never arrive"),
+    flag("--step-clock", "fault: after four seconds its clock is set by 0.3 s"),
     flag("--stale", "fault: keep drawing with the projections of the wearer before"),
     value(
         "--eye-distance-mm",
@@ -319,6 +320,7 @@ def headset(arguments: argparse.Namespace) -> None:
         duration_s=arguments.duration_s,
         is_stale=arguments.stale,
         loses_start=arguments.lose_start,
+        steps_clock=arguments.step_clock,
         eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
         side=arguments.hand,
         wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),

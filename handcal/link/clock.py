@@ -13,6 +13,9 @@ DRIFT_PRIOR = 50e-6
 """Prior standard deviation of a crystal's drift, s/s."""
 
 MIN_SAMPLES = 5
+_MOST_DRIFT = 500e-6
+"""No clock drifts more, s/s: ten times the prior, and what NTP takes as the largest."""
+_RESOLUTION_NS = 1_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +39,21 @@ class ClockEstimator:
     """Estimates offset and drift from the four timestamps of each ping, as NTP does (RFC 5905, 8).
 
     A ping with round trip r bounds the offset to ±r/2, so the line fit weights each ping by its
-    delay beyond the shortest.
+    delay beyond the shortest. Two pings whose bounds no possible drift joins prove that the clock
+    was set: the fit begins again.
+
+    Attributes
+    ----------
+    fit : ClockFit or None
+        None before the first few pings, also after a step.
+    checked_host_ns : int
+        When the newest ping was sent: until then the clock has not stepped unnoticed.
     """
 
     def __init__(self) -> None:
         self._samples: deque[tuple[int, int, int]] = deque(maxlen=300)
         self.fit: ClockFit | None = None
+        self.checked_host_ns = 0
 
     def add(
         self,
@@ -49,15 +61,39 @@ class ClockEstimator:
         received_headset_ns: int,
         sent_headset_ns: int,
         received_host_ns: int,
-    ) -> None:
-        """Add the timestamps of one ping; a negative round trip is ignored."""
+    ) -> int:
+        """Add the timestamps of one ping; a negative round trip is ignored.
+
+        Returns
+        -------
+        int
+            By how much the clock was set since the pings before, ns; 0 if it was not.
+        """
         round_trip = (received_host_ns - sent_host_ns) - (sent_headset_ns - received_headset_ns)
         if round_trip < 0:
-            return
+            return 0
         offset = (received_headset_ns - sent_host_ns + sent_headset_ns - received_host_ns) // 2
-        self._samples.append(((sent_host_ns + received_host_ns) // 2, offset, round_trip))
+        sample = (sent_host_ns + received_host_ns) // 2, offset, round_trip
+        step_ns = self._step_ns(*sample)
+        if step_ns:
+            self._samples.clear()
+            self.fit = None
+        self._samples.append(sample)
+        self.checked_host_ns = sent_host_ns
         if len(self._samples) >= MIN_SAMPLES:
             self.fit = _fit(self._samples)
+        return step_ns
+
+    def _step_ns(self, host_ns: int, offset_ns: int, round_trip_ns: int) -> int:
+        """Return the largest difference from an earlier ping that no drift explains, or 0."""
+        largest_ns = 0
+        for earlier_ns, earlier_offset_ns, earlier_trip_ns in self._samples:
+            apart_ns = offset_ns - earlier_offset_ns
+            delays_ns = (round_trip_ns + earlier_trip_ns) / 2 + _RESOLUTION_NS
+            is_step = abs(apart_ns) > delays_ns + _MOST_DRIFT * abs(host_ns - earlier_ns)
+            if is_step and abs(apart_ns) > abs(largest_ns):
+                largest_ns = apart_ns
+        return largest_ns
 
     def to_headset_ns(self, host_ns: int) -> int:
         """Convert a host time.

@@ -41,6 +41,11 @@ class PoseBuffer:
         self._poses.insert(index, T_W_H)
         del self._times_ns[: -self._capacity], self._poses[: -self._capacity]
 
+    def drop_after(self, t_headset_ns: int) -> None:
+        """Forget the poses after a time."""
+        kept = bisect.bisect_right(self._times_ns, t_headset_ns)
+        del self._times_ns[kept:], self._poses[kept:]
+
     def at(self, t_headset_ns: int) -> Float64:
         """Return the pose at a time: translation interpolated linearly, rotation by slerp.
 

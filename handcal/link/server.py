@@ -35,6 +35,10 @@ _MAX_CONFIRMATIONS = 64
 _NOTICE_S = 5.0
 _RESTART_S = 0.5
 _REFRESH_S = 1.0
+_AHEAD_NS = 1_000_000_000
+"""A pose further ahead of the headset's own clock than this is for no image that will be drawn."""
+_AROUND_STEP_NS = 2_000_000_000
+"""After a step of the headset's clock: until the clock is known again, and old stamps are gone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +51,8 @@ class Confirmation:
     cursor_id: int
     problem: str = ""
     """Difference between what the headset drew and what it was sent; empty if there is none."""
+    is_timed: bool = True
+    """False if the headset's clock was set around this time, so that the times mean nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +69,8 @@ class Nudge:
     """As in `Confirmation`."""
     session: int = 0
     """The link's session, in which the sums began at zero."""
+    is_timed: bool = True
+    """As in `Confirmation`."""
 
 
 @dataclass(slots=True)
@@ -113,8 +121,10 @@ class HeadsetServer(Sender):
         self._notice, self._notice_until_s = "", 0.0
         self._clock = ClockEstimator()
         self._poses = PoseBuffer()
-        self._confirms: deque[tuple[pb.Confirm, str]] = deque(maxlen=_MAX_CONFIRMATIONS)
-        self._nudges: deque[tuple[pb.Nudge, NudgeSum, str]] = deque(maxlen=_MAX_CONFIRMATIONS)
+        self._step_ns, self._step_host_ns = 0, -_AROUND_STEP_NS
+        # The last number of each is when it came, on the host's clock.
+        self._confirms: deque[tuple[pb.Confirm, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
+        self._nudges: deque[tuple[pb.Nudge, NudgeSum, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
         self._lost = 0
         self._next_ping_s = 0.0
         self._next_refresh_s = 0.0
@@ -162,9 +172,18 @@ class HeadsetServer(Sender):
             self._pairings.withdraw()
             self._reception.exchange = None
 
+    @property
+    def clock_step_s(self) -> float:
+        """By how much the headset's clock was set a moment ago; 0 if it was not."""
+        with self._changed:
+            is_recent = time.monotonic_ns() - self._step_host_ns < _AROUND_STEP_NS
+            return 1e-9 * self._step_ns if is_recent else 0.0
+
     def confirmations(self) -> list[Confirmation]:
         """Return the confirmations since the last call.
 
+        One is held back until a ping sent after it came has shown that the clock has not stepped.
+
         Raises
         ------
         LinkError
@@ -172,22 +191,19 @@ class HeadsetServer(Sender):
         """
         with self._changed:
             self._require_running()
-            if self._clock.fit is None:
-                return []
-            confirmations = [
-                Confirmation(
-                    confirm.t_headset_ns,
-                    self._clock.to_host_ns(confirm.t_headset_ns),
-                    confirm.cursor_id,
-                    problem,
+            found = []
+            while self._confirms and self._is_checked(self._confirms[0][-1]):
+                confirm, problem, came_ns = self._confirms.popleft()
+                t_host_ns, is_timed = self._when(confirm.t_headset_ns, came_ns)
+                found.append(
+                    Confirmation(
+                        confirm.t_headset_ns, t_host_ns, confirm.cursor_id, problem, is_timed
+                    )
                 )
-                for confirm, problem in self._confirms
-            ]
-            self._confirms.clear()
-            return confirmations
+            return found
 
     def nudges(self) -> list[Nudge]:
-        """Return the wearer's nudges since the last call.
+        """Return the wearer's nudges since the last call; held back as `confirmations`.
 
         Raises
         ------
@@ -196,22 +212,23 @@ class HeadsetServer(Sender):
         """
         with self._changed:
             self._require_running()
-            if self._clock.fit is None:
-                return []
             session = 0 if self._channel is None else self._channel.session
-            found = [
-                Nudge(
-                    nudge.verify_id,
-                    moved,
-                    nudge.fits,
-                    self._clock.to_host_ns(nudge.t_headset_ns),
-                    problem,
-                    session,
+            found = []
+            while self._nudges and self._is_checked(self._nudges[0][-1]):
+                nudge, moved, problem, came_ns = self._nudges.popleft()
+                t_host_ns, is_timed = self._when(nudge.t_headset_ns, came_ns)
+                found.append(
+                    Nudge(nudge.verify_id, moved, nudge.fits, t_host_ns, problem, session, is_timed)
                 )
-                for nudge, moved, problem in self._nudges
-            ]
-            self._nudges.clear()
             return found
+
+    def _is_checked(self, came_ns: int) -> bool:
+        return self._clock.fit is not None and self._clock.checked_host_ns >= came_ns
+
+    def _when(self, t_headset_ns: int, came_ns: int) -> tuple[int, bool]:
+        """Return a stamp on the host's clock, and whether it can be trusted."""
+        is_timed = came_ns > self._step_host_ns + _AROUND_STEP_NS
+        return self._clock.to_host_ns(t_headset_ns) if is_timed else came_ns, is_timed
 
     def pose_at_host_ns(self, t_host_ns: int) -> Float64:
         """Return the headset's pose ``T_W_H`` at a time of the host's monotonic clock.
@@ -317,6 +334,7 @@ class HeadsetServer(Sender):
         self._shown = Owner()
         self._dismissed = False
         self._clock = ClockEstimator()
+        self._step_ns, self._step_host_ns = 0, -_AROUND_STEP_NS
         self._poses = PoseBuffer()
         self._confirms.clear()
         self._nudges.clear()
@@ -331,15 +349,18 @@ class HeadsetServer(Sender):
     def _handle(self, envelope: pb.Envelope) -> None:
         match envelope.WhichOneof("body"):
             case "poses":
-                for t_headset_ns, T_W_H in messages.read_poses(envelope.poses):
-                    self._poses.add(t_headset_ns, T_W_H)
+                self._take_poses(envelope.poses)
             case "confirm":
                 confirm = messages.read_confirm(envelope.confirm)
-                self._confirms.append((confirm, self._difference(confirm.drawn)))
+                came_ns = time.monotonic_ns()
+                self._confirms.append((confirm, self._difference(confirm.drawn), came_ns))
+                self._next_ping_s = 0.0
             case "nudge":
                 nudge = envelope.nudge
                 moved = nudges.read_nudge(nudge)
-                self._nudges.append((nudge, moved, self._difference(nudge.drawn)))
+                came_ns = time.monotonic_ns()
+                self._nudges.append((nudge, moved, self._difference(nudge.drawn), came_ns))
+                self._next_ping_s = 0.0
             case "device":
                 assert self._session is not None
                 device_id = self._session.caller.device_id
@@ -348,6 +369,18 @@ class HeadsetServer(Sender):
                 self._take_pong(envelope.pong)
             case other:
                 raise MalformedError(f"a headset sends no {other}")
+
+    def _take_poses(self, poses: pb.Poses) -> None:
+        clock = self._clock
+        last_ns = None
+        if clock.fit is not None:
+            last_ns = clock.to_headset_ns(time.monotonic_ns()) + _AHEAD_NS
+        for t_headset_ns, T_W_H in messages.read_poses(poses):
+            if last_ns is None or t_headset_ns <= last_ns:
+                self._poses.add(t_headset_ns, T_W_H)
+            else:
+                ahead_s = 1e-9 * (t_headset_ns - last_ns + _AHEAD_NS)
+                self._tell(f"the headset's poses are for {ahead_s:.0f} s from now; restart its app")
 
     def _refresh(self) -> None:
         """Take over changes of the pairings; end the session of a device that was revoked."""
@@ -370,9 +403,16 @@ class HeadsetServer(Sender):
         if not 0 <= now_ns - pong.t_sent_host_ns < 1e9 * self._settings.silence_s:
             return  # of no ping sent lately
         self._lost = max(0, pong.highest_sequence - pong.accepted)
-        self._clock.add(
+        was_known = self._clock.fit is not None
+        step_ns = self._clock.add(
             pong.t_sent_host_ns, pong.t_received_headset_ns, pong.t_sent_headset_ns, now_ns
         )
+        if step_ns:
+            self._step_ns, self._step_host_ns = step_ns, now_ns
+            self._poses = PoseBuffer()  # their stamps are of either time
+            _LOG.warning("the headset's clock was set by %.3f s", 1e-9 * step_ns)
+        elif not was_known and self._clock.fit is not None:
+            self._poses.drop_after(self._clock.to_headset_ns(now_ns) + _AHEAD_NS)
 
     def _tick(self, now_s: float) -> None:
         if now_s >= self._next_refresh_s:

@@ -34,6 +34,7 @@ from handcal.sim.scene import ScenePublisher, SceneState
 from handcal.sim.wearer import DisplayView, Wearer, WearerAction
 from handcal.sim.wearer_settings import WearerSettings
 
+_STEP_AFTER_NS, _STEP_NS = 4_000_000_000, 300_000_000
 _FORMER_SHIFT_M = (0.006, 0.0, 0.0)
 
 
@@ -74,6 +75,8 @@ class HeadsetSettings:
     """Fault: acknowledges projections, but keeps drawing those of the wearer before."""
     loses_start: bool = False
     """Fault: the first projections never arrive."""
+    steps_clock: bool = False
+    """Fault: its clock is set during the calibration."""
     eye_distance_m: float | None = None
     """Eye distance that it reports; None: it measures none."""
     side: Side | None = None
@@ -250,7 +253,8 @@ def _clock(settings: HeadsetSettings) -> Callable[[int], int]:
 
     def clock_ns(host_ns: int) -> int:
         drift_ns = round(settings.clock_drift_ppm * (host_ns - start_ns) / 1e6)
-        return host_ns + offset_ns + drift_ns
+        is_set = settings.steps_clock and host_ns - start_ns > _STEP_AFTER_NS
+        return host_ns + offset_ns + drift_ns + (_STEP_NS if is_set else 0)
 
     return clock_ns
 

@@ -38,6 +38,8 @@ class VirtualHeadset(Closable):
     is_stale, loses_start : bool
         Faults: it keeps drawing with the projections of the wearer before; the first projections
         never arrive.
+    steps_clock : bool
+        Fault: its clock is set during the calibration.
     side : {"left", "right"}, optional
     slip_m : (3,) tuple of float
     eye_distance_m : float or None
@@ -57,6 +59,7 @@ class VirtualHeadset(Closable):
         reorder: float = 0.0,
         is_stale: bool = False,
         loses_start: bool = False,
+        steps_clock: bool = False,
         eye_distance_m: float | None = None,
         side: Side | None = None,
         slip_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -75,6 +78,7 @@ class VirtualHeadset(Closable):
         command += [str(part) for option in options.items() for part in option]
         command += ["--stale"] if is_stale else []
         command += ["--lose-start"] if loses_start else []
+        command += ["--step-clock"] if steps_clock else []
         if eye_distance_m is not None:
             command += ["--eye-distance-mm", str(1e3 * eye_distance_m)]
         command += ["--hand", side] if side else []

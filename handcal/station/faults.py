@@ -12,4 +12,5 @@ Fault: TypeAlias = Literal[
     "other-camera",
     "late-camera",
     "depth-bias",
+    "clock-step",
 ]

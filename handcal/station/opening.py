@@ -200,6 +200,7 @@ def start_headset(
         reorder=settings.reorder,
         is_stale=settings.fault == "stale-headset",
         loses_start=settings.fault == "lost-start",
+        steps_clock=settings.fault == "clock-step",
         eye_distance_m=settings.eye_distance_m,
         side=settings.side,
         slip_m=settings.slip_m,

@@ -3083,6 +3083,14 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Last: headset&apos;s clock set.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Last: hand partly out of view.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Last: the drawn φ had changed.</source>
         <translation type="unfinished"></translation>
     </message>

@@ -14,7 +14,9 @@ from tests.calibration.stage import KEY, LINK, RIG, Stage, connect
 
 
 @pytest.fixture
-def server() -> Iterator[HeadsetServer]:
+def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[HeadsetServer]:
+    # The stage's time runs ahead of the real one, as it waits for nothing.
+    monkeypatch.setattr("handcal.link.server._AHEAD_NS", 10**12)
     with HeadsetServer(KEY, settings=LINK) as server:
         yield server
 

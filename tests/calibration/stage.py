@@ -120,6 +120,12 @@ class Stage:
         shown = shown if cursor_id is None else replace(shown, cursor_id=cursor_id)
         t_headset_ns = (t_ns or self.t_ns) + HEADSET_AHEAD_NS
         self.client.wait_acked(self.client.confirm(t_headset_ns, shown), 5.0)
+        self.wait_checked()
+
+    def wait_checked(self) -> None:
+        """Wait until the headset's clock is known to run on since the last message."""
+        now_ns = time.monotonic_ns()
+        eventually(lambda: self.server._clock.checked_host_ns > now_ns)
 
     def make_cursor(self, T_D_hand: Float64 = T_D_HAND, eyes: Sequence[Eye] = EYES) -> None:
         """Hold the hand, make the cursor of it, and wait until the headset shows it."""

@@ -290,3 +290,18 @@ def test_a_hand_beside_cut_edges_counts_as_none(
     stage.press()
     assert stage.see().state is State.ALIGN
     eventually(lambda: "beside cut edges. Align and confirm again" in stage.shown().prompt)
+
+
+def test_a_cursor_is_made_again_after_a_step_of_the_headset_s_clock(
+    stage: Stage, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage.make_cursor()
+    monkeypatch.setattr(type(stage.server), "clock_step_s", 0.3)
+    seen = stage.see()
+    assert seen.state is State.SHOW_HAND
+    assert "clock was set by +0.30 s" in seen.problem
+    assert "clock was set" in stage.calibration.refusal
+    assert stage.hold().hand is None
+    monkeypatch.setattr(type(stage.server), "clock_step_s", 0.0)
+    stage.align()
+    assert stage.state() is State.ALIGNED

@@ -73,6 +73,7 @@ class Planned:
         t_ns = self.stage.t_ns + HEADSET_AHEAD_NS
         nudge = self.stage.client.nudge(t_ns, shown, NudgeSum(1.0), fits)
         self.stage.client.wait_acked(nudge, 5.0)
+        self.stage.wait_checked()
 
 
 @pytest.fixture

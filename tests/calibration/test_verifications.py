@@ -52,6 +52,7 @@ def press(stage: Stage, moved: NudgeSum, fits: bool = False) -> None:
     """Send the wearer's nudge with what is drawn now, and step."""
     t_ns = stage.t_ns + HEADSET_AHEAD_NS
     stage.client.wait_acked(stage.client.nudge(t_ns, stage.shown(), moved, fits), 5.0)
+    stage.wait_checked()
     stage.see()
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handcal.core.errors import PosePendingError
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, HeadsetIdentity, HeadsetView, Projection
 from handcal.link.client import HeadsetClient, HeadsetState
@@ -266,3 +267,47 @@ def test_an_outline_arrives_in_order_for_its_eyes(
     assert state.is_outline
     assert state.live_eyes == ("left",)
     np.testing.assert_allclose(state.live_W_m, outline, atol=1e-4)
+
+
+@pytest.mark.parametrize("step_s", [-0.3, 0.3])
+def test_around_a_step_of_the_headset_s_clock_nothing_is_taken(
+    server: HeadsetServer, pairing_key: bytes, step_s: float
+) -> None:
+    ahead = [OFFSET_NS]
+
+    def clock_ns() -> int:
+        return time.monotonic_ns() + ahead[0]
+
+    with HeadsetClient(server.address, pairing_key, IDENTITY, clock_ns) as client:
+        eventually(lambda: server.statistics().clock_offset_ms is not None)
+        client.send_pose(np.eye(4), clock_ns())
+        ahead[0] += round(step_s * 1e9)
+        # Before any ping could show it, with the clock's old time and its new one.
+        for t_ns in (clock_ns() - round(step_s * 1e9), clock_ns()):
+            client.wait_acked(client.confirm(t_ns, client.state()), 5.0)
+            heard: list[Confirmation] = []
+            eventually(lambda: heard.extend(server.confirmations()) or heard)  # noqa: B023
+            assert not heard[0].is_timed
+            assert abs(heard[0].t_host_ns - time.monotonic_ns()) < 2e9
+        assert server.clock_step_s == pytest.approx(step_s, abs=0.01)
+        with pytest.raises(PosePendingError):
+            server.pose_at_host_ns(time.monotonic_ns())
+        eventually(lambda: server.clock_step_s == 0.0, 5.0)
+        client.wait_acked(client.confirm(clock_ns(), client.state()), 5.0)
+        eventually(lambda: heard.extend(server.confirmations()) or len(heard) == 2)
+        assert heard[1].is_timed
+
+
+def test_poses_of_the_future_are_dropped_and_told(
+    server: HeadsetServer, pairing_key: bytes
+) -> None:
+    with HeadsetClient(server.address, pairing_key, IDENTITY, headset_clock_ns) as client:
+        client.send_pose(np.eye(4), headset_clock_ns() + 3_600 * 10**9)
+        eventually(lambda: server.statistics().clock_offset_ms is not None)
+        for hour in range(2, 4):  # before and after the clock is known
+            client.send_pose(np.eye(4), headset_clock_ns() + hour * 3_600 * 10**9)
+        eventually(lambda: "restart its app" in server.statistics().notice)
+        for _ in range(10):
+            client.send_pose(np.eye(4), headset_clock_ns())
+            time.sleep(0.01)
+        eventually(lambda: 50.0 < server.statistics().pose_rate_hz < 110.0)

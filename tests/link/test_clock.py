@@ -19,10 +19,10 @@ class Headset:
     def at(self, host_ns: int) -> int:
         return host_ns + self.offset_ns + round(self.drift * (host_ns - START_NS))
 
-    def ping(self, clock: ClockEstimator, host_ns: int, out_ns: int, back_ns: int) -> None:
+    def ping(self, clock: ClockEstimator, host_ns: int, out_ns: int, back_ns: int) -> int:
         received = host_ns + out_ns
         answered = received + 50_000
-        clock.add(host_ns, self.at(received), self.at(answered), answered + back_ns)
+        return clock.add(host_ns, self.at(received), self.at(answered), answered + back_ns)
 
 
 def test_equal_ways_give_the_exact_clock() -> None:
@@ -74,3 +74,30 @@ def test_an_impossible_round_trip_is_ignored() -> None:
     for _ in range(2 * MIN_SAMPLES):
         clock.add(START_NS, START_NS, START_NS + 10 * MS, START_NS + MS)
     assert clock.fit is None
+
+
+@pytest.mark.parametrize("step_ms", [-300, -20, 20, 300, 3_600_000])
+def test_a_clock_that_is_set_is_known_again_after_a_few_pings(step_ms: int) -> None:
+    chance, headset, clock = random.Random(1), Headset(20 * MS, 80e-6), ClockEstimator()
+
+    def ping(number: int) -> int:
+        out, back = (MS + round(chance.expovariate(1 / (4 * MS))) for _ in range(2))
+        return headset.ping(clock, START_NS + 100 * MS * number, out, back)
+
+    assert not any(ping(number) for number in range(250))
+    headset.offset_ns += step_ms * MS
+    found = [ping(number) for number in range(250, 250 + MIN_SAMPLES)]
+    assert found[0] == pytest.approx(step_ms * MS, abs=30 * MS)
+    assert not any(found[1:])
+    now = START_NS + 100 * MS * (250 + MIN_SAMPLES)
+    assert clock.fit is not None
+    error_ns = abs(clock.to_headset_ns(now) - headset.at(now))
+    assert error_ns < min(5 * MS, 3 * clock.fit.uncertainty_ns)
+
+
+def test_delays_and_drift_are_no_step() -> None:
+    """Also pings that take 2 s one way, and the largest drift."""
+    chance, headset, clock = random.Random(2), Headset(0, 450e-6), ClockEstimator()
+    for number in range(600):
+        out, back = (round(chance.paretovariate(0.7) * MS) % (2_000 * MS) for _ in range(2))
+        assert headset.ping(clock, START_NS + 100 * MS * number, out, back) == 0

@@ -368,6 +368,7 @@ def test_a_resumed_session_keeps_its_usable_eyes_and_those_skipped(
         ("other-camera", "choose the rig file"),
         ("frozen-camera", "unplug the camera"),
         ("lost-start", "restart its app"),
+        ("clock-step", "wait a moment"),
     ],
 )
 def test_evidence_is_reported_before_anything_is_solved(

@@ -47,6 +47,7 @@ _REASONS = {
     "moved": tr("Last: moved too fast."),
     "shape changed": tr("Last: shape changed."),
     "no hand": tr("Last: no hand."),
+    "clock set": tr("Last: headset's clock set."),
     "out of view": tr("Last: hand partly out of view."),
     "drawn otherwise": tr("Last: the drawn φ had changed."),
 }
