@@ -25,7 +25,7 @@ from handcal.station.snapshot import Snapshot
 DEFAULT_PORT = 18944
 MAX_POINTS = 3000
 _MAX_CLIENTS = 8
-_SEND_S = 0.5
+_SEND_S = 2.0
 _DRAIN_BYTES = 65536
 
 
@@ -111,40 +111,63 @@ class SlicerOutput:
                     connection.close()
                     continue
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                connection.settimeout(self._send_s)
-                self._clients.append(_Client(connection, f"{address[0]}:{address[1]}"))
+                connection.setblocking(False)
+                name = f"{address[0]}:{address[1]}"
+                self._clients.append(_Client(connection, name, self._send_s))
 
 
 class _Client:
-    """One connected program, and what it was sent last."""
+    """One connected program, and what it was sent last. Nothing here waits for it."""
 
-    def __init__(self, connection: socket.socket, name: str) -> None:
+    def __init__(self, connection: socket.socket, name: str, patience_s: float) -> None:
         self.name = name
         self._connection = connection
+        self._patience_s = patience_s
         self._sent: dict[str, object] = {}
+        self._pending = b""
+        self._took_s = time.monotonic()
 
     def send(self, messages: Mapping[str, tuple[object, Callable[[], bytes]]]) -> None:
-        """Send the messages whose value differs from the one sent last."""
+        """Send the messages whose value differs from the one sent last, once those are gone.
+
+        Raises
+        ------
+        TimeoutError
+            If it has taken nothing for a while.
+        OSError
+            If it has closed the connection.
+        """
         self._drain()
-        for name, (value, pack) in messages.items():
-            if name not in self._sent or self._sent[name] != value:
-                self._connection.sendall(pack())
-                self._sent[name] = value
+        self._push()
+        if self._pending:
+            if time.monotonic() - self._took_s > self._patience_s:
+                raise TimeoutError
+            return
+        new = {name: value for name, (value, _) in messages.items()}
+        changed = [name for name in new if name not in self._sent or self._sent[name] != new[name]]
+        self._pending = b"".join(messages[name][1]() for name in changed)
+        self._sent |= {name: new[name] for name in changed}
+        self._took_s = time.monotonic()
+        self._push()
 
     def close(self) -> None:
         self._connection.close()
 
+    def _push(self) -> None:
+        """Send as much of what waits as the client takes now."""
+        while self._pending:
+            try:
+                taken = self._connection.send(self._pending)
+            except BlockingIOError:
+                return
+            self._pending = self._pending[taken:]
+            self._took_s = time.monotonic()
+
     def _drain(self) -> None:
         """Discard what the client sends: requests and keep-alives."""
-        timeout_s = self._connection.gettimeout()
-        self._connection.setblocking(False)
-        try:
+        with suppress(BlockingIOError):
             if not self._connection.recv(_DRAIN_BYTES):
                 raise ConnectionResetError
-        except BlockingIOError:
-            pass
-        finally:
-            self._connection.settimeout(timeout_s)
 
 
 def igtl_messages(snapshot: Snapshot) -> dict[str, tuple[object, Callable[[], bytes]]]:

@@ -276,7 +276,7 @@ def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> st
 )
 def headset(arguments: argparse.Namespace) -> None:
     """Run a virtual headset with a simulated wearer, connected by the real protocol."""
-    from handcal.link.ask_to_pair import pair_by_digits
+    from handcal.link.ask_to_pair import pair_by_code, pair_by_digits
     from handcal.link.impair import Impairment
     from handcal.link.invitation import read_invitation
     from handcal.link.pairing import new_device_id, read_pairing_key
@@ -287,11 +287,11 @@ def headset(arguments: argparse.Namespace) -> None:
     if arguments.pair:
         console.print("Code: ", end="")
         code = sys.stdin.readline(_MAX_CODE).strip()
+        device_id = new_device_id()
         if port is None:
             invited = read_invitation(code)
-            host, port, key = invited.host, invited.port, invited.code.encode()
+            host, port, key = invited.host, invited.port, pair_by_code(invited, device_id).encode()
         else:
-            device_id = new_device_id()
             try:
                 key = pair_by_digits((host, port), device_id, code).encode()
             except ValueError as error:

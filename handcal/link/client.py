@@ -117,7 +117,7 @@ class HeadsetClient(Endpoint):
         self._pairing_key = pairing_key
         self._keys = wire.handshake_keys(pairing_key, self._device)
         self._server = resolve(*server)
-        transport = UdpTransport(local_address(self._server), settings.receive_buffer_bytes)
+        transport = UdpTransport(_own_side(self._server), settings.receive_buffer_bytes)
         super().__init__(ImpairedTransport(transport, impairment), settings)
         self._identity = identity
         self._clock_ns = clock_ns
@@ -391,3 +391,9 @@ class HeadsetClient(Endpoint):
         self._hello_ns = max(time.time_ns(), self._hello_ns + 1)
         hello = greetings.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
         self._post(greetings.seal(self._keys.to_pc, self._device, hello), self._server)
+
+
+def _own_side(server: Address) -> Address:
+    """Return where to bind: not to the address of today, which the network may change."""
+    own = local_address(server)
+    return own if own[0] == server[0] else ("::" if ":" in own[0] else "0.0.0.0", 0)  # noqa: S104

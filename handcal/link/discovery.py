@@ -7,7 +7,7 @@ import socket
 import time
 from dataclasses import dataclass
 
-from zeroconf import Error, ServiceBrowser, ServiceInfo, ServiceListener, Zeroconf
+from zeroconf import Error, IPVersion, ServiceBrowser, ServiceInfo, ServiceListener, Zeroconf
 
 from handcal.core.errors import LinkError
 from handcal.io.closable import Closable
@@ -47,7 +47,7 @@ class Announcement(Closable):
             properties={"protocol": str(VERSION)},
             server=f"{name}.local.",
         )
-        self._zeroconf = _open(interface)
+        self._zeroconf = _open(interface, is_ipv6=":" in host)
         try:
             self._zeroconf.register_service(info, allow_name_change=True)
         except (Error, OSError) as error:
@@ -105,8 +105,10 @@ class _Names(ServiceListener):
         self.found.discard(name)
 
 
-def _open(interface: str) -> Zeroconf:
+def _open(interface: str, *, is_ipv6: bool = False) -> Zeroconf:
     try:
-        return Zeroconf(interfaces=[interface]) if interface else Zeroconf()
+        if interface:
+            return Zeroconf(interfaces=[interface])
+        return Zeroconf(ip_version=IPVersion.V6Only) if is_ipv6 else Zeroconf()
     except (Error, OSError) as error:
         raise LinkError(f"cannot use multicast on the local network: {error}") from error

@@ -1,8 +1,9 @@
-"""Agreement on a pairing key by a few digits (SPEKE: IEEE 1363.2, ISO/IEC 11770-4).
+"""Agreement on a pairing key by digits or by a QR code (SPEKE: IEEE 1363.2, ISO/IEC 11770-4).
 
-Both ends raise the same secret generator, derived from the digits, to a random power modulo the
-2,048-bit prime of RFC 3526. Without the digits, neither listening nor taking part helps to try
-digits afterwards: every guess costs one attempt with the PC, which allows only a few.
+Both ends raise the same secret generator, derived from the digits or the code, to a random power
+modulo the 2,048-bit prime of RFC 3526. Without the digits, neither listening nor taking part helps
+to try digits afterwards: every guess costs one attempt with the PC, which allows only a few. Who
+photographs a QR code has nothing once it has been used or has expired.
 """
 
 from __future__ import annotations
@@ -10,17 +11,25 @@ from __future__ import annotations
 import hmac
 import re
 import secrets
+from collections import Counter
 from dataclasses import dataclass
+from ipaddress import ip_network
 
 from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link.cookies import Cookies
 from handcal.link.fields import MalformedError, read_text
+from handcal.link.invitation import Invitation
 from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings
+from handcal.link.transport import Address
 from handcal.link.wire import NONCE_BYTES, Packet, Rejection
 
 DIGITS = 8
 MAX_ATTEMPTS = 5
-"""Attempts that are answered; one of them succeeds by chance with 5 in 10⁸."""
+"""Attempts of one address that are answered."""
+_PER_HOST, _PER_CODE = 20, 100
+"""The same for all ports of a host, and for all hosts together: one of 100 guesses is right with a
+chance of 1 in 10⁶. A stranger uses up the attempts of one host, not those of others."""
 PUBLIC_KEYS = wire.Keys(to_headset=b"handcal pair to headset", to_pc=b"handcal pair to pc")
 """Keys of the datagrams, known to everyone: they only show that a datagram is intact."""
 PROOF_BYTES = 16
@@ -71,10 +80,13 @@ def new_secret() -> int:
     return secrets.randbits(_SECRET_BITS) | 1
 
 
-def public_value(digits: str, device: int, nonce: bytes, secret: int) -> bytes:
-    """Return what an end sends: the generator of this attempt to the power of its secret."""
+def public_value(code: str, device: int, nonce: bytes, secret: int) -> bytes:
+    """Return what an end sends: the generator of this attempt to the power of its secret.
+
+    `code` is the digits, or the code of the invitation.
+    """
     info = b"generator" + _attempt(device, nonce)
-    root = int.from_bytes(wire.hkdf(digits.encode(), _SALT, info, _GENERATOR_BYTES), "big") % PRIME
+    root = int.from_bytes(wire.hkdf(code.encode(), _SALT, info, _GENERATOR_BYTES), "big") % PRIME
     # A square generates the subgroup of prime order, so that nothing leaks about the digits.
     return pow(root, 2 * secret, PRIME).to_bytes(VALUE_BYTES, "big")
 
@@ -89,9 +101,7 @@ def agree(
     MalformedError
         If the other's public value is invalid.
     """
-    other = headset_value if is_pc else pc_value
-    if len(other) != VALUE_BYTES or not 1 < (value := int.from_bytes(other, "big")) < PRIME - 1:
-        raise MalformedError("no public value")
+    value = _read_value(headset_value if is_pc else pc_value)
     shared = pow(value, secret, PRIME).to_bytes(VALUE_BYTES, "big")
     context = _attempt(device, nonce) + headset_value + pc_value
     return Agreed(
@@ -100,28 +110,54 @@ def agree(
     )
 
 
+def _read_value(value: bytes) -> int:
+    number = int.from_bytes(value, "big")
+    if len(value) != VALUE_BYTES or not 1 < number < PRIME - 1:
+        raise MalformedError("no public value")
+    return number
+
+
 def _attempt(device: int, nonce: bytes) -> bytes:
     return device.to_bytes(8, "big") + nonce
 
 
 class Exchange:
-    """The PC's side: answers a few attempts while the digits are shown.
+    """The PC's side: answers a few attempts while digits and QR code are shown.
 
     Parameters
     ----------
     pairings : Pairings
         The agreed key is offered here; only the headset that has it can connect with it.
-    digits : str
+    invitation : Invitation
+    cookies : Cookies
+        An attempt counts once it returns one, which proves its address.
     now_s : float
     """
 
-    def __init__(self, pairings: Pairings, digits: str, now_s: float) -> None:
+    def __init__(
+        self, pairings: Pairings, invitation: Invitation, cookies: Cookies, now_s: float
+    ) -> None:
         self._pairings = pairings
-        self._digits = digits
+        self._invitation = invitation
+        self._cookies = cookies
         self._until_s = now_s + OFFER_S
         self._answers: dict[tuple[int, bytes], pb.Envelope] = {}
+        self._tallies = {is_code: _Tally() for is_code in (False, True)}
 
-    def hear(self, packet: Packet, datagram: bytes, now_s: float) -> bytes | Rejection:
+    @property
+    def tried(self) -> tuple[int, str]:
+        """The number of attempts by digits so far, and the address of the last one."""
+        tally = self._tallies[False]
+        return tally.counts[""], tally.last
+
+    @property
+    def is_used_up(self) -> bool:
+        """True if no attempt by digits is answered any more, from whatever address."""
+        return self._tallies[False].counts[""] >= _PER_CODE
+
+    def hear(
+        self, packet: Packet, datagram: bytes, address: Address, now_s: float
+    ) -> bytes | Rejection:
         """Return the datagram to answer with, or the reason for no answer.
 
         Raises
@@ -131,33 +167,63 @@ class Exchange:
         """
         if now_s > self._until_s or not wire.is_authentic(PUBLIC_KEYS.to_pc, datagram):
             return Rejection.UNPAIRED
-        message = read_pair(messages.parse(packet.payload))
-        attempt = packet.sequence, message.nonce
-        if attempt not in self._answers:
-            if len(self._answers) >= MAX_ATTEMPTS:
-                refused = greetings.refused_code(message.nonce)
-                return greetings.seal(PUBLIC_KEYS.to_headset, packet.sequence, refused)
-            self._answers[attempt] = self._answer(packet.sequence, message, now_s)
-        return greetings.seal(PUBLIC_KEYS.to_headset, packet.sequence, self._answers[attempt])
+        message, device = read_pair(messages.parse(packet.payload)), packet.sequence
+        answer = self._answers.get((device, message.nonce))
+        if not self._cookies.accept(message.cookie, device, address, now_s):
+            answer = greetings.retry(message.nonce, self._cookies.make(device, address, now_s))
+        elif answer is None and not self._tallies[message.by_code].allows(address):
+            answer = greetings.refused_code(message.nonce)
+        elif answer is None:
+            answer = self._answers[device, message.nonce] = self._answer(device, message, now_s)
+        return greetings.seal(PUBLIC_KEYS.to_headset, device, answer)
 
     def _answer(self, device: int, message: pb.Pair, now_s: float) -> pb.Envelope:
         secret = new_secret()
-        value = public_value(self._digits, device, message.nonce, secret)
+        code = self._invitation.code if message.by_code else self._invitation.digits
+        value = public_value(code, device, message.nonce, secret)
         agreed = agree(device, message.nonce, message.public_value, value, secret, is_pc=True)
-        self._pairings.offer(agreed.key, now_s)
+        self._pairings.offer(agreed.key, now_s, f"{device:016x}")
         return paired(message.nonce, value, agreed.proof)
 
 
-def pair(nonce: bytes, value: bytes, name: str) -> pb.Envelope:
-    """Make the headset's request."""
-    return pb.Envelope(pair=pb.Pair(nonce=nonce, public_value=value, name=name))
+class _Tally:
+    """Counts the attempts of each address, each host and all together."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.last = ""
+
+    def allows(self, address: Address) -> bool:
+        """Return whether one more attempt is answered, and count it."""
+        host, port = address[0].partition("%")[0], address[1]
+        if ":" in host:  # whoever has one address of IPv6 has all of its network
+            host = str(ip_network((host, 64), strict=False))
+        limits = {f"{host} {port}": MAX_ATTEMPTS, host: _PER_HOST, "": _PER_CODE}
+        if any(self.counts[who] >= most for who, most in limits.items()):
+            return False
+        self.counts.update(limits.keys())
+        self.last = host
+        return True
+
+
+def pair(
+    nonce: bytes, value: bytes, name: str, cookie: bytes = b"", *, by_code: bool = False
+) -> pb.Envelope:
+    """Make the headset's request, with the PC's cookie once it is known."""
+    message = pb.Pair(nonce=nonce, public_value=value, name=name, cookie=cookie, by_code=by_code)
+    return pb.Envelope(pair=message)
 
 
 def read_pair(envelope: pb.Envelope) -> pb.Pair:
     """Return the request in an envelope."""
     message = envelope.pair
-    if envelope.WhichOneof("body") != "pair" or len(message.nonce) != NONCE_BYTES:
+    if (
+        envelope.WhichOneof("body") != "pair"
+        or len(message.nonce) != NONCE_BYTES
+        or len(message.cookie) > greetings.MAX_COOKIE_BYTES
+    ):
         raise MalformedError("a pairing begins with a nonce")
+    _read_value(message.public_value)
     read_text(message.name, MAX_NAME_CHARACTERS)
     return message
 
@@ -168,7 +234,7 @@ def paired(nonce: bytes, value: bytes, proof: bytes) -> pb.Envelope:
 
 
 def finish(message: pb.Paired, device: int, nonce: bytes, value: bytes, secret: int) -> str | None:
-    """Return the headset's pairing key from the PC's answer; None if the digits are wrong.
+    """Return the headset's pairing key from the PC's answer; None if the code is wrong.
 
     Raises
     ------

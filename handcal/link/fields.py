@@ -69,8 +69,12 @@ def read_text(text: str, most: int) -> str:
 
 
 def is_text(text: str, most: int) -> bool:
-    """Return whether a text is short enough, and without control characters."""
-    return len(text) <= most and all(character >= " " for character in text)
+    """Return whether a text is short enough, and all of it is seen.
+
+    Some terminals take the controls U+0080 to U+009F as orders, and those of bidirectional text let
+    a name be read as another.
+    """
+    return len(text) <= most and text.replace("\N{NO-BREAK SPACE}", " ").isprintable()
 
 
 def read_size(width_px: int, height_px: int) -> tuple[int, int]:

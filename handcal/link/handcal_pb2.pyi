@@ -106,14 +106,18 @@ class Welcome(_message.Message):
     def __init__(self, nonce: _Optional[bytes] = ..., session: _Optional[int] = ..., pc_nonce: _Optional[bytes] = ...) -> None: ...
 
 class Pair(_message.Message):
-    __slots__ = ("nonce", "public_value", "name")
+    __slots__ = ("nonce", "public_value", "name", "cookie", "by_code")
     NONCE_FIELD_NUMBER: _ClassVar[int]
     PUBLIC_VALUE_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
+    COOKIE_FIELD_NUMBER: _ClassVar[int]
+    BY_CODE_FIELD_NUMBER: _ClassVar[int]
     nonce: bytes
     public_value: bytes
     name: str
-    def __init__(self, nonce: _Optional[bytes] = ..., public_value: _Optional[bytes] = ..., name: _Optional[str] = ...) -> None: ...
+    cookie: bytes
+    by_code: bool
+    def __init__(self, nonce: _Optional[bytes] = ..., public_value: _Optional[bytes] = ..., name: _Optional[str] = ..., cookie: _Optional[bytes] = ..., by_code: _Optional[bool] = ...) -> None: ...
 
 class Paired(_message.Message):
     __slots__ = ("nonce", "public_value", "proof")

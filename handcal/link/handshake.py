@@ -1,29 +1,24 @@
 """The PC's side of the handshake. No sockets; time is an argument.
 
-A stranger costs no memory: the first hello is answered with a cookie, a MAC over the sender's
-address and the time in periods of two minutes (as WireGuard's cookie and QUIC's Retry). Only a
-hello that returns the cookie is passed on. A hello is accepted once: its time must be greater than
-that of every earlier one of its device.
+A stranger costs no memory: the first hello is answered with a cookie, and only a hello that
+returns it is passed on. A hello is accepted once: its time must be greater than that of every
+earlier one of its device.
 """
 
 from __future__ import annotations
 
-import hmac
 import math
-import secrets
 from dataclasses import dataclass, field
 
 from handcal.link import greetings, messages, wire
+from handcal.link.cookies import PERIOD_S, Cookies
 from handcal.link.exchange import Exchange
 from handcal.link.pairing import Pairing, Pairings, device_number
 from handcal.link.transport import Address
 from handcal.link.wire import Keys, Packet, Rejection
 
-PERIOD_S = 120.0
-"""A cookie is valid until the end of the period after the one in which it was made."""
 MAX_ANSWERS = 64
 """Addresses to which one hello is answered with a cookie."""
-_COOKIE_BYTES = 16
 _MAX_DEVICES = 64
 _MAX_DROPPED = 4096
 _FOREIGN_KEYS_HZ = 20.0
@@ -80,14 +75,15 @@ class Reception:
     Attributes
     ----------
     exchange : Exchange or None
-        Answers those who pair by digits, while digits are shown.
+        Answers those who ask to pair, while an invitation is shown.
+    cookies : Cookies
     """
 
     def __init__(self, pairings: Pairings) -> None:
         self.exchange: Exchange | None = None
         self._pairings = pairings
         self._heard: dict[int, _Heard] = {}
-        self._secret = secrets.token_bytes(32)
+        self.cookies = Cookies()
         self._foreign = Limiter(_FOREIGN_KEYS_HZ)
         self._dropped: set[bytes | tuple[bytes, Address]] = set()
         self._indexed: tuple[Pairing, ...] = ()
@@ -113,11 +109,13 @@ class Reception:
         found = self._find(device, datagram, now_s)
         if found is None:
             exchange = self.exchange
-            return exchange.hear(packet, datagram, now_s) if exchange else Rejection.UNPAIRED
+            return (
+                exchange.hear(packet, datagram, address, now_s) if exchange else Rejection.UNPAIRED
+            )
         pairing, keys = found
         hello = greetings.read_hello(messages.parse(packet.payload))
         heard = self._recall(device, now_s)
-        if self._is_cookie(hello.cookie, device, address, now_s):
+        if self.cookies.accept(hello.cookie, device, address, now_s):
             if hello.time_ns <= heard.admitted_ns:
                 return self._drop(datagram, address)
             heard.changed_s = now_s
@@ -133,7 +131,7 @@ class Reception:
         elif address in heard.answered or len(heard.answered) >= MAX_ANSWERS:
             return self._drop(datagram, address)
         heard.answered.add(address)
-        retry = greetings.retry(hello.nonce, self._cookie(0, device, address, now_s))
+        retry = greetings.retry(hello.nonce, self.cookies.make(device, address, now_s))
         return greetings.seal(keys.to_headset, device, retry)
 
     def _drop(self, datagram: bytes, address: Address | None = None) -> Rejection:
@@ -152,7 +150,7 @@ class Reception:
             return own
         others = [one for one, _ in self._bound.values()]
         try_all = own is None and bool(others) and self._foreign.allows(now_s)
-        offered = self._pairings.offered(now_s)
+        offered = self._pairings.offered(now_s, f"{device:016x}")
         for pairing in (*self._unbound, *offered, *(others if try_all else ())):
             keys = wire.handshake_keys(pairing.key.encode(), device)
             if wire.is_authentic(keys.to_pc, datagram):
@@ -180,14 +178,3 @@ class Reception:
                 del self._heard[next(iter(self._heard))]
             heard = self._heard[device] = _Heard(now_s)
         return heard
-
-    def _is_cookie(self, cookie: bytes, device: int, address: Address, now_s: float) -> bool:
-        return bool(cookie) and any(
-            hmac.compare_digest(cookie, self._cookie(age, device, address, now_s)) for age in (0, 1)
-        )
-
-    def _cookie(self, age: int, device: int, address: Address, now_s: float) -> bytes:
-        """Return the cookie of the present period, or of the one before with `age` 1."""
-        period = math.floor(now_s / PERIOD_S) - age
-        who = f"{period} {device:016x} {address[1]} {address[0]}".encode()
-        return hmac.digest(self._secret, who, "sha256")[:_COOKIE_BYTES]

@@ -20,7 +20,7 @@ _TEXT = re.compile(
 
 
 def new_code() -> str:
-    """Return a new random one-time code of 130 bits; it is a pairing key."""
+    """Return a new random one-time code of 130 bits."""
     return "".join(secrets.choice(_ALPHABET) for _ in range(CODE_CHARACTERS))
 
 
@@ -32,7 +32,7 @@ class Invitation:
     """Address of the PC in numbers, or its name."""
     port: int
     code: str
-    """One-time code, which becomes the device's pairing key."""
+    """One-time code, by which the pairing key is agreed."""
     digits: str = ""
     """Short code for a headset that knows the address; not part of the QR code."""
 

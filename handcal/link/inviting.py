@@ -60,7 +60,9 @@ def run_pairing(
             _LOG.warning("%s; type the address into the headset", error)
         start_s = time.monotonic()
         while (waited_s := time.monotonic() - start_s) < timeout_s:
-            progress.at(waited_s / timeout_s, "Waiting for the headset")
+            attempts = str(server.pairing_attempts)
+            what = f"Waiting for the headset: {attempts}" if attempts else "Waiting for the headset"
+            progress.at(waited_s / timeout_s, what)
             if added := set(pairings.all) - known:
                 return added.pop()
             time.sleep(_POLL_S)

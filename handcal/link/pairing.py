@@ -24,7 +24,7 @@ MAX_DEVICES = 16
 MAX_NAME_CHARACTERS = 40
 OFFER_S = 600.0
 """Time within which a device must connect with an offered key."""
-_MAX_OFFERS = 8
+_MAX_OFFERS = 256  # more than the attempts that an invitation answers
 _LOCK_S = 2.0
 _MAX_KEY_BYTES = 1024
 _MAX_FILE_BYTES = MAX_DEVICES * 2 * _MAX_KEY_BYTES
@@ -102,7 +102,7 @@ class Pairing:
             device_number(self.device_id)
         if len(self.name) > MAX_NAME_CHARACTERS:
             raise ValueError(f"a device's name has at most {MAX_NAME_CHARACTERS} characters")
-        if not all(character >= " " for character in self.name):
+        if not self.name.isprintable():
             raise ValueError("a device's name has no control characters")
 
 
@@ -125,7 +125,7 @@ class Pairings:
     def __init__(self, pairings: tuple[Pairing, ...], path: Path | None = None) -> None:
         self.all = pairings[-MAX_DEVICES:]
         self._path = path
-        self._offers: dict[str, float] = {}
+        self._offers: dict[str, tuple[float, str]] = {}
         self._lock = RLock()
         self._stamp = self._look()
 
@@ -172,11 +172,15 @@ class Pairings:
             self._change(lambda before: (*before, made))
             return made.key
 
-    def offer(self, key: str, now_s: float | None = None) -> None:
-        """Let one new device connect with a key within `OFFER_S`; the key is not stored before."""
+    def offer(self, key: str, now_s: float | None = None, device_id: str = "") -> None:
+        """Let a device connect with a key within `OFFER_S`; the key is not stored before.
+
+        Without `device_id`, any new device may.
+        """
         offered = Pairing(key)
         with self._lock:
-            self._offers[offered.key] = (time.monotonic() if now_s is None else now_s) + OFFER_S
+            end_s = (time.monotonic() if now_s is None else now_s) + OFFER_S
+            self._offers[offered.key] = end_s, device_id
             while len(self._offers) > _MAX_OFFERS:
                 del self._offers[next(iter(self._offers))]
 
@@ -185,11 +189,12 @@ class Pairings:
         with self._lock:
             self._offers.clear()
 
-    def offered(self, now_s: float) -> tuple[Pairing, ...]:
-        """Return the offers that have not ended."""
+    def offered(self, now_s: float, device_id: str = "") -> tuple[Pairing, ...]:
+        """Return the offers to a device that have not ended."""
         with self._lock:
-            self._offers = {key: end for key, end in self._offers.items() if end > now_s}
-            return tuple(Pairing(key) for key in self._offers)
+            self._offers = {key: one for key, one in self._offers.items() if one[0] > now_s}
+            whose = "", device_id
+            return tuple(Pairing(key) for key, one in self._offers.items() if one[1] in whose)
 
     def bind(self, pairing: Pairing, device_id: str, name: str) -> None:
         """Give an open or offered key to a device, in place of the device's older key.

@@ -73,6 +73,23 @@ class Nudge:
     """As in `Confirmation`."""
 
 
+@dataclass(frozen=True, slots=True)
+class PairingAttempts:
+    """Attempts to pair by digits, none of which has led to a connection."""
+
+    count: int = 0
+    host: str = ""
+    """Address of the last one."""
+    is_used_up: bool = False
+    """True if no more are answered, so that the digits are worth nothing."""
+
+    def __str__(self) -> str:
+        if self.count < 2:
+            return ""
+        told = f"{self.count} attempts with other digits, the last from {self.host}"
+        return f"{told}; no more are answered: show a new code" if self.is_used_up else told
+
+
 @dataclass(slots=True)
 class _Session:
     """The present session's device and its welcome."""
@@ -161,10 +178,19 @@ class HeadsetServer(Sender):
         with self._changed:
             self._require_running()
             self.withdraw()
-            self._pairings.offer(invitation.code)
-            now_s = time.monotonic()
-            self._reception.exchange = Exchange(self._pairings, invitation.digits, now_s)
+            self._reception.exchange = Exchange(
+                self._pairings, invitation, self._reception.cookies, time.monotonic()
+            )
         return invitation
+
+    @property
+    def pairing_attempts(self) -> PairingAttempts:
+        """What has come of the invitation so far."""
+        with self._changed:
+            exchange = self._reception.exchange
+            if exchange is None:
+                return PairingAttempts()
+            return PairingAttempts(*exchange.tried, exchange.is_used_up)
 
     def withdraw(self) -> None:
         """End the invitation, if there is one."""

@@ -5,7 +5,11 @@ from __future__ import annotations
 import errno
 import select
 import socket
+from contextlib import suppress
+from ipaddress import ip_address
 from typing import Any, Protocol, TypeAlias
+
+from ifaddr import get_adapters
 
 from handcal.core.errors import LinkError
 from handcal.link.wire import MAX_DATAGRAM_BYTES
@@ -16,7 +20,8 @@ EVERY_NETWORK = ("0.0.0.0", "::")  # noqa: S104
 """The addresses that listen on all networks: of IPv4, and of both where the system can."""
 _MAX_BATCH = 256
 _MAPPED = "::ffff:"
-_ANYWHERE: Address = ("192.0.2.1", 9)  # reserved for documentation; nothing is sent to it
+_ANYWHERE: tuple[Address, ...] = (("192.0.2.1", 9), ("2001:db8::1", 9))
+"""Reserved for documentation, of IPv4 and IPv6; nothing is sent to them."""
 
 
 class Transport(Protocol):
@@ -126,13 +131,29 @@ def local_address(server: Address) -> Address:
 def reachable_address(bound: Address) -> Address:
     """Return the address at which others reach a socket bound to one network or to all.
 
+    Of several networks, that which leads farther; IPv6 only if there is no IPv4.
+
     Raises
     ------
     LinkError
         If it is bound to all networks, but there is none.
     """
     host, port = bound
-    return (local_address(_ANYWHERE)[0], port) if host in EVERY_NETWORK else bound
+    if host not in EVERY_NETWORK:
+        return bound
+    families = 2 if host == "::" else 1
+    for anywhere in _ANYWHERE[:families]:
+        with suppress(LinkError):  # no route leads there
+            return local_address(anywhere)[0], port
+    own = [ip for adapter in get_adapters() for ip in adapter.ips]
+    v4 = [str(ip.ip) for ip in own if ip.is_IPv4]
+    v6 = [ip.ip[0] for ip in own if ip.is_IPv6 and families == 2]
+    for address in (*v4, *v6):
+        number = ip_address(address)
+        if not (number.is_loopback or number.is_link_local):
+            return address, port
+    missing = "no network" if families == 2 else "no IPv4 network (:: listens on IPv6, too)"
+    raise LinkError(f"this computer has {missing}; connect it to the headset's network")
 
 
 def resolve(host: str, port: int) -> Address:

@@ -35,6 +35,8 @@ from handcal.sim.wearer import DisplayView, Wearer, WearerAction
 from handcal.sim.wearer_settings import WearerSettings
 
 _STEP_AFTER_NS, _STEP_NS = 4_000_000_000, 300_000_000
+_SUSPENDED_S = 2.0
+"""So long after its time, an image was late because the computer was suspended."""
 _FORMER_SHIFT_M = (0.006, 0.0, 0.0)
 
 
@@ -140,7 +142,7 @@ def run_headset(
             if action.nudge is not None and state.verify is not None:
                 client.nudge(clock_ns(t_ns), state, action.nudge, action.fits)
             now_s = time.monotonic()
-            if client.connected:
+            if client.connected or now_s - next_s > _SUSPENDED_S:
                 heard_s = now_s
             elif now_s - heard_s > settings.patience_s:
                 raise LinkError(

@@ -28,6 +28,7 @@ from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import hbox, vbox
 from handcal_gui.widgets.qr_code import QrCode
 from handcal_gui.widgets.result_rows import EYE_NAMES
+from handcal_gui.widgets.sentence import sentence
 
 _PERIOD_MS = 250
 _DELIVERIES = {
@@ -81,6 +82,7 @@ class ConnectDialog(QDialog):
         self._how = paragraph("howToPair")
         self._invite = button("invite", tr("&New code"), tr("Invite another headset"))
         self._state = FindingLine("headset")
+        self._attempts = paragraph("attempts")
         self._problem = paragraph("connectProblem")
         self._devices = PairedDevices(server.pairings)
         self._devices.failed.connect(self._problem.setText)
@@ -165,12 +167,17 @@ class ConnectDialog(QDialog):
             self._end_invitation(tr("Paired. From now on the headset connects automatically."))
         elif time.monotonic() - self._invited_s > OFFER_S:
             self._end_invitation(tr("The code has expired. New code makes another one."))
+        else:
+            attempts = self._server.pairing_attempts
+            self._attempts.setText(sentence(str(attempts)))
+            self._code.setEnabled(not attempts.is_used_up)
 
     def _end_invitation(self, why: str) -> None:
         self._invitation = None
         self._qr.hide()
         self._qr.show_text("")
         self._code.clear()
+        self._attempts.clear()
         self._how.setText(why)
 
     def _announce(self, invitation: Invitation) -> None:
@@ -204,7 +211,7 @@ class ConnectDialog(QDialog):
         make_equally_wide(square.send for square in self._squares.values())
         foot = hbox(self._code, 1, self._invite, spacing=SPACING_PX)
         foot.setAlignment(self._invite, Qt.AlignmentFlag.AlignBottom)  # in one line with Close
-        left = vbox(self._how, (self._qr, 1), 0, foot, spacing=SPACING_PX)
+        left = vbox(self._how, (self._qr, 1), 0, self._attempts, foot, spacing=SPACING_PX)
         right = vbox(
             _heading(tr("Headset")),
             self._state,

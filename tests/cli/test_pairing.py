@@ -11,6 +11,7 @@ import pytest
 
 from handcal.core.types import HeadsetIdentity
 from handcal.link import inviting
+from handcal.link.ask_to_pair import pair_by_code
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairing, Pairings
@@ -108,7 +109,8 @@ def test_a_headset_is_paired_by_what_is_shown(
         eventually(is_shown, 20.0)
         invitation = read_invitation("".join(shown).split("type ")[1].split()[0])
         address = (invitation.host, invitation.port)
-        with HeadsetClient(address, invitation.code.encode(), HeadsetIdentity("c" * 16)) as client:
+        key = pair_by_code(invitation, "c" * 16).encode()
+        with HeadsetClient(address, key, HeadsetIdentity("c" * 16)) as client:
             client.wait_connected(5.0)
 
     thread = threading.Thread(target=connect)

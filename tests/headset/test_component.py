@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from handcal.core.display import projection_matrix
 from handcal.core.geometry import project, rigid, transform
 from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.link.nudges import VerifyRequest
-from handcal.link.pairing import Pairing, Pairings
+from handcal.link.pairing import Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
 from handcal.link.shapes import Shape
 from handcal.rig.example import example_rig
@@ -24,7 +25,6 @@ from tests.helpers import ROOT, eventually
 
 pytestmark = pytest.mark.process
 DEFINES = "UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"
-CODE = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 SHIFT_M = (0.003, 0.001, 0.005)
 SQUARE_M = np.array(
     [[x, y, 0.5] for x, y in ((-0.04, -0.03), (0.04, -0.03), (0.04, 0.05), (-0.04, 0.05))]
@@ -57,7 +57,7 @@ def start(player: Path, tmp_path: Path) -> Iterator[Start]:
 
 @pytest.fixture
 def pairings(tmp_path: Path) -> Pairings:
-    return Pairings((Pairing(CODE),), tmp_path / "devices.json")
+    return Pairings((), tmp_path / "devices.json")
 
 
 @pytest.fixture
@@ -66,9 +66,10 @@ def server(pairings: Pairings) -> Iterator[HeadsetServer]:
         yield server
 
 
+@cache
 def invitation(server: HeadsetServer) -> str:
-    host, port = server.address
-    return f"HANDCAL://{host}:{port}/{CODE}"
+    """Return what the QR code of the first request says; an app pairs by it once."""
+    return server.invite().text
 
 
 def is_connected(told: Mapping[str, str]) -> bool:

@@ -9,9 +9,12 @@ import pytest
 from handcal.core.errors import PosePendingError
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, HeadsetIdentity, HeadsetView, Projection
+from handcal.link import client as client_module
 from handcal.link.client import HeadsetClient, HeadsetState
+from handcal.link.fields import MalformedError, read_text
 from handcal.link.impair import Impairment
 from handcal.link.messages import Owner
+from handcal.link.pairing import Pairing
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.shapes import Shape
 from tests.helpers import eventually
@@ -86,17 +89,22 @@ def test_a_confirmation_arrives_once_on_the_hosts_clock(
     assert abs(confirmation.t_host_ns - t_host_ns) < 5_000_000
 
 
+def heard(server: HeadsetServer) -> Confirmation:
+    """Return the next confirmation."""
+    found: list[Confirmation] = []
+
+    def hear() -> bool:
+        found.extend(server.confirmations())
+        return bool(found)
+
+    eventually(hear)
+    return found[0]
+
+
 def confirmed(server: HeadsetServer, client: HeadsetClient, state: HeadsetState) -> str:
     """Confirm with a state, and return the difference that the PC finds."""
     client.wait_acked(client.confirm(time.monotonic_ns(), state), 5.0)
-    heard: list[Confirmation] = []
-
-    def hear() -> bool:
-        heard.extend(server.confirmations())
-        return bool(heard)
-
-    eventually(hear)
-    return heard[0].problem
+    return heard(server).problem
 
 
 def test_a_confirmation_of_stale_drawings_is_found_out(
@@ -285,17 +293,15 @@ def test_around_a_step_of_the_headset_s_clock_nothing_is_taken(
         # Before any ping could show it, with the clock's old time and its new one.
         for t_ns in (clock_ns() - round(step_s * 1e9), clock_ns()):
             client.wait_acked(client.confirm(t_ns, client.state()), 5.0)
-            heard: list[Confirmation] = []
-            eventually(lambda: heard.extend(server.confirmations()) or heard)  # noqa: B023
-            assert not heard[0].is_timed
-            assert abs(heard[0].t_host_ns - time.monotonic_ns()) < 2e9
+            confirmation = heard(server)
+            assert not confirmation.is_timed
+            assert abs(confirmation.t_host_ns - time.monotonic_ns()) < 2e9
         assert server.clock_step_s == pytest.approx(step_s, abs=0.01)
         with pytest.raises(PosePendingError):
             server.pose_at_host_ns(time.monotonic_ns())
         eventually(lambda: server.clock_step_s == 0.0, 5.0)
         client.wait_acked(client.confirm(clock_ns(), client.state()), 5.0)
-        eventually(lambda: heard.extend(server.confirmations()) or len(heard) == 2)
-        assert heard[1].is_timed
+        assert heard(server).is_timed
 
 
 def test_poses_of_the_future_are_dropped_and_told(
@@ -311,3 +317,17 @@ def test_poses_of_the_future_are_dropped_and_told(
             client.send_pose(np.eye(4), headset_clock_ns())
             time.sleep(0.01)
         eventually(lambda: 50.0 < server.statistics().pose_rate_hz < 110.0)
+
+
+@pytest.mark.parametrize("name", ["\x9b2J", "a\u202egnp", "\u200b", "two\nlines", "\x85"])
+def test_a_name_that_is_not_all_seen_is_refused(name: str) -> None:
+    with pytest.raises(MalformedError):
+        read_text(name, 40)
+    with pytest.raises(ValueError, match="control characters"):
+        Pairing("k" * 16, IDENTITY.device_id, name)
+    assert read_text("Ärger\N{NO-BREAK SPACE}5 %", 40)
+
+
+def test_a_client_is_not_bound_to_the_address_of_today() -> None:
+    assert client_module._own_side(("127.0.0.1", 5)) == ("127.0.0.1", 0)
+    assert client_module._own_side(("192.0.2.77", 5))[0] in ("0.0.0.0", "127.0.0.1")

@@ -8,7 +8,7 @@ from handcal.core.errors import CancelledError, LinkError
 from handcal.core.progress import Progress
 from handcal.core.types import HeadsetIdentity
 from handcal.link import inviting
-from handcal.link.ask_to_pair import pair_by_digits
+from handcal.link.ask_to_pair import pair_by_code, pair_by_digits
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import Invitation
 from handcal.link.inviting import run_pairing
@@ -37,7 +37,7 @@ def test_the_first_new_headset_is_paired(has_camera: bool) -> None:
 
     def connect(invitation: Invitation) -> None:
         address = (invitation.host, invitation.port)
-        key = invitation.code
+        key = pair_by_code(invitation, DEVICE)
         if not has_camera:
             key = pair_by_digits(address, DEVICE, invitation.digits)
         with HeadsetClient(address, key.encode(), HeadsetIdentity(DEVICE, "Lab 9")) as client:

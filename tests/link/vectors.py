@@ -126,13 +126,19 @@ def _pairing_by_digits() -> dict[str, str]:
     pc_value = exchange.public_value(DIGITS, DEVICE, NONCE, PC_SECRET)
     agreed = exchange.agree(DEVICE, NONCE, value, pc_value, SECRET, is_pc=False)
     keys = exchange.PUBLIC_KEYS
-    request = _greeting(keys.to_pc, exchange.pair(NONCE, value, "Lab 2"))
+    first = _greeting(keys.to_pc, exchange.pair(NONCE, value, "Lab 2"))
+    request = _greeting(keys.to_pc, exchange.pair(NONCE, value, "Lab 2", COOKIE))
+    by_code = exchange.public_value(INVITATION.code, DEVICE, NONCE, SECRET)
+    scanned = exchange.pair(NONCE, by_code, "Lab 2", COOKIE, by_code=True)
     answer = _greeting(keys.to_headset, exchange.paired(NONCE, pc_value, agreed.proof))
     return {
         "digits": DIGITS,
         "headset_secret": f"{SECRET:064x}",
         "pc_secret": f"{PC_SECRET:064x}",
+        "first_pair": first["datagram"],
+        "retry": _greeting(keys.to_headset, greetings.retry(NONCE, COOKIE))["datagram"],
         "pair": request["datagram"],
+        "pair_by_code": _greeting(keys.to_pc, scanned)["datagram"],
         "refused": _greeting(keys.to_headset, greetings.refused_code(NONCE))["datagram"],
         "paired": answer["datagram"],
         "proof": agreed.proof.hex(),

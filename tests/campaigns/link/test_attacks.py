@@ -160,7 +160,7 @@ def test_hostile_messages_with_the_key_crash_nothing(server: HeadsetServer) -> N
     def session() -> tuple[Welcome, bytes]:
         greet(b"")
         with server._changed:
-            cookie = server._reception._cookie(0, device, address, time.monotonic())
+            cookie = server._reception.cookies.make(device, address, time.monotonic())
             server._channel = None
         greet(cookie)
         assert server._session is not None

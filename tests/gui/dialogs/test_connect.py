@@ -20,10 +20,11 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import HeadsetIdentity, Rig
+from handcal.link.ask_to_pair import pair_by_code
 from handcal.link.client import HeadsetClient
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings
-from handcal.link.server import HeadsetServer
+from handcal.link.server import HeadsetServer, PairingAttempts
 from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.theme import SPACING_PX
 from handcal_gui.widgets.qr_code import QrCode
@@ -59,10 +60,11 @@ def connect(
         scanned = read_invitation(child(dialog, QrCode).accessibleDescription())
         identity = HeadsetIdentity(DEVICE, "Lab 9", "Runtime 3", "App 1.2", protocol=2)
         address = scanned.host, scanned.port
-        clients.append(HeadsetClient(address, scanned.code.encode(), identity))
+        key = pair_by_code(scanned, DEVICE)
+        clients.append(HeadsetClient(address, key.encode(), identity))
         clients[0].wait_connected(5.0)
         qtbot.waitUntil(lambda: "Lab 9" in text(dialog, "headsetFound"), timeout=PATIENCE_MS)
-        return clients[0], scanned.code
+        return clients[0], key
 
     yield connect
     for client in clients:
@@ -112,11 +114,30 @@ def test_enter_keeps_the_code_that_is_being_typed(dialog: ConnectDialog) -> None
     assert text(dialog, "digits") == code
 
 
+def test_digits_that_are_guessed_are_told_and_end(
+    dialog: ConnectDialog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried = PairingAttempts(7, "192.168.1.7")
+    monkeypatch.setattr(HeadsetServer, "pairing_attempts", property(lambda _: tried))
+    dialog.refresh()
+    assert "7 attempts with other digits, the last from 192.168.1.7" in text(dialog, "attempts")
+    assert child(dialog, QLabel, "digits").isEnabled()
+    tried = PairingAttempts(100, "192.168.1.7", is_used_up=True)
+    dialog.refresh()
+    assert not child(dialog, QLabel, "digits").isEnabled()
+    assert child(dialog, QrCode).isVisible()  # it is not ended by who guesses digits
+    tried = PairingAttempts()
+    dialog.invite()
+    dialog.refresh()
+    assert child(dialog, QLabel, "digits").isEnabled()
+    assert text(dialog, "attempts") == ""
+
+
 def test_a_headset_pairs_by_the_code_once(
     dialog: ConnectDialog, pairings: Pairings, connect: Callable[[], tuple[HeadsetClient, str]]
 ) -> None:
-    _, code = connect()
-    assert [(one.device_id, one.name, one.key) for one in pairings.all] == [(DEVICE, "Lab 9", code)]
+    _, key = connect()
+    assert [(one.device_id, one.name, one.key) for one in pairings.all] == [(DEVICE, "Lab 9", key)]
     dialog.refresh()
     assert child(dialog, QrCode).accessibleDescription() == ""
     assert text(dialog, "digits") == ""

@@ -22,7 +22,7 @@ namespace Handcal.Link.Tests
                 case "pose": Lines(Numbers.Pose); break;
                 case "focus": Lines(Numbers.Focus); break;
                 case "invitation": Lines(Invited); break;
-                case "digits": Console.WriteLine(Vectors.Digits(Console.In)); break;
+                case "exchange": Console.WriteLine(Vectors.Exchanged(Console.In)); break;
                 case "pair": Console.WriteLine(Paired(arguments)); break;
                 case "hostile": Lines(Hostile); break;
                 case "run": new Remote(arguments).Run(); break;
@@ -41,15 +41,18 @@ namespace Handcal.Link.Tests
         static string Invited(string text)
         {
             if (!Invitation.TryRead(text, out Invitation one)) return "none";
-            return one.Host + " " + one.Port + " " + Encoding.ASCII.GetString(one.Key);
+            return one.Host + " " + one.Port + " " + one.Code;
         }
 
-        /// <summary>Arguments: host, port, digits, identity. Returns the key or the problem.</summary>
+        /// <summary>Arguments: host, port, digits or an invitation's text, identity. Returns the key or the problem.</summary>
         static string Paired(string[] arguments)
         {
             ulong device = ulong.Parse(arguments[4], NumberStyles.HexNumber);
-            byte[] key = Digits.Pair(
-                arguments[1], int.Parse(arguments[2]), arguments[3], device, "Lab-2", 5, out string problem);
+            string problem;
+            byte[] key = Invitation.TryRead(arguments[3], out Invitation scanned)
+                ? Exchange.PairByCode(scanned, device, "Lab-2", 5, out problem)
+                : Exchange.PairByDigits(
+                    arguments[1], int.Parse(arguments[2]), arguments[3], device, "Lab-2", 5, out problem);
             return key == null ? problem : Encoding.ASCII.GetString(key);
         }
 
@@ -198,14 +201,20 @@ namespace Handcal.Link.Tests
             Tell("both_and_cursor_removed", Hex(state.Digest()));
         }
 
-        /// <summary>Reads digits, identity, nonce, secret, name and the PC's answer; returns request and key.</summary>
-        public static string Digits(TextReader input)
+        /// <summary>
+        /// Reads a code, whether it is that of an invitation, identity, nonce, secret, name and two
+        /// answers of the PC; returns both requests and the key.
+        /// </summary>
+        public static string Exchanged(TextReader input)
         {
-            string digits = input.ReadLine();
+            string code = input.ReadLine();
+            bool isByCode = bool.Parse(input.ReadLine());
             ulong device = ulong.Parse(input.ReadLine(), NumberStyles.HexNumber);
-            var exchange = new Digits(digits, device, Bytes(input.ReadLine()), Bytes(input.ReadLine()));
-            string request = Hex(exchange.Request(input.ReadLine()));
-            byte[] answer = Bytes(input.ReadLine());
+            var exchange = new Exchange(code, isByCode, device, Bytes(input.ReadLine()), Bytes(input.ReadLine()));
+            string name = input.ReadLine(), request = Hex(exchange.Request(name));
+            byte[] retry = Bytes(input.ReadLine()), answer = Bytes(input.ReadLine());
+            exchange.TryRead(retry, retry.Length, out _, out _);
+            request += " " + Hex(exchange.Request(name));
             bool isEnd = exchange.TryRead(answer, answer.Length, out byte[] key, out string problem);
             return request + " " + isEnd + " " + (key == null ? problem : Encoding.ASCII.GetString(key));
         }

@@ -128,20 +128,23 @@ namespace Handcal
         /// <summary>
         /// Pairs with the PC by the text of its QR code, scanned or typed; or by its address and the
         /// 8 digits that it shows, "192.168.1.20 12345678". False if the text is neither, or the
-        /// component is disabled. Digits take a moment: see IsPairing and PairingProblem.
+        /// component is disabled. It takes a moment: see IsPairing and PairingProblem.
         /// </summary>
         public bool Pair(string text)
         {
             if (drawing == null) return false;
-            if (Invitation.TryRead(text, out Invitation one))
-            {
-                Paired(one.Host, one.Port, one.Key);
-                return true;
-            }
-            if (!Invitation.TrySplitTyped(text, out string host, out int port, out string digits))
+            string host = "", digits = "";
+            int port = 0;
+            bool isScanned = Invitation.TryRead(text, out Invitation scanned);
+            if (!isScanned && !Invitation.TrySplitTyped(text, out host, out port, out digits))
             {
                 FailPairing("\"" + text + "\" is not understood. " + HowToPair);
                 return false;
+            }
+            if (isScanned)
+            {
+                host = scanned.Host;
+                port = scanned.Port;
             }
             ulong device = pairing.DeviceId;
             string name = Introduction().Name;
@@ -152,7 +155,9 @@ namespace Handcal
                 string problem;
                 try
                 {
-                    key = Digits.Pair(host, port, digits, device, name, PairPatienceS, out problem);
+                    key = isScanned
+                        ? Exchange.PairByCode(scanned, device, name, PairPatienceS, out problem)
+                        : Exchange.PairByDigits(host, port, digits, device, name, PairPatienceS, out problem);
                 }
                 catch (Exception error)  // of a name that is none
                 {

@@ -11,10 +11,10 @@ namespace Handcal.Link
                 .Bytes(1, nonce).Fixed(2, timeNs).Bytes(3, cookie).Text(4, Link.Device.Short(name)));
         }
 
-        public static byte[] Pair(byte[] nonce, byte[] value, string name)
+        public static byte[] Pair(byte[] nonce, byte[] value, string name, byte[] cookie, bool isByCode)
         {
             return Of(Body.Pair, new ProtoWriter()
-                .Bytes(1, nonce).Bytes(2, value).Text(3, Link.Device.Short(name)));
+                .Bytes(1, nonce).Bytes(2, value).Text(3, Link.Device.Short(name)).Bytes(4, cookie).Flag(5, isByCode));
         }
 
         public static byte[] Device(Device device, string shownWearer, string shownRig)

@@ -9,10 +9,10 @@ using System.Text;
 namespace Handcal.Link
 {
     /// <summary>
-    /// Agreement on a pairing key by the 8 digits that the PC shows; protocol.md, "Pairing by
-    /// digits". It takes some tenths of a second: call it from a thread of its own.
+    /// Agreement on a pairing key by the QR code or the 8 digits that the PC shows; protocol.md,
+    /// "Pairing". It takes some tenths of a second: call it from a thread of its own.
     /// </summary>
-    public sealed class Digits
+    public sealed class Exchange
     {
         const int Count = 8, ValueBytes = 256, GeneratorBytes = 272, SecretBytes = 32, KeyBytes = 24, ProofBytes = 16;
         const int ResendMs = 200;
@@ -30,39 +30,55 @@ namespace Handcal.Link
         static readonly byte[] ToPc = Encoding.ASCII.GetBytes("handcal pair to pc");
         static readonly byte[] ToHeadset = Encoding.ASCII.GetBytes("handcal pair to headset");
 
+        readonly bool isByCode;
         readonly ulong device;
         readonly byte[] attempt;  // identity and nonce
         readonly byte[] nonce, value;
         readonly BigInteger secret;
+        byte[] cookie = new byte[0];
 
-        internal Digits(string digits, ulong device, byte[] nonce, byte[] secretBytes)
+        internal Exchange(string code, bool isByCode, ulong device, byte[] nonce, byte[] secretBytes)
         {
+            this.isByCode = isByCode;
             this.device = device;
             this.nonce = nonce;
             attempt = Keys.Join(Keys.BigEndian(device), nonce);
             secret = FromBigEndian(secretBytes);
             byte[] info = Keys.Join(Encoding.ASCII.GetBytes("generator"), attempt);
             BigInteger root = FromBigEndian(
-                Keys.Hkdf(Encoding.ASCII.GetBytes(digits), Salt, info, GeneratorBytes)) % Prime;
+                Keys.Hkdf(Encoding.ASCII.GetBytes(code), Salt, info, GeneratorBytes)) % Prime;
             value = ToBigEndian(BigInteger.ModPow(root, 2 * secret, Prime));
         }
 
         /// <summary>
-        /// Asks the PC for a pairing key; null, with the reason in `problem`, if there is none.
+        /// Asks the PC for a pairing key by its QR code; null, with the reason in `problem`, if there
+        /// is none.
         /// </summary>
-        public static byte[] Pair(
+        public static byte[] PairByCode(
+            Invitation invitation, ulong device, string name, double timeoutS, out string problem)
+        {
+            return Pair(invitation.Host, invitation.Port, invitation.Code, true, device, name, timeoutS, out problem);
+        }
+
+        /// <summary>The same by the digits that the PC shows.</summary>
+        public static byte[] PairByDigits(
             string host, int port, string text, ulong device, string name, double timeoutS, out string problem)
         {
             var digits = new StringBuilder();
             foreach (char one in text)
                 if (one >= '0' && one <= '9') digits.Append(one);
-            if (digits.Length != Count)
-            {
-                problem = "The code has 8 digits: read it again from the PC's screen.";
-                return null;
-            }
-            var exchange = new Digits(
-                digits.ToString(), device, Keys.RandomBytes(Keys.NonceBytes), Keys.RandomBytes(SecretBytes));
+            if (digits.Length == Count)
+                return Pair(host, port, digits.ToString(), false, device, name, timeoutS, out problem);
+            problem = "The code has 8 digits: read it again from the PC's screen.";
+            return null;
+        }
+
+        static byte[] Pair(
+            string host, int port, string code, bool isByCode, ulong device, string name, double timeoutS,
+            out string problem)
+        {
+            var exchange = new Exchange(
+                code, isByCode, device, Keys.RandomBytes(Keys.NonceBytes), Keys.RandomBytes(SecretBytes));
             try
             {
                 return exchange.Ask(host, port, name, timeoutS, out problem);
@@ -76,7 +92,7 @@ namespace Handcal.Link
 
         byte[] Ask(string host, int port, string name, double timeoutS, out string problem)
         {
-            byte[] request = Request(name), answer = new byte[2048];
+            var answer = new byte[2048];
             var clock = System.Diagnostics.Stopwatch.StartNew();
             using (Socket socket = HeadsetLink.Open(host, port))
             {
@@ -84,8 +100,9 @@ namespace Handcal.Link
                 {
                     try
                     {
-                        socket.Send(request);
-                        while (socket.Poll(1000 * ResendMs, SelectMode.SelectRead))
+                        byte[] asked = cookie;
+                        socket.Send(Request(name));
+                        while (asked == cookie && socket.Poll(1000 * ResendMs, SelectMode.SelectRead))
                         {
                             int size = socket.Receive(answer);
                             if (TryRead(answer, size, out byte[] key, out problem)) return key;
@@ -104,14 +121,14 @@ namespace Handcal.Link
 
         internal byte[] Request(string name)
         {
-            byte[] payload = Envelope.Pair(nonce, value, name);
+            byte[] payload = Envelope.Pair(nonce, value, name, cookie, isByCode);
             var datagram = new byte[Datagram.MaxBytes];
             var packet = new Packet { Sequence = device, FragmentCount = 1, Bytes = payload, Count = payload.Length };
             using (var mac = new HMACSHA256(ToPc)) Array.Resize(ref datagram, Datagram.Seal(mac, packet, datagram));
             return datagram;
         }
 
-        /// <summary>Reads an answer of the PC; true if it ends the attempt.</summary>
+        /// <summary>Reads an answer of the PC; true if it ends the attempt. A cookie is kept for the next request.</summary>
         internal bool TryRead(byte[] datagram, int size, out byte[] key, out string problem)
         {
             key = null;
@@ -120,7 +137,7 @@ namespace Handcal.Link
                 return false;
             using (var mac = new HMACSHA256(ToHeadset))
                 if (!Datagram.IsAuthentic(mac, datagram, size)) return false;
-            byte[] echo = new byte[0], pcValue = new byte[0], proof = new byte[0];
+            byte[] echo = new byte[0], pcValue = new byte[0], proof = new byte[0], newCookie = cookie;
             int body;
             try
             {
@@ -130,6 +147,7 @@ namespace Handcal.Link
                 while (message.Next(out int field))
                 {
                     if (field == 1) echo = message.Bytes();
+                    else if (field == 2 && body == (int)Body.Retry) newCookie = message.Bytes();
                     else if (field == 2 && body == (int)Body.Paired) pcValue = message.Bytes();
                     else if (field == 3 && body == (int)Body.Paired) proof = message.Bytes();
                 }
@@ -139,6 +157,7 @@ namespace Handcal.Link
                 return false;
             }
             if (!Keys.AreEqual(echo, nonce)) return false;
+            cookie = newCookie;
             if (body == (int)Body.Refused)
                 problem = "The PC takes no more codes after too many wrong ones: show a new one on the PC.";
             else if (body != (int)Body.Paired || !IsValue(pcValue)) return false;
@@ -150,7 +169,7 @@ namespace Handcal.Link
             return true;
         }
 
-        /// <summary>The pairing key, or null if the PC has other digits.</summary>
+        /// <summary>The pairing key, or null if the PC has another code.</summary>
         byte[] Agree(byte[] pcValue, byte[] proof)
         {
             byte[] shared = ToBigEndian(BigInteger.ModPow(FromBigEndian(pcValue), secret, Prime));

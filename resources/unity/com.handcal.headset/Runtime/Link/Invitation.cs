@@ -1,10 +1,9 @@
 using System;
-using System.Text;
 
 namespace Handcal.Link
 {
     /// <summary>
-    /// The PC's address and the pairing key, from the text of a QR code or as typed; protocol.md,
+    /// The PC's address and a one-time code, from the text of a QR code or as typed; protocol.md,
     /// "Pairing by QR code".
     /// </summary>
     public sealed class Invitation
@@ -13,13 +12,13 @@ namespace Handcal.Link
         const int CodeCharacters = 26, DefaultPort = 47800;
         public readonly string Host;
         public readonly int Port;
-        public readonly byte[] Key;
+        public readonly string Code;
 
-        Invitation(string host, int port, byte[] key)
+        Invitation(string host, int port, string code)
         {
             Host = host;
             Port = port;
-            Key = key;
+            Code = code;
         }
 
         /// <summary>Reads an invitation; false if the text is none.</summary>
@@ -35,7 +34,7 @@ namespace Handcal.Link
             bool isCode = code.Length == CodeCharacters;
             foreach (char one in code) isCode &= (one >= 'A' && one <= 'Z') || (one >= '2' && one <= '7');
             if (!isCode || !TrySplit(address, out string host, out int port)) return false;
-            invitation = new Invitation(host, port, Encoding.ASCII.GetBytes(code));
+            invitation = new Invitation(host, port, code);
             return true;
         }
 
