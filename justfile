@@ -38,6 +38,10 @@ translations:
 campaigns *arguments:
     nice python -m tests.campaigns {{arguments}}
 
+# break a copy of the program in 20 known ways, and see that something notices each; half an hour
+mutants *words:
+    nice python -m tests.mutants {{words}}
+
 # every figure of the documentation that a command measures: the benchmarks and both studies
 figures:
     handcal bench --json results/bench.json && handcal study noise && handcal study methods

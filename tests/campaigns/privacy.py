@@ -60,6 +60,8 @@ def _watch_one(name: str, words: list[str], wearer: str, folder: Path, tally: Ta
     )
     if run.returncode != 0:
         tally.fail(f"{name}: {run.stderr[-300:]}")
+    if wearer in run.stderr:
+        tally.fail(f"{name}: it printed the wearer's name")
     with trace.open(errors="replace") as lines:
         for line in lines:
             tally.seen["calls of the network"] += 1

@@ -101,3 +101,15 @@ def test_each_event_and_each_new_file_are_on_the_disk_when_they_are_done(
         assert synced[0] == (stored, stored.stat().st_size)
         assert [one for one, _ in synced[1:]] == [stored.parent, path]
         assert synced[-1][1] == path.stat().st_size
+
+
+def test_each_line_is_on_the_disk_before_it_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "journal.jsonl"
+    writer = begin(path)
+    synced: list[bytes] = []
+    monkeypatch.setattr(os, "fsync", lambda _: synced.append(path.read_bytes()))
+    line = journal_line(happens_now(2, "said", {}))
+    writer.append(line)
+    assert any(content.endswith(line) for content in synced)

@@ -1,3 +1,4 @@
+import logging
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
@@ -370,3 +371,11 @@ def test_a_file_that_was_replaced_is_no_longer_damaged(session: Session) -> None
         assert {one.file for one in again.contents.damaged} == {"results.json"}
         again.save_results({"a": 2})
         assert again.contents.damaged == ()
+
+
+def test_no_log_has_the_wearer_s_name(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.DEBUG)
+    with Session.create(tmp_path, example_rig(), {}, wearer="Zdenka Quorvath") as session:
+        session.save_notes("sits well")
+    Session.open(session.path)
+    assert "Zdenka" not in caplog.text
