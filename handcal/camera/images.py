@@ -35,9 +35,9 @@ def read_frame(
     Parameters
     ----------
     color : path
-        PNG or JPEG, 8 bits per channel.
+        PNG, JPEG, TIFF, BMP or PPM.
     depth : path
-        16-bit grey PNG of the same size; 0 where there is no measurement.
+        16-bit grey PNG, TIFF or PGM of the same size; 0 where there is no measurement.
     intrinsics : path
         JSON with ``width``, ``height``, ``fx``, ``fy``, ``cx``, ``cy`` in pixels and
         ``depth_scale`` in metres per unit of depth; ``distortion``, OpenCV's coefficients, if any.
@@ -164,7 +164,7 @@ def number_from(values: dict[str, Any], path: Path, key: str, low: float, high: 
 
 
 def read_depth(path: Path, camera: Intrinsics) -> UInt16:
-    """Read a depth image: a 16-bit grey PNG of the camera's size; FileError otherwise."""
+    """Read a depth image: 16-bit grey, of the camera's size; FileError otherwise."""
     image = read_image(path, cv2.IMREAD_UNCHANGED)
     if image.dtype != np.uint16 or image.ndim != 2:
         raise FileError(f"{path} must be a 16-bit image of one channel")
@@ -172,7 +172,7 @@ def read_depth(path: Path, camera: Intrinsics) -> UInt16:
 
 
 def read_color(path: Path, camera: Intrinsics) -> UInt8:
-    """Read a colour image as RGB: a PNG or JPEG of the camera's size; FileError otherwise."""
+    """Read a colour image as RGB, of the camera's size; FileError otherwise."""
     image = read_image(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
     return _of_size(image, path, camera)
 

@@ -123,7 +123,7 @@ def replay(arguments: argparse.Namespace) -> None:
 
 @command(
     file_option("--color", "colour image", required=True),
-    file_option("--depth", "16-bit PNG, aligned to the colour image", required=True),
+    file_option("--depth", "16-bit PNG, TIFF or PGM, aligned to the colour image", required=True),
     file_option(
         "--intrinsics",
         "JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit; or a file of "

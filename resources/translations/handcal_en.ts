@@ -6715,7 +6715,7 @@ the mean over its trials, and their numbers: 0 if all were of an earlier φ.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end in the same number, such as depth07.png and headset07.png.</source>
+        <source>Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both views, tilted by 20° to 45° in all directions. Give the two images of a pair the same name, or let them end in the same number, as depth07.png and headset07.png do.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -154,7 +154,7 @@ def test_a_board_without_a_file_is_misuse(
         (("board", "--png", "b.txt"), "b.txt must end in .png"),
         (("board", "--pdf", "b.png"), "b.png must end in .pdf"),
         (("board", "--pdf", "b.pdf", "--squares", "30", "30"), "too few for 30×30 squares"),
-        (("camera", "nowhere"), "no PNG or JPEG images"),
+        (("camera", "nowhere"), "no PNG, JPEG, TIFF, BMP or PGM images"),
         (
             ("camera", "{depth}", *CHECKERBOARD, "--drop", "x.png"),
             "there is no image x.png to drop",
