@@ -20,8 +20,8 @@ from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _HINT = tr(
     "Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both "
-    "views, tilted by 20° to 45° in all directions. Give the two images of a pair the same name, or let "
-    "them end in the same number, as depth07.png and headset07.png do."
+    "views, tilted by 20° to 45° in all directions. Give the two images of a pair the same name, "
+    "or let them end in the same number, as depth07.png and headset07.png do."
 ).format(ASKED_VIEWS)
 
 
