@@ -304,8 +304,8 @@ def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float6
 
 def _benefit_json(benefit: Benefit) -> dict[str, Any]:
     found = asdict(benefit)
-    depth = found.pop("depth")
-    return {"benefit": found, "depth": depth}
+    depth, at = found.pop("depth"), list(found.pop("by_distance"))
+    return {"benefit": found, "depth": depth, "by_distance": at}
 
 
 def _advice_json(advice: Advice | None) -> dict[str, Any] | None:

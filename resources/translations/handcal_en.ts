@@ -2983,6 +2983,14 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Range</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Expected error from 0.3 to 5 m</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>A line that ends level has converged.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -4561,7 +4569,27 @@ the mean over its trials, and their numbers: 0 if all were of an earlier φ.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Expected error in arcminutes; bars and brackets hold 95 %. Dashed: without the calibration. Only the eye&apos;s place is uncertain here: an error of the rig itself comes on top, and matters most far away.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error against distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance (m)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Expected error (′)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, without</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, with</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

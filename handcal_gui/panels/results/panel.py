@@ -17,6 +17,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.keys import add_action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
+from handcal_gui.panels.results.distance_tab import DistanceTab
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
@@ -49,7 +50,7 @@ _MARGINS_PX = 3 * SPACING_PX // 2
 
 
 class ResultsPanel(QWidget):
-    """Shows results in tabs: eyes, convergence, residuals, alignments, comparison.
+    """Shows results in tabs: eyes, convergence, residuals, alignments, distances, comparison.
 
     Attributes
     ----------
@@ -79,6 +80,7 @@ class ResultsPanel(QWidget):
         )
         self._another = QLabel()
         self._another.setWordWrap(True)
+        self._distances = DistanceTab()
         self._compare = CompareTab()
         self._compare.requested.connect(self.compare_requested)
         self._compare.cancelled.connect(self.compare_cancelled)
@@ -126,6 +128,7 @@ class ResultsPanel(QWidget):
         self._residuals.show_results(results, alignments)
         self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results))
         self._another.setText(another_text(results))
+        self._distances.show_results(results)
         self._compare.show_results(results)
         self._fit()
 
@@ -168,7 +171,7 @@ class ResultsPanel(QWidget):
             return ""
         rows = verdict_rows(self._results, self._judged)
         verdicts = rows_as_text((tr("Verdict"), tr("Reason")), rows)
-        tables = self._numbers, self._alignments, self._compare.table
+        tables = self._numbers, self._alignments, self._distances.table, self._compare.table
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 
     def _fit(self) -> None:
@@ -215,6 +218,8 @@ class ResultsPanel(QWidget):
         self._alone = self._alignments_tab()
         tabs.addTab(self._alone, tr("Single"))
         tabs.setTabToolTip(3, tr("φ of each alignment alone"))
+        tabs.addTab(self._distances, tr("Range"))
+        tabs.setTabToolTip(4, tr("Expected error from 0.3 to 5 m"))
         tabs.addTab(self._compare, tr("Compare"))
         self._stack = QStackedLayout(self)
         self._stack.addWidget(empty)
