@@ -37,7 +37,7 @@ BY_DISTANCE = (
     "Only the eye's place is uncertain here: an error of the rig itself, such as a focal length or "
     "a distance of the virtual screen that is wrong, comes on top, and matters most far away."
 )
-"""What the error against distance assumes."""
+"""The assumption of the error against distance."""
 _INTERVAL = (0.025, 0.975)
 _STEP_M = 1e-5
 

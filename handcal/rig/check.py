@@ -31,7 +31,7 @@ MAX_ID = 128
 _FOCAL_SIDES = 0.1, 10.0
 """Focal length by the side of the image: 157° and 6° across."""
 _AXIS_SHARES = 1 / 7, 6 / 7
-"""Where the axis meets the image; a size entered the wrong way round is beyond."""
+"""Range of the axis in the image, beyond which it is for a size entered the wrong way round."""
 _MOST_ASPECT = 1.5
 _FARTHEST_VIEW_M = 0.3
 _MOST_TURNED_DEG = 90.0

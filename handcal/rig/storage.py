@@ -16,7 +16,7 @@ from handcal.rig.check import require
 MAX_STORAGE_BYTES = 2**14
 
 _NESTS = re.compile(rb"[\[{<:]|-\s")
-"""What opens a level of nesting in YAML or XML; deeper indentation takes ever more bytes."""
+"""Openings of a level of nesting in YAML or XML; deeper indentation takes ever more bytes."""
 _DEEPEST = 12
 
 Value = TypeVar("Value")

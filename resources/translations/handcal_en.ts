@@ -2967,7 +2967,11 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Convergence of each registration</source>
+        <source>Plots</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error against distance, and convergence of each registration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -2980,14 +2984,6 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
     </message>
     <message>
         <source>φ of each alignment alone</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Range</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>Expected error from 0.3 to 5 m</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -131,14 +131,13 @@ def test_the_error_against_distance_of_one_axis_by_hand() -> None:
     found = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.array([0.01, 0.0, 0.0]), sigma_m**2)
     for one in found.by_distance:
         arcmin_per_m = 60 * np.degrees(abs(1 / one.distance_m - 1 / DISPLAY.z_C0_S_m))
-        tolerances = {"rel": 0.03, "abs": 1e-6}
         # Mean and quantiles of a folded normal distribution; then of one far from 0.
         after = one.after_arcmin, one.after_low_arcmin, one.after_high_arcmin
         folded = [1e-3 * arcmin_per_m * part for part in (np.sqrt(2 / np.pi), 0.0313, 2.2414)]
         assert after == pytest.approx(folded, rel=0.1 if one.distance_m < 2 else 0.03, abs=0.01)
         without = one.without_arcmin, one.without_low_arcmin, one.without_high_arcmin
         aside = [arcmin_per_m * part for part in (10e-3, 8.04e-3, 11.96e-3)]
-        assert without == pytest.approx(aside, **tolerances)
+        assert without == pytest.approx(aside, rel=0.03, abs=1e-6)
 
 
 def test_the_error_against_distance_is_the_expected_one_and_holds_95_percent() -> None:

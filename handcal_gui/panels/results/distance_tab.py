@@ -22,7 +22,7 @@ _MEANING = tr(
 )
 _SYMBOLS = {"left": "o", "right": "s"}
 _BESIDE = {"left": -0.01, "right": 0.01}
-"""Where the eyes' bars stand, so that they do not hide each other."""
+"""Distance of an eye's bars from their place, so that the eyes' do not hide each other."""
 
 
 class DistanceTab(QWidget):

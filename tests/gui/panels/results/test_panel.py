@@ -122,7 +122,7 @@ def test_without_alignments_no_tab_is_of_them(
     panel.show_results(replace(results, alignments={}), {})
     tabs = child(panel, QTabWidget)
     seen = [tabs.tabText(i) for i in range(tabs.count()) if tabs.isTabVisible(i)]
-    assert seen == ["Eyes", "Range", "Compare"]
+    assert seen == ["Eyes", "Plots", "Compare"]
 
 
 def test_a_low_panel_has_room_for_all_numbers(qtbot: QtBot, solved: ResultsPanel) -> None:
@@ -250,6 +250,7 @@ def test_lines_that_end_together_share_one_name(solved: ResultsPanel, results: R
 def test_the_names_of_lines_fit_into_the_plot(solved: ResultsPanel, width_px: int) -> None:
     solved.resize(width_px, 320)
     child(solved, QTabWidget).setCurrentIndex(1)
+    child(solved, QComboBox, "plots-choice").setCurrentIndex(1)
     QApplication.processEvents()
     item = child(solved, ConvergencePlot).item
     frame = item.vb.mapRectToScene(item.vb.boundingRect())
