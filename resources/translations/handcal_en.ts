@@ -3907,7 +3907,7 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)</source>
+        <source>Intrinsics (*.yaml *.yml *.xml *.json)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6321,7 +6321,7 @@ the mean over its trials, and their numbers: 0 if all were of an earlier φ.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>OpenCV FileStorage, ROS camera_info or handcal JSON.</source>
+        <source>As OpenCV, ROS, Kalibr, RealSense, Open3D, Azure Kinect or handcal write them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

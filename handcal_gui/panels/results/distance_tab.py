@@ -37,7 +37,7 @@ class DistanceTab(QWidget):
             tr("Expected error (′)"),
         )
         self.plot.show_legend()
-        ticks = [(float(np.log10(one)), f"{one:g}") for one in DISTANCES_M]
+        ticks = [(float(np.log10(one)), f"{one:g}") for one in DISTANCES_M if one not in (0.4, 0.6)]
         self.plot.item.getAxis("bottom").setTicks([ticks])
         self.table = NumberTable("error-by-distance-table", tr("Error against distance"))
         meaning = paragraph("", _MEANING)

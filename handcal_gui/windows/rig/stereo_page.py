@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
 from handcal.rig.boards.views import ASKED_VIEWS
+from handcal.rig.formats import read_intrinsics, read_pose
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
@@ -30,7 +31,11 @@ class StereoPage(StepPage):
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         imager = PathField(
-            tr("Depth imager's intrinsics"), "file", INTRINSICS_FILES, tr("Not needed")
+            tr("Depth imager's intrinsics"),
+            "file",
+            INTRINSICS_FILES,
+            tr("Not needed"),
+            read=read_intrinsics,
         )
         imager.setToolTip(
             tr(
@@ -43,6 +48,7 @@ class StereoPage(StepPage):
             "file",
             tr("Poses (*.yaml *.yml *.json)"),
             tr("Not needed"),
+            read=read_pose,
         )
         pose.setToolTip(imager.toolTip())
         form = EntriesForm(
