@@ -306,5 +306,8 @@ def _write(
     if arguments.format == "json":
         write_json(arguments.output, result)
     else:
-        in_another(arguments.output)
+        try:
+            in_another(arguments.output)
+        except ValueError as error:
+            raise HandcalError(str(error)) from error
     console.print(str(arguments.output), markup=False)

@@ -50,6 +50,7 @@ _NAMES = {
     "cx": "cx|ppx",
     "cy": "cy|ppy",
 }
+_GROUPS = "projectionparameters|distortionparameters"
 _SIDES = "left|right|l|r|[0-9]"
 _FIELD = re.compile(
     f"(?P<before>left|right)?(?:{'|'.join(f'(?P<{n}>{p})' for n, p in _NAMES.items())})"
@@ -58,6 +59,7 @@ _FIELD = re.compile(
 _KINDS = (
     (rb"PK\x03\x04|\x93NUMPY", "a NumPy archive"),
     (rb"MATLAB 5", "a MATLAB file"),
+    (rb"# oST", "ROS's ost.txt: use the ost.yaml beside it"),
     (rb"# Camera list|\d+ [A-Z_]+ \d+ \d+( [-+.\de]+){3,}", "COLMAP's cameras.txt"),
     (rb"\x89PNG|\xff\xd8|BM|II\*\x00|MM\x00\*|P[2-6]\s", "an image"),
     (rb"\x80[\x02-\x05]", "a pickle of Python"),
@@ -137,12 +139,11 @@ def _camera(label: str, model: str, camera: Intrinsics) -> Camera:
 
 
 def _found(values: Mapping[str, Any], levels: int = _DEEPEST) -> Iterator[_Found]:
-    """Yield the cameras in maps and lists of fields; a size is also that of the parts."""
+    """Yield the cameras in maps and lists of fields; those beside a part are also the part's."""
     by_side: dict[str, dict[str, Any]] = {}
     parts: list[tuple[str, Mapping[str, Any]]] = []
-    for key, value in values.items():
-        simple = re.sub(r"[^a-z0-9]", "", re.sub(r"^camera\d?\.(?!type)", "", key.lower()))
-        match = _FIELD.fullmatch(simple)
+    for key, value in _level(values):
+        match = _FIELD.fullmatch(_simple(key))
         is_map = isinstance(value, dict) and "data" not in value
         if match and not is_map and value != "":
             name = next(one for one in _NAMES if match[one] is not None)
@@ -168,10 +169,23 @@ def _found(values: Mapping[str, Any], levels: int = _DEEPEST) -> Iterator[_Found
     if _is_camera(shared) and not sides:
         sides = {"": shared}
     yield from (_Found(side, fields) for side, fields in sides.items())
-    inherited = {key: shared[key] for key in ("width", "height", "size") if key in shared}
     for key, part in parts if levels and not sides else ():
-        for one in _found(inherited | dict(part), levels - 1):
-            yield _Found(one.name or key, one.fields)
+        for one in _found(part, levels - 1):
+            yield _Found(one.name or key, shared | dict(one.fields))
+
+
+def _level(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the fields, and in place of a map of intrinsics or of coefficients what it holds."""
+    for key, value in values.items():
+        is_group = re.fullmatch(f"{_NAMES['K']}|{_NAMES['D']}|{_GROUPS}", _simple(key))
+        if is_group and isinstance(value, dict) and not {"data", "ModelParameters"} & value.keys():
+            yield from value.items()
+        else:
+            yield key, value
+
+
+def _simple(key: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"^camera\d?\.(?!type)", "", key.lower()))
 
 
 def _is_camera(fields: Mapping[str, Any]) -> bool:
@@ -218,6 +232,7 @@ def _model(fields: Mapping[str, Any]) -> str:
     names = []
     for key in ("model", "camera_model"):
         name = str(fields.get(key, "")).lower().removeprefix("distortion.")
+        name = name.removeprefix("rs2_distortion_")
         name = re.sub(r"[-_\s]+", " ", name).strip()
         names.append(_SAME.get(name, name))
     known = (*_PINHOLE, *_FISHEYE, "pinhole")
