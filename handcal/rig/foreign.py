@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -71,17 +71,9 @@ _LOCATION = "CALIBRATION_CameraLocation"
 _DEEPEST = 6
 
 
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """The fields of one camera, by the names of `_NAMES`, and those that its parents hold."""
-
-    name: str
-    fields: Mapping[str, Any] = field(default_factory=dict)
-
-
 def cameras_in(values: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the cameras that a file's values hold; "" if it gives one no name."""
-    return tuple(one.name for one in _found(values))
+    return tuple(_found(values))
 
 
 def camera_in(
@@ -103,21 +95,17 @@ def camera_in(
         If there is none of that name, its size is missing, its lens model is not known, or a value
         is implausible.
     """
-    found = {one.name: one for one in _found(values)}
-    require(name is None or name in found, f"there is no camera {name}, but {_listed(found)}")
-    one = next(iter(found.values())) if name is None else found[str(name)]
-    fields, label = one.fields, one.name or "camera"
+    found = _found(values)
+    chosen = next(iter(found)) if name is None else name
+    require(chosen in found, f"there is no camera {name}, but {', '.join(found)}")
+    fields, label = found[chosen], chosen or "camera"
     width, height = _size({"size": size, **fields}, label)
     if "azure" in fields:
         return _azure(fields["azure"], width, height, label)
     model = _model(fields)
     fx, fy, cx, cy = _pinhole(fields, label)
-    coefficients = tuple(
-        array_of(fields.get("D", _numbered(fields)), f"{label}: distortion").tolist()
-    )
-    if not any(coefficients) and model == "pinhole":
-        coefficients = ()
-    return _camera(label, model, Intrinsics(width, height, fx, fy, cx, cy, coefficients))
+    given = array_of(fields.get("D", _numbered(fields, model)), f"{label}: distortion")
+    return _camera(label, model, Intrinsics(width, height, fx, fy, cx, cy, tuple(given.tolist())))
 
 
 def no_camera(data: bytes) -> str:
@@ -138,8 +126,11 @@ def _camera(label: str, model: str, camera: Intrinsics) -> Camera:
     return FisheyeIntrinsics(**asdict(camera)) if model in _FISHEYE else camera
 
 
-def _found(values: Mapping[str, Any], levels: int = _DEEPEST) -> Iterator[_Found]:
-    """Yield the cameras in maps and lists of fields; those beside a part are also the part's."""
+def _found(values: Mapping[str, Any], levels: int = _DEEPEST) -> dict[str, dict[str, Any]]:
+    """Return the fields of each camera in maps and lists, by the names of `_NAMES`.
+
+    Fields beside a part are also the part's.
+    """
     by_side: dict[str, dict[str, Any]] = {}
     parts: list[tuple[str, Mapping[str, Any]]] = []
     for key, value in _level(values):
@@ -148,7 +139,7 @@ def _found(values: Mapping[str, Any], levels: int = _DEEPEST) -> Iterator[_Found
         if match and not is_map and value != "":
             name = next(one for one in _NAMES if match[one] is not None)
             side = match["before"] or match["after"] or ""
-            is_one = np.size(_data(value)) == 1
+            is_one = _count(value) == 1
             if name == "K" and match["K"] == "k" and is_one:
                 name, side = f"k{side}", ""  # a coefficient
             if name in ("p1", "p2") and not is_one:
@@ -166,12 +157,13 @@ def _found(values: Mapping[str, Any], levels: int = _DEEPEST) -> Iterator[_Found
             ]
     shared = by_side.pop("", {})
     sides = {side: shared | own for side, own in by_side.items() if _is_camera(own)}
-    if _is_camera(shared) and not sides:
-        sides = {"": shared}
-    yield from (_Found(side, fields) for side, fields in sides.items())
-    for key, part in parts if levels and not sides else ():
-        for one in _found(part, levels - 1):
-            yield _Found(one.name or key, shared | dict(one.fields))
+    if sides or _is_camera(shared):
+        return sides or {"": shared}
+    found = {}
+    for key, part in parts if levels else ():
+        for name, fields in _found(part, levels - 1).items():
+            found[name or key] = shared | fields
+    return found
 
 
 def _level(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -189,7 +181,7 @@ def _simple(key: str) -> str:
 
 
 def _is_camera(fields: Mapping[str, Any]) -> bool:
-    has_numbers = np.size(_data(fields.get("K"))) >= 4
+    has_numbers = _count(fields.get("K")) >= 4
     return has_numbers or "azure" in fields or {"fx", "cx"} <= fields.keys()
 
 
@@ -235,9 +227,11 @@ def _model(fields: Mapping[str, Any]) -> str:
         name = name.removeprefix("rs2_distortion_")
         name = re.sub(r"[-_\s]+", " ", name).strip()
         names.append(_SAME.get(name, name))
-    known = (*_PINHOLE, *_FISHEYE, "pinhole")
     for name in names:
-        require(name in known, f"the lens model {name} is not known; {', '.join(known[:-1])} are")
+        require(
+            name in (*_PINHOLE, *_FISHEYE, "pinhole"),
+            f"the lens model {name} is not known; OpenCV's radial-tangential and equidistant are",
+        )
     return next((name for name in names if name != "pinhole"), "pinhole")
 
 
@@ -259,19 +253,23 @@ def _azure(values: Mapping[str, Any], width: int, height: int, label: str) -> Ca
     return _camera(label, "pinhole", Intrinsics(*size, (k1, k2, p1, p2, k3, k4, k5, k6)))
 
 
-def _numbered(fields: Mapping[str, Any]) -> list[Any]:
-    """Return coefficients given one by one; empty without any."""
-    given = [fields.get(key, 0.0) for key in ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")]
-    has_more = any(key in fields for key in ("k4", "k5", "k6"))
-    is_fisheye = has_more and not any(key in fields for key in ("p1", "p2"))
-    if is_fisheye:
-        return [fields.get(key, 0.0) for key in ("k1", "k2", "k3", "k4")]
-    return given[: 8 if has_more else 5] if any(key in fields for key in ("k1", "k2")) else []
+def _numbered(fields: Mapping[str, Any], model: str) -> list[Any]:
+    """Return coefficients given one by one, in OpenCV's order; empty without any."""
+    names: tuple[str, ...] = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+    if model in _FISHEYE:
+        names = ("k1", "k2", "k3", "k4")
+    elif not fields.keys() & set(names[5:]):
+        names = names[:5]
+    return [fields.get(one, 0.0) for one in names] if fields.keys() & set(names) else []
 
 
 def _data(value: Any) -> Any:
     """Return the numbers of a matrix, which OpenCV and ROS write as rows, cols and data."""
     return value.get("data") if isinstance(value, dict) else value
+
+
+def _count(value: Any) -> int:
+    return int(np.array(_data(value), dtype=object).size)
 
 
 def array_of(value: Any, name: str) -> Float64:
@@ -286,7 +284,3 @@ def array_of(value: Any, name: str) -> Float64:
     is_number = (isinstance(one, int | float) and not isinstance(one, bool) for one in flat)
     require(all(is_number) and bool(np.isfinite(flat).all()), f"{name} must be finite numbers")
     return np.array(flat, np.float64)
-
-
-def _listed(names: Mapping[str, object]) -> str:
-    return ", ".join(name or "one without a name" for name in names)

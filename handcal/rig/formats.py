@@ -44,7 +44,7 @@ _LOG = logging.getLogger(__name__)
 Value = TypeVar("Value")
 
 
-def read_intrinsics(path: Path, name: str | None = None) -> Intrinsics:
+def read_intrinsics(path: Path) -> Intrinsics:
     """Read a pinhole camera's intrinsics, like `read_camera`.
 
     Raises
@@ -53,7 +53,7 @@ def read_intrinsics(path: Path, name: str | None = None) -> Intrinsics:
         As `read_camera`, or if it is a fisheye.
     """
     try:
-        return as_pinhole(read_camera(path, name), "the camera")
+        return as_pinhole(read_camera(path), "the camera")
     except FileError:
         raise
     except HandcalError as error:
@@ -68,7 +68,7 @@ def read_camera(path: Path, name: str | None = None, size: tuple[int, int] | Non
     path : Path
         Recognised by its content.
     name : str, optional
-        Which of its cameras (`camera_names`); by default the first.
+        Which of its cameras; by default the first, with a warning if there are others.
     size : (width, height), optional
         Of the images, in pixels, where the file does not say it.
 

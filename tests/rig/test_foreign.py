@@ -111,10 +111,10 @@ SIZE = {"image_width": 640, "image_height": 480}
 @pytest.mark.parametrize(
     ("values", "camera"),
     [
-        ({"size": [640, 480], "mtx": K, "dist": [[0, 0, 0, 0, 0]]}, PLAIN),
+        ({"size": [640, 480], "mtx": K, "dist": []}, PLAIN),
         ({"imageSize": [640, 480], "intrinsics": np.transpose(K).ravel().tolist()}, PLAIN),
         ({"depth": {"width": 640, "height": 480, "fx": 500, "fy": 501, "ppx": 320, "ppy": 240,
-                    "model": "distortion.none", "coeffs": [0.0] * 5}}, PLAIN),
+                    "model": "distortion.none", "coeffs": []}}, PLAIN),
         (SIZE | {"right": {"camera_matrix": K}, "left": {"camera_matrix": K}}, PLAIN),
         (SIZE | {"camera_matrix_left": K, "dist_coeffs_left": [0.1, 0.2, 0, 0, 0]},
          Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
@@ -131,6 +131,9 @@ SIZE = {"image_width": 640, "image_height": 480}
         ({"intrinsics": {"color": {"width": 640, "height": 480, "fx": 500, "fy": 501, "ppx": 320,
           "ppy": 240, "model": "RS2_DISTORTION_BROWN_CONRADY", "coeffs": [0.1, 0.2, 0, 0, 0]}}},
          Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
+        (SIZE | {"model": "fisheye", "fx": 500, "fy": 501, "cx": 320, "cy": 240, "k1": 0.1,
+                 "k4": 0.4},
+         FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.0, 0.0, 0.4))),
         (SIZE | {"K": K, "D": T265, "distortion_model": "equidistant", "P1": [[1.0] * 4] * 3},
          FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, T265)),
         ({"resolution": [640, 480], "camera_model": "pinhole", "distortion_model": "equidistant",
@@ -154,6 +157,8 @@ def test_names_of_fields_vary(tmp_path: Path, values: dict[str, object], camera:
         (SIZE | {"K": [500, 0, 0, 501, 3]}, "3×3"),
         (SIZE | {"K": [["a"] * 3] * 3}, "finite numbers"),
         ({"size": 640, "K": K}, "not the size of the images"),
+        (SIZE | {"K": [[500, 0], [1]]}, "no camera"),
+        (SIZE | {"K": K, "D": [[0.1], [1, 2]]}, "distortion must be finite numbers"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named(tmp_path: Path, values: dict[str, object], said: str) -> None:

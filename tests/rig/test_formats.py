@@ -139,7 +139,7 @@ def test_a_whole_calibration_survives(tmp_path: Path) -> None:
         ("%YAML 1.2\n---\n" + "[" * 4000, "not valid YAML or XML"),
         ("%YAML 1.2\n---\na: " + "[" * MAX_STORAGE_BYTES, "nested too deeply"),
         ("\x00", "map|YAML"),
-        (ROS.replace("plumb_bob", "omni"), "lens model omni is not known; plumb bob"),
+        (ROS.replace("plumb_bob", "omni"), "lens model omni is not known; OpenCV"),
         (ROS.replace("rows: 3", "rows: 1000000000"), "camera matrix must have rows times cols"),
         (ROS.replace("cols: 5", "cols: 4"), "distortion must have rows times cols"),
         (ROS.replace("[500, 0,", "[500, 1,"), "no skew"),
