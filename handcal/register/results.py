@@ -304,8 +304,9 @@ def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float6
 
 def _benefit_json(benefit: Benefit) -> dict[str, Any]:
     found = asdict(benefit)
-    depth, at = found.pop("depth"), list(found.pop("by_distance"))
-    return {"benefit": found, "depth": depth, "by_distance": at}
+    depth = found.pop("depth")
+    del found["by_distance"]  # follows from the covariance; journals hold many results
+    return {"benefit": found, "depth": depth}
 
 
 def _advice_json(advice: Advice | None) -> dict[str, Any] | None:

@@ -52,7 +52,7 @@ def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None
         "stop_reason",
     }  # fmt: skip
     for eye in EYES:
-        judged = {"verdict", "reason", "benefit", "depth", "by_distance", "advice"}
+        judged = {"verdict", "reason", "benefit", "depth", "advice"}
         assert set(data["eyes"][eye]) == solved | judged
         assert data["eyes"][eye]["depth"] == asdict(results.benefits[eye].depth)
         assert data["eyes"][eye]["shift_m"] == results.eyes[eye].shift_m.tolist()
