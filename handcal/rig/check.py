@@ -46,7 +46,7 @@ def check_rig(rig: Rig) -> None:
     check_intrinsics("depth_camera", rig.depth_intrinsics)
     check_identity("depth_camera", rig.depth_camera)
     if rig.headset is not None:
-        _check_headset(rig.headset)
+        check_headset(rig.headset)
     if rig.depth_check is not None:
         _check_depth_check(rig.depth_check)
     if rig.depth_edges is not None:
@@ -176,7 +176,8 @@ def _check_origin(name: str, origin: Origin) -> None:
     _check_covariance(f"{name}.covariance", origin.covariance)
 
 
-def _check_headset(headset: HeadsetIdentity) -> None:
+def check_headset(headset: HeadsetIdentity) -> None:
+    """Raise ValueError, naming the field and what is expected, if a report is implausible."""
     require(
         0 < len(headset.device_id) <= MAX_ID and set(headset.device_id) <= set(hexdigits),
         f"headset.device_id must be 1 to {MAX_ID} hexadecimal digits",
