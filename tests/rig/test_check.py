@@ -70,6 +70,7 @@ LEFT_HANDED = np.diag([1.0, 1.0, -1.0, 1.0])
         (lambda: with_depth_camera(fx=np.nan), "depth_camera: fx is nan"),
         (lambda: with_depth_camera(fx=10.05), "depth_camera: fx is 10.05 px, but must lie between"),
         (lambda: with_depth_camera(fy=600.0), "fx is 1005 px and fy 600 px, but pixels are about"),
+        (lambda: with_depth_camera(fx=600.0), "fx is 600 px and fy 1005 px, but pixels are about"),
         (lambda: with_depth_camera(cx=0.0), "depth_camera: cx is 0 px, but must lie near the mid"),
         (lambda: with_depth_camera(width=720, height=1280), "cx is 639.5 .* another size of image"),
         (lambda: with_display(K=edited(LEFT.K, 0, 0, 24.56)), "left.K: fx is 24.56 px"),
