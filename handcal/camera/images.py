@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from handcal.core.errors import FileError
 from handcal.core.types import Frame, Intrinsics, UInt8, UInt16
-from handcal.io.files import make_folder, read_json, write_atomic, write_json
+from handcal.io.files import make_folder, write_atomic, write_json
 from handcal.io.images import MAX_SIDE_PX, read_image, write_png
+from handcal.rig.formats import read_fields, read_intrinsics
 
 DEPTH_SCALES_M = 1e-6, 0.1
 """Least and largest plausible depth scale, metres per unit."""
@@ -24,19 +25,25 @@ DISTORTION_COUNTS = 0, 4, 5, 8, 12, 14
 
 
 def read_frame(
-    color: str | PathLike[str], depth: str | PathLike[str], intrinsics: str | PathLike[str]
+    color: str | PathLike[str],
+    depth: str | PathLike[str],
+    intrinsics: str | PathLike[str],
+    depth_scale_m: float | None = None,
 ) -> Frame:
     """Read one frame whose depth is aligned to colour.
 
     Parameters
     ----------
     color : path
-        PNG or JPEG, 8 bits per channel.
+        PNG, JPEG, TIFF, BMP or PPM.
     depth : path
-        16-bit grey PNG of the same size; 0 where there is no measurement.
+        16-bit grey PNG, TIFF or PGM of the same size; 0 where there is no measurement.
     intrinsics : path
         JSON with ``width``, ``height``, ``fx``, ``fy``, ``cx``, ``cy`` in pixels and
         ``depth_scale`` in metres per unit of depth; ``distortion``, OpenCV's coefficients, if any.
+        Or a file of another program, as `handcal.rig.formats.read_camera` reads it.
+    depth_scale_m : float, optional
+        In place of the file's ``depth_scale``.
 
     Returns
     -------
@@ -64,8 +71,14 @@ def read_frame(
     ((720, 1280), dtype('uint16'), (720, 1280, 3))
     """
     color, depth, intrinsics = Path(color), Path(depth), Path(intrinsics)
-    values = read_json(intrinsics)
-    camera = intrinsics_from(values, intrinsics)
+    camera, values = read_intrinsics(intrinsics), read_fields(intrinsics)
+    if depth_scale_m is not None:
+        values["depth_scale"] = depth_scale_m
+    if "depth_scale" not in values:
+        raise FileError(
+            f"{intrinsics} must give depth_scale, in metres per unit of depth; or use "
+            "--depth-scale: 0.001 for millimetres"
+        )
     depth_scale_m = number_from(values, intrinsics, "depth_scale", *DEPTH_SCALES_M)
     depth_image = read_depth(depth, camera)
     color_image = read_color(color, camera)
@@ -151,7 +164,7 @@ def number_from(values: dict[str, Any], path: Path, key: str, low: float, high: 
 
 
 def read_depth(path: Path, camera: Intrinsics) -> UInt16:
-    """Read a depth image: a 16-bit grey PNG of the camera's size; FileError otherwise."""
+    """Read a depth image: 16-bit grey, of the camera's size; FileError otherwise."""
     image = read_image(path, cv2.IMREAD_UNCHANGED)
     if image.dtype != np.uint16 or image.ndim != 2:
         raise FileError(f"{path} must be a 16-bit image of one channel")
@@ -159,7 +172,7 @@ def read_depth(path: Path, camera: Intrinsics) -> UInt16:
 
 
 def read_color(path: Path, camera: Intrinsics) -> UInt8:
-    """Read a colour image as RGB: a PNG or JPEG of the camera's size; FileError otherwise."""
+    """Read a colour image as RGB, of the camera's size; FileError otherwise."""
     image = read_image(path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
     return _of_size(image, path, camera)
 

@@ -15,7 +15,7 @@ from handcal.camera.playback import PlaybackSettings
 from handcal.core.errors import CameraEndError, CameraError, FileError
 from handcal.core.types import UInt8
 from handcal.io.closable import Closable
-from handcal.io.images import IMAGE_SUFFIXES, MAX_SIDE_PX, read_image
+from handcal.io.images import IMAGE_KINDS, IMAGE_SUFFIXES, MAX_SIDE_PX, read_image
 
 _BACKENDS = {"linux": cv2.CAP_V4L2, "win32": cv2.CAP_DSHOW, "darwin": cv2.CAP_AVFOUNDATION}
 _MOST_CAMERAS = 10
@@ -64,7 +64,7 @@ def open_viewpoint(
     ----------
     source : int or Path
         A camera's number in the operating system (V4L2, DirectShow, AVFoundation), a folder of
-        PNG and JPEG images, in order of their names, or a video file.
+        images, in order of their names, or a video file.
     size_px : (int, int), optional
         Width and height requested from a camera, which may deliver others.
     playback : PlaybackSettings, optional
@@ -98,7 +98,7 @@ class _Images(ViewpointCamera):
         except OSError as error:
             raise CameraError(f"cannot read {folder}: {error.strerror or error}") from error
         if not paths:
-            raise CameraError(f"{folder} holds no PNG or JPEG image")
+            raise CameraError(f"{folder} holds no {IMAGE_KINDS} image")
         self._paths = sorted(paths, reverse=True)
         self._remaining: list[Path] | None = [*self._paths]
         self._playback = playback

@@ -7,6 +7,7 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+from handcal.camera.images import DEPTH_SCALES_M
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
@@ -122,11 +123,18 @@ def replay(arguments: argparse.Namespace) -> None:
 
 @command(
     file_option("--color", "colour image", required=True),
-    file_option("--depth", "16-bit PNG, aligned to the colour image", required=True),
+    file_option("--depth", "16-bit PNG, TIFF or PGM, aligned to the colour image", required=True),
     file_option(
         "--intrinsics",
-        "JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit",
+        "JSON with width, height, fx, fy, cx, cy, and depth_scale in metres per unit; or a file of "
+        "another program",
         required=True,
+    ),
+    value(
+        "--depth-scale",
+        number(float, *DEPTH_SCALES_M),
+        "M",
+        "metres per unit of depth (default: as the file of intrinsics says)",
     ),
     folder_option("--output", "folder for the results", required=True),
     _ROI,
@@ -138,7 +146,9 @@ def segment(arguments: argparse.Namespace) -> None:
     from handcal.hand.settings import SegmentSettings
     from handcal.hand.shipped import make_finder
 
-    frame = read_frame(arguments.color, arguments.depth, arguments.intrinsics)
+    frame = read_frame(
+        arguments.color, arguments.depth, arguments.intrinsics, arguments.depth_scale
+    )
     cloud = make_finder(SegmentSettings(roi=arguments.roi)).find(frame)
     write_segmentation(cloud, frame, make_folder(arguments.output))
     console.print(

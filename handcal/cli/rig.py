@@ -25,7 +25,7 @@ from handcal.cli.boards import (
 from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
 from handcal.cli.output import console, show_progress, until_interrupted
 from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
-from handcal.core.errors import FileError, HandcalError
+from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder, write_json
 from handcal.rig.boards.print_page import PAPERS
 from handcal.rig.boards.views import MAX_VIEWS
@@ -260,29 +260,32 @@ def stereo(arguments: argparse.Namespace) -> None:
 
 
 @command(
-    arg("input", type=Path, help="file in any of the formats"),
+    arg("input", type=Path, help="file by OpenCV, ROS, Kalibr, RealSense, Open3D or Azure Kinect"),
     arg("output", type=Path, help="file to write"),
     arg("--format", choices=CALIBRATION_FORMATS, required=True, help="format of the output"),
+    arg("--camera", metavar="NAME", help="which camera of the file (default: the first)"),
+    arg(
+        "--size",
+        type=int,
+        nargs=2,
+        metavar=("WIDTH", "HEIGHT"),
+        help="size of the images in pixels, where the file does not say it",
+    ),
 )
 def convert(arguments: argparse.Namespace) -> None:
     """Convert intrinsics or a stereo pose between the files of OpenCV, ROS and handcal."""
-    from handcal.rig.formats import read_intrinsics, read_pose, write_intrinsics, write_pose
+    from handcal.rig.formats import has_pose, read_camera, read_pose, write_intrinsics, write_pose
 
     make_folder(arguments.output.parent)
+    source, output, kind = arguments.input, arguments.output, arguments.format
     try:
-        try:
-            intrinsics = read_intrinsics(arguments.input)
-        except FileError as no_camera:
-            try:
-                pose = read_pose(arguments.input)
-            except FileError:
-                raise no_camera from None
-            write_pose(arguments.output, pose, arguments.format)
+        if has_pose(source):
+            write_pose(output, read_pose(source), kind)
         else:
-            write_intrinsics(arguments.output, intrinsics, arguments.format)
+            write_intrinsics(output, read_camera(source, arguments.camera, arguments.size), kind)
     except ValueError as error:
         raise HandcalError(str(error)) from error
-    console.print(str(arguments.output), markup=False)
+    console.print(str(output), markup=False)
 
 
 def _conclude(rms_px: float, worst: WorstView, verdict: CalibrationVerdict) -> None:
@@ -303,5 +306,8 @@ def _write(
     if arguments.format == "json":
         write_json(arguments.output, result)
     else:
-        in_another(arguments.output)
+        try:
+            in_another(arguments.output)
+        except ValueError as error:
+            raise HandcalError(str(error)) from error
     console.print(str(arguments.output), markup=False)

@@ -128,6 +128,7 @@ def _solution(
             "covariance_m2": outcome.results.eyes[eye].covariance_m2.tolist(),
             "verdict": verdict.name,
             "reason": verdict.reason,
+            "by_distance": [asdict(one) for one in outcome.results.benefits[eye].by_distance],
         }
     return found | {
         "opencv": {"P": projection.P.tolist()},

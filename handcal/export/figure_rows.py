@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
@@ -24,6 +25,13 @@ def convergence_rows(results: Results) -> Iterator[FigureRow]:
                     "iteration": iteration,
                     "rms_mm": 1e3 * float(rms_m),
                 }
+
+
+def distance_rows(results: Results) -> Iterator[FigureRow]:
+    """Yield a row for every eye and distance of the error against distance."""
+    for eye, benefit in results.benefits.items():
+        for one in benefit.by_distance:
+            yield {"eye": eye, **asdict(one)}
 
 
 def residual_rows(number: int, cells: Mapping[Eye, ResidualCells]) -> Iterator[FigureRow]:

@@ -21,6 +21,7 @@ from handcal.core.display import eye_projection
 from handcal.core.geometry import project, transform
 from handcal.core.types import EYES, Alignment, Eye, EyeDisplay, EyeShift, Float64
 from handcal.export.outcome import SessionOutcome
+from handcal.register.benefit import DISTANCES_M
 from handcal.register.results import Results
 from handcal.session.trial import Trial
 
@@ -52,6 +53,24 @@ def draw_convergence(axes: Sequence[Axes], results: Results) -> None:
         name_axes(ax, f"{eye} eye", "iteration", "RMS pair distance, mm")
         if 0 < len(ax.lines) <= 8:
             ax.legend(title="alignment", fontsize=6.5, title_fontsize=6.5, frameon=False)
+
+
+def draw_distances(axes: Sequence[Axes], results: Results) -> None:
+    """Draw each eye's error against distance, without the calibration (grey) and with it."""
+    for ax, eye in zip(axes, EYES, strict=True):
+        for name, color in (("without", "0.5"), ("after", COLORS[eye])):
+            at = results.benefits[eye].by_distance if eye in results.benefits else ()
+            x = [one.distance_m for one in at]
+            error, low, high = (
+                [getattr(one, f"{name}{end}_arcmin") for one in at] for end in ("", "_low", "_high")
+            )
+            ax.plot(x, error, f"{MARKERS[eye]}-", color=color, markersize=3, linewidth=1.0)
+            ax.fill_between(x, low, high, color=color, alpha=0.2, lw=0)
+        ax.set_xscale("log")
+        ax.set_xticks(DISTANCES_M, [f"{one:g}" for one in DISTANCES_M])
+        ax.minorticks_off()
+        ax.set_ylim(bottom=0.0)
+        name_axes(ax, f"{eye} eye", "distance, m", "expected error, arcmin")
 
 
 def draw_shifts(axes: Sequence[Axes], outcome: SessionOutcome, results: Results) -> None:

@@ -13,6 +13,7 @@ from handcal.export import figures
 from handcal.export.definitions import DEFINITIONS
 from handcal.export.figure_rows import (
     convergence_rows,
+    distance_rows,
     overlay_rows,
     residual_rows,
 )
@@ -24,6 +25,7 @@ from handcal.export.trial_sections import (
     trials_section,
     user_test_section,
 )
+from handcal.register.benefit import BY_DISTANCE
 from handcal.register.results import Results
 from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
@@ -61,6 +63,7 @@ def _sections(outcome: SessionOutcome) -> Iterator[Section]:
     yield _shifts(outcome)
     if results is not None:
         yield _solution(results)
+        yield _distances(results)
     if results is not None and results.alignments:
         yield _alignments(outcome, results)
         yield _shift_plots(outcome, results)
@@ -195,6 +198,32 @@ def _solution(results: Results) -> Section:
     if results.eye_distance_m is not None:
         items.append(f"Implied eye distance: {1e3 * results.eye_distance_m:.1f} mm.")
     return Section("How it was solved", items)
+
+
+def _distances(results: Results) -> Section:
+    """Return the section with the error expected at other distances than those of the verdict."""
+    eyes = list(results.benefits)
+    table = Table(
+        [
+            Column("distance, m"),
+            *(Column(f"{eye}, {which}") for eye in eyes for which in ("without", "with")),
+        ],
+        [
+            [f"{at[0].distance_m:g}", *(text for one in at for text in one.texts)]
+            for at in zip(*(results.benefits[eye].by_distance for eye in eyes), strict=True)
+        ],
+        "Expected error, arcmin, without the calibration and with it, and the interval that holds "
+        f"95 %. {BY_DISTANCE}",
+    )
+    figure = Figure(
+        "distances",
+        "Grey: without the calibration; coloured: with it; shaded: 95 %.",
+        lambda axes: figures.draw_distances(axes, results),
+        list(distance_rows(results)),
+        height_mm=55.0,
+        columns=2,
+    )
+    return Section("Error against distance", [table, figure])
 
 
 def _reason(verdict: Verdict, shift: EyeShift) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from handcal.core.errors import FileError
 from handcal.core.types import UInt8
 from handcal.io.files import read_limited, require_suffix, write_atomic
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
+IMAGE_KINDS = "PNG, JPEG, TIFF, BMP or PGM"
 _MAX_FILE_BYTES = 64 * 2**20
 MAX_SIDE_PX = 8192
 _MAX_PIXELS = 16 * 2**20
@@ -25,17 +27,22 @@ _PIECE_BYTES = 2**20
 _HARMLESS_BYTES = 2**20
 """A shorter PNG cannot unpack to more than 1 GB, in about two seconds."""
 _JPEG = b"\xff\xd8"
+_TIFF = b"II*\x00", b"MM\x00*"
+_TIFF_SIDES = ((256, 322), (257, 323))
+"""Tags with width and height of the image, and of its tiles, for which memory is taken, too."""
+_TIFF_CHANNELS, _MOST_CHANNELS = 277, 4
+_PNM = re.compile(rb"P[1-6](?:\s+(?:#[^\n]*\n\s*)*)(\d{1,9})(?:\s+(?:#[^\n]*\n\s*)*)(\d{1,9})\s")
 # Start-of-frame segments, which hold a JPEG's size; C4, C8 and CC among them are something else.
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 def read_image(path: Path, flags: int) -> NDArray[Any]:
-    """Read a PNG or JPEG as `cv2.imdecode` with `flags` does, its size checked before decoding.
+    """Read an image as `cv2.imdecode` with `flags` does, its size checked before decoding.
 
     Raises
     ------
     FileError
-        If it is missing, damaged, too large or neither PNG nor JPEG.
+        If it is missing, damaged, too large or none of `IMAGE_KINDS`.
     """
     data = read_limited(path, _MAX_FILE_BYTES)
     width, height = _image_size(data, path)
@@ -50,6 +57,25 @@ def read_image(path: Path, flags: int) -> NDArray[Any]:
     if image is None:
         raise FileError(f"{path} is damaged")
     return image
+
+
+def read_grey(path: Path) -> UInt8:
+    """Read an image as grey, as stored, also of 10 to 16 bits or of floats; raises `read_image`'s.
+
+    More than 8 bits are scaled to the brightest pixel: files do not say how many a camera has.
+    """
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+    image = read_image(path, flags)
+    if image.dtype == np.uint8:
+        return image
+    values = np.nan_to_num(image.astype(np.float32), posinf=0.0, neginf=0.0)
+    return np.asarray(np.clip(values * (255.0 / max(values.max(), 1e-9)), 0.0, 255.0), np.uint8)
+
+
+def image_named(folder: Path, name: str) -> Path:
+    """Return the image of a name in a folder, whatever its kind; of none, that of a PNG."""
+    paths = [folder / f"{name}{suffix}" for suffix in IMAGE_SUFFIXES]
+    return next((path for path in paths if path.exists()), paths[0])
 
 
 def write_png(path: Path, image: UInt8) -> None:
@@ -104,4 +130,34 @@ def _image_size(data: bytes, path: Path) -> tuple[int, int]:
             if data[at + 1] in _JPEG_FRAMES:
                 return int.from_bytes(data[at + 7 : at + 9]), int.from_bytes(data[at + 5 : at + 7])
             at += 2 + int.from_bytes(data[at + 2 : at + 4])
-    raise FileError(f"{path} is neither a PNG nor a JPEG image")
+    if data.startswith(b"BM") and len(data) >= 26:
+        ends = (20, 22) if data[14] == 12 else (22, 26)  # OS/2's header is shorter
+        width, height = (
+            int.from_bytes(data[start:end], "little", signed=end == 26)
+            for start, end in ((18, ends[0]), (ends[0], ends[1]))
+        )
+        return width, abs(height)  # negative: the upper row comes first
+    if match := _PNM.match(data[:4096]):
+        return int(match[1]), int(match[2])
+    if data[:4] in _TIFF:
+        return _tiff_size(data, path)
+    raise FileError(f"{path} is not a {IMAGE_KINDS} image")
+
+
+def _tiff_size(data: bytes, path: Path) -> tuple[int, int]:
+    """Return the size of a TIFF's first image, or of its tiles if they are larger."""
+
+    def number(at: int, size: int) -> int:
+        return int.from_bytes(data[at : at + size], "little" if data[0] == 0x49 else "big")
+
+    first = number(4, 4)
+    tags: dict[int, int] = {}
+    for at in range(first + 2, first + 2 + 12 * number(first, 2), 12):
+        value = number(at + 8, 2 if number(at + 2, 2) == 3 else 4)
+        tags[number(at, 2)] = max(tags.get(number(at, 2), 0), value)
+    if tags.get(_TIFF_CHANNELS, 1) > _MOST_CHANNELS:
+        raise FileError(f"{path} has {tags[_TIFF_CHANNELS]} channels, more than is allowed")
+    width, height = (max(tags.get(tag, 0) for tag in side) for side in _TIFF_SIDES)
+    if not width or not height:
+        raise FileError(f"{path} is damaged")
+    return width, height

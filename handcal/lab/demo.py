@@ -347,6 +347,7 @@ def _judge(
                 ],
                 "verified": _verified(calibration, eye),
                 "depth": asdict(results.benefits[eye].depth),
+                "by_distance": [asdict(one) for one in results.benefits[eye].by_distance],
                 "reprojection_arcmin": errors_arcmin((eye,)),
             }
             for eye, shift in results.eyes.items()

@@ -31,6 +31,14 @@ from handcal.core.types import EyeDisplay, EyeShift, Float64
 WORKING_DISTANCE_M = TARGET_DEPTHS_M[1]
 """Distance at which the error in depth is expected."""
 
+DISTANCES_M = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0, 5.0)
+"""Distances of the error against distance."""
+BY_DISTANCE = (
+    "Only the eye's place is uncertain here: an error of the rig itself, such as a focal length or "
+    "a distance of the virtual screen that is wrong, comes on top, and matters most far away."
+)
+"""The assumption of the error against distance."""
+_INTERVAL = (0.025, 0.975)
 _STEP_M = 1e-5
 
 # Direction numbers (9, 3) and shift (3,) of a scrambled Sobol sequence, in units of 2^-30.
@@ -66,6 +74,33 @@ class DepthBenefit:
 
 
 @dataclass(frozen=True, slots=True)
+class ErrorAt:
+    """The error of one eye at one distance, by what the alignments say about the wearer.
+
+    Only φ is uncertain: the display, the distance of its focal plane and the depth camera's pose
+    count as those of the rig. So nothing errs at the focal plane, wherever the eye is.
+    """
+
+    distance_m: float
+    without_arcmin: float
+    without_low_arcmin: float
+    without_high_arcmin: float
+    """Expected with the offline calibration, and the interval that holds it for 95 % of eyes."""
+    after_arcmin: float
+    after_low_arcmin: float
+    after_high_arcmin: float
+    """The same with the solved φ."""
+
+    @property
+    def texts(self) -> tuple[str, str]:
+        """Return the errors without the calibration and with it, each with its interval."""
+        low, high = self.without_low_arcmin, self.without_high_arcmin
+        without = f"{self.without_arcmin:.1f} ({low:.1f}–{high:.1f})"
+        low, high = self.after_low_arcmin, self.after_high_arcmin
+        return without, f"{self.after_arcmin:.1f} ({low:.1f}–{high:.1f})"
+
+
+@dataclass(frozen=True, slots=True)
 class Benefit:
     """The error of one eye without the calibration and with it."""
 
@@ -78,6 +113,8 @@ class Benefit:
     probability_better: float
     """Probability that the solved φ errs less than the offline calibration."""
     depth: DepthBenefit
+    by_distance: tuple[ErrorAt, ...]
+    """At `DISTANCES_M`."""
 
 
 def percent(probability: float) -> str:
@@ -133,7 +170,25 @@ def benefit(
             after_m=float(depth_after_m.mean()),
             probability_better=float((depth_after_m < depth_without_m).mean()),
         ),
+        by_distance=_by_distance(display, eyes_m, shift_m),
     )
+
+
+def _by_distance(display: EyeDisplay, eyes_m: Float64, shift_m: Float64) -> tuple[ErrorAt, ...]:
+    """Return the errors at `DISTANCES_M` for samples of the eye (N, 3) and the φ drawn with."""
+    found = []
+    for distance_m in DISTANCES_M:
+        without, after = (
+            _errors_arcmin(display, difference_m, (distance_m,))
+            for difference_m in (eyes_m, eyes_m - shift_m)
+        )
+        found.append(ErrorAt(distance_m, *_summary(without), *_summary(after)))
+    return tuple(found)
+
+
+def _summary(errors_arcmin: Float64) -> tuple[float, float, float]:
+    low, high = np.quantile(errors_arcmin, _INTERVAL).tolist()
+    return float(errors_arcmin.mean()), low, high
 
 
 def depth_error_m(display: EyeDisplay, difference_m: Float64) -> Float64:
@@ -189,16 +244,19 @@ def _standard_normal() -> Float64:
     return samples
 
 
-def _errors_arcmin(display: EyeDisplay, difference_m: Float64) -> Float64:
+def _errors_arcmin(
+    display: EyeDisplay, difference_m: Float64, depths_m: tuple[float, ...] = TARGET_DEPTHS_M
+) -> Float64:
     """Return the mean error over the corners (N,) for differences of φ (N, 3)."""
-    x_px, y_px = np.tensordot(_jacobian(display), difference_m.T, axes=1).transpose(1, 0, 2)
+    J = _jacobian(display, depths_m)
+    x_px, y_px = np.tensordot(J, difference_m.T, axes=1).transpose(1, 0, 2)
     return np.asarray(arcmin_from_px(display, np.hypot(x_px, y_px).mean(axis=0)))
 
 
-@lru_cache(maxsize=16)
-def _jacobian(display: EyeDisplay) -> Float64:
-    """Return the derivative (12, 2, 3) of the drawn corners with respect to φ, px/m."""
-    corners_m = np.concatenate([target_corners_m(depth_m) for depth_m in TARGET_DEPTHS_M])
+@lru_cache(maxsize=16 * (1 + len(DISTANCES_M)))
+def _jacobian(display: EyeDisplay, depths_m: tuple[float, ...]) -> Float64:
+    """Return the derivative (4 depths, 2, 3) of the drawn corners with respect to φ, px/m."""
+    corners_m = np.concatenate([target_corners_m(depth_m) for depth_m in depths_m])
 
     def drawn_px(shift_m: Float64) -> Float64:
         return project(eye_projection(display, shift_m), corners_m)

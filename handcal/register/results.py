@@ -305,6 +305,7 @@ def read_rendered_shift_m(results: Mapping[str, Any] | None) -> dict[Eye, Float6
 def _benefit_json(benefit: Benefit) -> dict[str, Any]:
     found = asdict(benefit)
     depth = found.pop("depth")
+    del found["by_distance"]  # follows from the covariance; journals hold many results
     return {"benefit": found, "depth": depth}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from dataclasses import asdict, astuple, fields
 from string import hexdigits
 
 import numpy as np
@@ -28,6 +28,13 @@ MAX_NAME, MAX_TEXT = 200, 500
 MAX_PARAMETERS = 12
 MAX_RANGES = 20
 MAX_ID = 128
+_FOCAL_SIDES = 0.1, 10.0
+"""Focal length by the side of the image: 157° and 6° across."""
+_AXIS_SHARES = 1 / 7, 6 / 7
+"""Range of the axis in the image, beyond which it is for a size entered the wrong way round."""
+_MOST_ASPECT = 1.5
+_FARTHEST_VIEW_M = 0.3
+_MOST_TURNED_DEG = 90.0
 
 
 def check_rig(rig: Rig) -> None:
@@ -39,7 +46,7 @@ def check_rig(rig: Rig) -> None:
     check_intrinsics("depth_camera", rig.depth_intrinsics)
     check_identity("depth_camera", rig.depth_camera)
     if rig.headset is not None:
-        _check_headset(rig.headset)
+        check_headset(rig.headset)
     if rig.depth_check is not None:
         _check_depth_check(rig.depth_check)
     if rig.depth_edges is not None:
@@ -54,8 +61,7 @@ def check_rig(rig: Rig) -> None:
 def check_intrinsics(name: str, intrinsics: Intrinsics) -> None:
     """Raise ValueError, naming the field of `name` and what is expected, if implausible."""
     _check_size(name, intrinsics.width, intrinsics.height)
-    fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy
-    _check_camera(name, np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]))
+    _check_optics(name, *astuple(intrinsics)[:6])
     require(
         len(intrinsics.distortion) in (0, 4, 5, 8, 12, 14)
         and bool(np.isfinite(intrinsics.distortion).all()),
@@ -90,6 +96,48 @@ def require(condition: bool, problem: str) -> None:
         raise ValueError(problem)
 
 
+def check_view(name: str, T_V_H: Float64) -> None:
+    """Raise ValueError, naming what is expected, unless it may be a rendering camera's pose."""
+    _check_rigid(name, T_V_H)
+    far_m = float(np.linalg.norm(T_V_H[:3, 3]))
+    require(
+        far_m < _FARTHEST_VIEW_M,
+        f"{name}: the rendering camera is {far_m:.3g} m from the headset's rig, but must be nearer "
+        f"than {_FARTHEST_VIEW_M:g} m",
+    )
+    away_deg = float(np.degrees(np.arccos(np.clip(T_V_H[2, 2], -1.0, 1.0))))
+    require(
+        away_deg < _MOST_TURNED_DEG,
+        f"{name}: the rendering camera looks {away_deg:.0f}° away from where the headset's rig "
+        f"looks, but must be within {_MOST_TURNED_DEG:g}°: use OpenCV's axes (z forward), not "
+        "those of OpenGL or Unity",
+    )
+
+
+def _check_optics(
+    name: str, width: int, height: int, fx: float, fy: float, cx: float, cy: float
+) -> None:
+    """Raise ValueError unless pixels are about square, and field of view and axis usual ones."""
+    for key, focal_px, centre_px, side_px in (("x", fx, cx, width), ("y", fy, cy, height)):
+        require(
+            _FOCAL_SIDES[0] * side_px <= focal_px <= _FOCAL_SIDES[1] * side_px,
+            f"{name}: f{key} is {focal_px:g} px, but must lie between "
+            f"{_FOCAL_SIDES[0] * side_px:g} and {_FOCAL_SIDES[1] * side_px:g} for {side_px} px "
+            "(a field of view of 6° to 157°)",
+        )
+        require(
+            _AXIS_SHARES[0] * side_px <= centre_px <= _AXIS_SHARES[1] * side_px,
+            f"{name}: c{key} is {centre_px:g} px, but must lie near the middle of {side_px} px, "
+            f"between {_AXIS_SHARES[0] * side_px:.0f} and {_AXIS_SHARES[1] * side_px:.0f}: are the "
+            "intrinsics those of another size of image?",
+        )
+    require(
+        1.0 / _MOST_ASPECT <= fx / fy <= _MOST_ASPECT,
+        f"{name}: fx is {fx:g} px and fy {fy:g} px, but pixels are about square: one may be at "
+        f"most {_MOST_ASPECT:g} times the other",
+    )
+
+
 def _check_display(eye: str, display: EyeDisplay) -> None:
     K, H0 = display.K, display.H0
     _check_camera(f"{eye}.K", K)
@@ -108,7 +156,10 @@ def _check_display(eye: str, display: EyeDisplay) -> None:
         f"{eye}.z_C0_S_m must lie between 0.1 and 100 (metres), got {display.z_C0_S_m}",
     )
     _check_size(eye, display.width_px, display.height_px)
-    _check_rigid(f"{eye}.T_V_H", display.T_V_H)
+    _check_optics(
+        f"{eye}.K", display.width_px, display.height_px, K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    )
+    check_view(f"{eye}.T_V_H", display.T_V_H)
 
 
 def _check_origin(name: str, origin: Origin) -> None:
@@ -125,7 +176,8 @@ def _check_origin(name: str, origin: Origin) -> None:
     _check_covariance(f"{name}.covariance", origin.covariance)
 
 
-def _check_headset(headset: HeadsetIdentity) -> None:
+def check_headset(headset: HeadsetIdentity) -> None:
+    """Raise ValueError, naming the field and what is expected, if a report is implausible."""
     require(
         0 < len(headset.device_id) <= MAX_ID and set(headset.device_id) <= set(hexdigits),
         f"headset.device_id must be 1 to {MAX_ID} hexadecimal digits",
@@ -139,7 +191,7 @@ def _check_headset(headset: HeadsetIdentity) -> None:
     )
     for eye, view in headset.views.items():
         name = f"headset.{eye}"
-        _check_rigid(f"{name}.T_V_H", view.T_V_H)
+        check_view(f"{name}.T_V_H", view.T_V_H)
         _check_size(name, view.width_px, view.height_px)
         left, right, up, down = view.tangents
         require(
@@ -147,6 +199,9 @@ def _check_headset(headset: HeadsetIdentity) -> None:
             f"{name}.tangents must be left, right, up and down edge of the view, below 10, with "
             "left < right and up < down",
         )
+        fx, fy = view.width_px / (right - left), view.height_px / (down - up)
+        centre = -left * fx - 0.5, -up * fy - 0.5
+        _check_optics(f"{name}.tangents", view.width_px, view.height_px, fx, fy, *centre)
 
 
 def _check_depth_check(check: DepthCheck) -> None:

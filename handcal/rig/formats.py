@@ -2,11 +2,13 @@
 
 Lengths are in metres. FileStorage uses the names of OpenCV's own calibration samples
 (``camera_matrix``, ``distortion_coefficients``; ``R`` and ``T`` from the depth camera to the
-headset's). ROS's camera_info holds one camera and no pose.
+headset's). ROS's camera_info holds one camera and no pose. Intrinsics by other programs are read,
+too (`handcal.rig.foreign`).
 """
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable
 from dataclasses import asdict, astuple
@@ -17,35 +19,38 @@ import cv2
 import numpy as np
 
 from handcal.core.errors import FileError, HandcalError
-from handcal.core.geometry import camera_matrix, is_rigid, rigid
+from handcal.core.geometry import is_rigid, rigid
 from handcal.core.types import CameraIdentity, Float64, Intrinsics
 from handcal.io.files import read_json, read_limited, write_atomic, write_json
 from handcal.rig.boards.views import WorstView
 from handcal.rig.check import check_intrinsics, identity_from_json, require
+from handcal.rig.foreign import array_of, camera_in, cameras_in, no_camera
 from handcal.rig.lens.camera import CameraCalibration
-from handcal.rig.lens.lens import Camera, FisheyeIntrinsics, as_pinhole
+from handcal.rig.lens.lens import Camera, FisheyeIntrinsics, as_pinhole, camera_matrix_of
 from handcal.rig.lens.stereo import StereoCalibration
-from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
+from handcal.rig.storage import parse_tree
 from handcal.rig.verdict import CalibrationVerdict, CalibrationVerdictName
 
 CalibrationFormat: TypeAlias = Literal["opencv", "ros", "json"]
 CALIBRATION_FORMATS: tuple[CalibrationFormat, ...] = ("opencv", "ros", "json")
 JSON_VERSION = 1
 MAX_BYTES = 2**20
-_MAX_REACH_M = 10.0
+_MAX_REACH_M = 1.0
 _ROS_MODELS = ("plumb_bob", "rational_polynomial")
+_ROS_FISHEYE = "equidistant"
+
+_LOG = logging.getLogger(__name__)
 
 Value = TypeVar("Value")
 
 
 def read_intrinsics(path: Path) -> Intrinsics:
-    """Read a camera's intrinsics in any of `CALIBRATION_FORMATS`, recognised by the file's content.
+    """Read a pinhole camera's intrinsics, like `read_camera`.
 
     Raises
     ------
     FileError
-        If the file cannot be read or has another format, a field is missing or implausible, or the
-        lens model is not OpenCV's pinhole.
+        As `read_camera`, or if it is a fisheye.
     """
     try:
         return as_pinhole(read_camera(path), "the camera")
@@ -55,15 +60,45 @@ def read_intrinsics(path: Path) -> Intrinsics:
         raise FileError(f"{path}: {error}") from error
 
 
-def read_camera(path: Path) -> Camera:
-    """Read a camera's intrinsics, like `read_intrinsics`, or those of a fisheye from JSON.
+def read_camera(path: Path, name: str | None = None, size: tuple[int, int] | None = None) -> Camera:
+    """Read a camera's intrinsics, in any of `CALIBRATION_FORMATS` or as other programs write them.
+
+    Parameters
+    ----------
+    path : Path
+        Recognised by its content.
+    name : str, optional
+        Which of its cameras; by default the first, with a warning if there are others.
+    size : (width, height), optional
+        Of the images, in pixels, where the file does not say it.
 
     Raises
     ------
     FileError
-        As `read_intrinsics`.
+        If the file cannot be read or holds no such camera, a field is missing or implausible, or
+        the lens model is not one of OpenCV's.
     """
-    return _read(path, _camera_of_json, _intrinsics_of_yaml)
+
+    def convert(values: dict[str, Any]) -> Camera:
+        if "handcal_camera" in values:
+            return _camera_of_json(values)
+        names = cameras_in(values)
+        require(bool(names) or not _has_pose(values), "it holds a pose, but no camera")
+        require(bool(names), no_camera(read_limited(path, MAX_BYTES)))
+        if name is None and len(names) > 1:
+            _LOG.warning("%s: camera %s is used, of %s", path, names[0], ", ".join(names))
+        return camera_in(values, name, size)
+
+    return _read(path, convert)
+
+
+def has_pose(path: Path) -> bool:
+    """Return whether a file holds a pose, and no camera; FileError if it cannot be read."""
+
+    def is_pose(values: dict[str, Any]) -> bool:
+        return "handcal_stereo" in values or (_has_pose(values) and not cameras_in(values))
+
+    return _matrix_in(path) is not None or _read(path, is_pose)
 
 
 def read_pose(path: Path) -> Float64:
@@ -75,11 +110,9 @@ def read_pose(path: Path) -> Float64:
         If the file cannot be read, or holds no rigid transform.
     """
     try:
-        words = re.split(rb"[\s,\[\]]+", read_limited(path, MAX_BYTES))
-        numbers = [float(word) for word in words if word]
-    except ValueError:
-        return _read(path, _pose_of_json, _pose_of_yaml)
-    try:
+        numbers = _matrix_in(path)
+        if numbers is None:
+            return _read(path, _pose_of)
         require(len(numbers) == 16, "a matrix must have 4 rows of 4 numbers")
         return _pose(np.array(numbers).reshape(4, 4))
     except ValueError as error:
@@ -134,15 +167,18 @@ def read_identity(path: Path) -> CameraIdentity:
     """
     if not read_limited(path, MAX_BYTES).lstrip().startswith(b"{"):
         return CameraIdentity()
+    values = read_json(path)
+    if "handcal_camera" not in values:
+        return CameraIdentity()  # another program's, whose "device" is something else
     try:
-        return identity_from_json(read_json(path).get("device"), "device")
+        return identity_from_json(values.get("device"), "device")
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
 
 
 def write_intrinsics(
     path: Path,
-    intrinsics: Intrinsics,
+    intrinsics: Camera,
     kind: CalibrationFormat,
     identity: CameraIdentity = CameraIdentity(),
 ) -> None:
@@ -155,9 +191,9 @@ def write_intrinsics(
     FileError
         If the file cannot be written.
     """
-    check_intrinsics("camera", intrinsics)
+    check_intrinsics("camera", Intrinsics(**asdict(intrinsics)))
     if kind == "json":
-        values = {"handcal_camera": JSON_VERSION, **asdict(intrinsics)}
+        values = {"handcal_camera": JSON_VERSION, **camera_values(intrinsics)}
         write_json(path, values | ({"device": asdict(identity)} if any(astuple(identity)) else {}))
     elif kind == "ros":
         write_atomic(path, _ros_text(intrinsics, path.stem).encode())
@@ -165,7 +201,9 @@ def write_intrinsics(
         storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
         storage.write("image_width", intrinsics.width)
         storage.write("image_height", intrinsics.height)
-        storage.write("camera_matrix", camera_matrix(intrinsics))
+        if isinstance(intrinsics, FisheyeIntrinsics):
+            storage.write("distortion_model", _ROS_FISHEYE)
+        storage.write("camera_matrix", camera_matrix_of(intrinsics))
         storage.write("distortion_coefficients", _coefficients(intrinsics)[:, None])
         write_atomic(path, storage.releaseAndGetString().encode())
 
@@ -236,27 +274,33 @@ def _listed(covariance: Float64 | None) -> list[list[float]] | None:
     return None if covariance is None else covariance.tolist()
 
 
-def _read(
-    path: Path,
-    of_json: Callable[[dict[str, Any]], Value],
-    of_yaml: Callable[[Fields], Value],
-) -> Value:
+def read_fields(path: Path) -> dict[str, Any]:
+    """Return the fields of JSON, YAML or XML; FileError if it cannot be read."""
+    return _read(path, dict)
+
+
+def _read(path: Path, convert: Callable[[dict[str, Any]], Value]) -> Value:
+    """Return the result of `convert` for the fields of JSON, YAML or XML."""
     data = read_limited(path, MAX_BYTES)
     try:
         if data.lstrip().startswith(b"{"):
-            return of_json(read_json(path))
-        require(len(data) <= MAX_STORAGE_BYTES, f"a YAML file may hold {MAX_STORAGE_BYTES:,} bytes")
-        return parse_storage(_as_storage(data), of_yaml)
+            return convert(read_json(path))
+        try:
+            values = parse_tree(data)
+        except ValueError as error:
+            raise ValueError(f"{error}: {no_camera(data)}") from error
+        return convert(values)
     except ValueError as error:
         raise FileError(f"{path}: {error}") from error
 
 
-def _as_storage(data: bytes) -> bytes:
-    """Return YAML from other programs in the dialect that OpenCV reads."""
-    if data.startswith(b"%YAML"):
-        return data
-    # PyYAML does not indent a list below its key; OpenCV requires it.
-    return b"%YAML 1.2\n---\n" + re.sub(rb"(?m)^( *)- ", rb"\1  - ", data)
+def _matrix_in(path: Path) -> list[float] | None:
+    """Return the numbers of a file that holds nothing else; None if it does."""
+    words = re.split(rb"[\s,\[\]]+", read_limited(path, MAX_BYTES))
+    try:
+        return [float(word) for word in words if word]
+    except ValueError:
+        return None
 
 
 def _camera_of_json(values: dict[str, Any]) -> Camera:
@@ -285,11 +329,35 @@ def _pose_of_json(values: dict[str, Any]) -> Float64:
     return _pose(_numbers(values.get("T_H_D"), "T_H_D", 2))
 
 
+def _has_pose(values: dict[str, Any]) -> bool:
+    return "handcal_stereo" in values or {"R", "T"} <= values.keys()
+
+
+def _pose_of(values: dict[str, Any]) -> Float64:
+    if "handcal_stereo" in values:
+        return _pose_of_json(values)
+    require(_has_pose(values), "it holds no pose: R and T are missing")
+    R, T = (array_of(values[key], key) for key in ("R", "T"))
+    require(len(R) in (3, 9) and len(T) == 3, "R must have 3×3 numbers, and T 3")
+    return _pose(rigid(R.reshape(3, 3) if len(R) == 9 else cv2.Rodrigues(R)[0], T))
+
+
 def _pose(T: Float64) -> Float64:
+    is_affine = T.shape == (4, 4) and bool(np.isfinite(T).all())
+    if is_affine and np.linalg.det(T[:3, :3]) < 0:
+        raise ValueError(
+            "the rotation is a mirrored one, as with the axes of Unity or OpenGL: use OpenCV's "
+            "(x right, y down, z forward)"
+        )
+    far = float(np.linalg.norm(T[:3, 3])) if is_affine else 0.0
     require(
-        T.shape == (4, 4) and is_rigid(T, _MAX_REACH_M),
-        "the pose must be rigid: an orthonormal, right-handed rotation, and metres below "
-        f"{_MAX_REACH_M:g}",
+        far < _MAX_REACH_M,
+        f"the translation is {far:.4g} m long, more than a headset's {_MAX_REACH_M:g} m: if it is "
+        "in millimetres, divide it by 1000",
+    )
+    require(
+        is_affine and is_rigid(T, _MAX_REACH_M),
+        "the pose must be rigid: an orthonormal, right-handed rotation, and metres",
     )
     return T
 
@@ -331,56 +399,23 @@ def _numbers(values: object, name: str, dimensions: int) -> Float64:
     return array.astype(np.float64)
 
 
-def _intrinsics_of_yaml(root: Fields) -> Camera:
-    if root.has("distortion_model"):
-        model = root.text("distortion_model")
-        require(
-            model in _ROS_MODELS,
-            f"the lens model {model} is not known; {' and '.join(_ROS_MODELS)} are",
-        )
-    K = _yaml_matrix(root, "camera_matrix", (3, 3))
-    require(K[0, 1] == 0, "camera_matrix must have no skew")
-    coefficients = _yaml_matrix(root, "distortion_coefficients", None).ravel()
-    intrinsics = Intrinsics(
-        root.integer("image_width"),
-        root.integer("image_height"),
-        fx=float(K[0, 0]),
-        fy=float(K[1, 1]),
-        cx=float(K[0, 2]),
-        cy=float(K[1, 2]),
-        distortion=tuple(coefficients.tolist()),
-    )
-    check_intrinsics("camera", intrinsics)
-    return intrinsics
-
-
-def _pose_of_yaml(root: Fields) -> Float64:
-    return _pose(rigid(_yaml_matrix(root, "R", (3, 3)), _yaml_matrix(root, "T", (3, 1))[:, 0]))
-
-
-def _yaml_matrix(root: Fields, name: str, shape: tuple[int, int] | None) -> Float64:
-    """Return a matrix written as rows, cols and data, which both OpenCV and ROS do."""
-    matrix = root.section(name)
-    rows, columns = matrix.integer("rows"), matrix.integer("cols")
-    data = matrix.numbers("data")
-    require(
-        rows * columns == len(data) and shape in (None, (rows, columns)),
-        f"{name} must be a matrix" + (f" of {shape[0]}×{shape[1]}" if shape else ""),
-    )
-    return np.array(data, dtype=np.float64).reshape(rows, columns)
-
-
-def _coefficients(intrinsics: Intrinsics) -> Float64:
-    """Return the coefficients, padded to OpenCV's usual five."""
+def _coefficients(intrinsics: Camera) -> Float64:
+    """Return the coefficients, those of a pinhole padded to OpenCV's usual five."""
     given = intrinsics.distortion
+    if isinstance(intrinsics, FisheyeIntrinsics):
+        return np.array(given)
     return np.array([*given, *[0.0] * (5 - len(given))])
 
 
-def _ros_text(intrinsics: Intrinsics, name: str) -> str:
+def _ros_text(intrinsics: Camera, name: str) -> str:
     """Return a file as ROS's camera_calibration_parsers write it."""
     coefficients = _coefficients(intrinsics)
-    require(len(coefficients) in (5, 8), "ROS's models have 5 or 8 coefficients")
-    K = camera_matrix(intrinsics)
+    is_fisheye = isinstance(intrinsics, FisheyeIntrinsics)
+    require(
+        is_fisheye or len(coefficients) in (5, 8), "ROS's pinhole models have 5 or 8 coefficients"
+    )
+    model = _ROS_FISHEYE if is_fisheye else _ROS_MODELS[len(coefficients) == 8]
+    K = camera_matrix_of(intrinsics)
     matrices = {
         "camera_matrix": K,
         "distortion_coefficients": coefficients[None],
@@ -391,7 +426,7 @@ def _ros_text(intrinsics: Intrinsics, name: str) -> str:
         f"image_width: {intrinsics.width}",
         f"image_height: {intrinsics.height}",
         f"camera_name: {re.sub('[^A-Za-z0-9_]', '_', name) or 'camera'}",
-        f"distortion_model: {_ROS_MODELS[len(coefficients) == 8]}",
+        f"distortion_model: {model}",
     ]
     for key, matrix in matrices.items():
         rows, columns = matrix.shape

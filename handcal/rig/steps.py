@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from handcal.core.errors import HandcalError
+from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics, Rig
 from handcal.rig.assemble import screen_of
 from handcal.rig.boards.tracked_file import read_tracked
 from handcal.rig.boards.views import BoardImage, used
+from handcal.rig.check import check_view
 from handcal.rig.displays.display import (
     DisplayCalibration,
     DisplaySettings,
@@ -163,9 +164,8 @@ def _calibrated(
     viewpoint: ViewpointPose,
     inputs: DisplayInputs,
 ) -> DisplayCalibration:
-    pose_V_H = pose_in(inputs.pose_V_H)
-    if pose_V_H is not None:
-        screen = replace(screen, T_V_H=pose_V_H)
+    if inputs.pose_V_H is not None:
+        screen = replace(screen, T_V_H=view_in(inputs.pose_V_H))
     homography = fit_homography(seen, camera, screen.width_px, screen.height_px)
     return calibrate_display(homography, camera, viewpoint, screen, inputs.settings)
 
@@ -178,6 +178,16 @@ def intrinsics_in(path: Path | None) -> Intrinsics | None:
 def identity_in(path: Path | None) -> CameraIdentity:
     """Return the identity of the camera in a file of its intrinsics; empty without one."""
     return CameraIdentity() if path is None else read_identity(path)
+
+
+def view_in(path: Path) -> Float64:
+    """Return T_V_H in a file; FileError if it cannot be read, or is implausible."""
+    T_V_H = read_pose(path)
+    try:
+        check_view("T_V_H", T_V_H)
+    except ValueError as error:
+        raise FileError(f"{path}: {error}") from error
+    return T_V_H
 
 
 def pose_in(path: Path | None) -> Float64 | None:

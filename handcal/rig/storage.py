@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -13,6 +14,10 @@ from handcal.rig.check import require
 
 # OpenCV's parser recurses with the nesting and overflows the stack at 65 kB.
 MAX_STORAGE_BYTES = 2**14
+
+_NESTS = re.compile(rb"[\[{<:]|-\s")
+"""Openings of a level of nesting in YAML or XML; deeper indentation takes ever more bytes."""
+_DEEPEST = 12
 
 Value = TypeVar("Value")
 
@@ -31,6 +36,56 @@ def parse_storage(data: bytes, convert: Callable[[Fields], Value]) -> Value:
         return convert(Fields("", storage.root()))
     except (UnicodeDecodeError, cv2.error, SystemError) as error:  # SystemError: not parsable
         raise ValueError("not valid FileStorage YAML") from error
+
+
+def parse_tree(data: bytes) -> dict[str, Any]:
+    """Return FileStorage YAML or XML, or simple YAML of other programs, as maps, lists and values.
+
+    Of several YAML documents, as ``ros2 topic echo`` prints them, it is the first.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be parsed, is no map of fields, or is nested as no calibration is.
+    """
+    data = data.replace(b"\r\n", b"\n").removeprefix(b"\xef\xbb\xbf").lstrip()
+    if not data.startswith(b"<?xml"):
+        data = _as_storage(data)
+    require(len(_NESTS.findall(data)) <= MAX_STORAGE_BYTES, "it is nested too deeply")
+    try:
+        storage = cv2.FileStorage(data.decode(), cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        tree = _tree(storage.root(), _DEEPEST)
+    except (UnicodeDecodeError, cv2.error, SystemError) as error:
+        raise ValueError("not valid YAML or XML") from error
+    if not isinstance(tree, dict):
+        raise ValueError("the file must be a map of fields")
+    return tree
+
+
+def _as_storage(data: bytes) -> bytes:
+    """Return the first document of YAML in the dialect that OpenCV reads."""
+    is_own = data.startswith(b"%YAML")
+    documents = re.split(rb"(?m)^---.*$", re.sub(rb"(?m)^%YAML.*$", b"", data))
+    first = next((one for one in documents if one.strip()), b"")
+    if not is_own:
+        first = re.sub(rb"!!python/\S+", b"", first)
+        first = re.sub(rb",[ \t]*\n\s*", b", ", first)  # lists go on at any indentation
+        # A key without a value is refused by OpenCV.
+        first = re.sub(rb"(?m)^( *)([\w./]+):[ \t]*\n(?!\1 +\S|\1- )", rb'\1\2: ""\n', first)
+        # PyYAML does not indent a list below its key; OpenCV requires it.
+        first = re.sub(rb"(?m)^( *)- ", rb"\1  - ", first)
+    return b"%YAML 1.2\n---\n" + first
+
+
+def _tree(node: cv2.FileNode, levels: int) -> object:
+    require(levels > 0, "it is nested too deeply")
+    if node.isMap():
+        return {key: _tree(node.getNode(key), levels - 1) for key in node.keys()}  # noqa: SIM118
+    if node.isSeq():
+        return [_tree(node.at(index), levels - 1) for index in range(node.size())]
+    if node.isString():
+        return node.string()
+    return int(node.real()) if node.isInt() else node.real() if node.isReal() else None
 
 
 class Fields:

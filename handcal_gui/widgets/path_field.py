@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import Qt, Signal
@@ -17,11 +20,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from handcal.core.errors import HandcalError
+from handcal.io.files import user_path
 from handcal_gui.keys import native
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import button, fill_row, plain_tooltip
 
-INTRINSICS_FILES = tr("Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)")
+INTRINSICS_FILES = tr("Intrinsics (*.yaml *.yml *.xml *.json)")
 """File filter for a camera's intrinsics."""
 _KEY = "F4"
 """Opens the dialog of the field that has the focus, as it opens a list."""
@@ -41,6 +46,9 @@ class PathField(QWidget):
         File filter of `QFileDialog`, such as ``"Recordings (*.db3 *.bag)"``.
     empty : str
         Placeholder that explains the meaning of an empty path.
+    parent : QWidget or None
+    read : callable, optional
+        Reads the file; HandcalError if it cannot be used.
 
     Attributes
     ----------
@@ -57,9 +65,13 @@ class PathField(QWidget):
         pattern: str = "",
         empty: str = "",
         parent: QWidget | None = None,
+        read: Callable[[Path], object] | None = None,
     ) -> None:
         super().__init__(parent)
         self.name = name
+        self._read = read
+        self._checked: tuple[Path, int] | None = None
+        self._problem = ""
         self._pattern = pattern
         self._line = _PathLine(placeholderText=empty, clearButtonEnabled=bool(empty))
         self._line.setAccessibleName(name)
@@ -87,6 +99,22 @@ class PathField(QWidget):
     def path(self) -> str:
         """The entered path, without surrounding blanks."""
         return str(self._line.text()).strip()
+
+    @property
+    def problem(self) -> str:
+        """Return why the file cannot be used; empty if it can, or there is none to read."""
+        if self._read is None or not self.path:
+            return ""
+        file, mark = user_path(self.path), None
+        with suppress(OSError):
+            mark = file, file.stat().st_mtime_ns
+        if mark is None or mark != self._checked:
+            self._checked, self._problem = mark, ""
+            try:
+                self._read(file)
+            except HandcalError as error:
+                self._problem = str(error)
+        return self._problem
 
     def set_path(self, path: str) -> None:
         """Show a path."""

@@ -2967,7 +2967,11 @@ Each eye&apos;s position, its uncertainty and the verdict appear here once it is
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Convergence of each registration</source>
+        <source>Plots</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error against distance, and convergence of each registration</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -3911,7 +3915,7 @@ Depth alone: the nearest hand-sized object.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Intrinsics: OpenCV, ROS, handcal (*.yaml *.yml *.json)</source>
+        <source>Intrinsics (*.yaml *.yml *.xml *.json)</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -4569,7 +4573,27 @@ the mean over its trials, and their numbers: 0 if all were of an earlier φ.
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Expected error in arcminutes; bars and brackets hold 95 %. Dashed: without the calibration. Only the eye&apos;s place is uncertain here: an error of the rig itself comes on top, and matters most far away.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error against distance</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Distance (m)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Expected error (′)</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, without</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>{}, with</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6305,7 +6329,7 @@ the mean over its trials, and their numbers: 0 if all were of an earlier φ.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>OpenCV FileStorage, ROS camera_info or handcal JSON.</source>
+        <source>As OpenCV, ROS, Kalibr, RealSense, Open3D, Azure Kinect or handcal write them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -6723,7 +6747,7 @@ the mean over its trials, and their numbers: 0 if all were of an earlier φ.
         <translation type="unfinished"></translation>
     </message>
     <message>
-        <source>Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end in the same number, such as depth07.png and headset07.png.</source>
+        <source>Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both views, tilted by 20° to 45° in all directions. Give the two images of a pair the same name, or let them end in the same number, as depth07.png and headset07.png do.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

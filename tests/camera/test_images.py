@@ -62,6 +62,17 @@ def test_jpeg_color_is_read(files: tuple[Path, Path, Path]) -> None:
     np.testing.assert_allclose(frame.color, smooth, atol=4)
 
 
+@pytest.mark.parametrize(("color", "depth"), [("c.tiff", "d.tiff"), ("c.bmp", "d.pgm")])
+def test_other_kinds_of_images_are_read(
+    files: tuple[Path, Path, Path], color: str, depth: str
+) -> None:
+    folder = files[0].parent
+    write(folder / color, COLOR[..., ::-1])
+    frame = read_frame(folder / color, write(folder / depth, DEPTH), files[2])
+    np.testing.assert_array_equal(frame.depth, DEPTH)
+    np.testing.assert_array_equal(frame.color, COLOR)
+
+
 @pytest.mark.parametrize("missing", range(3))
 def test_missing_file_is_named(files: tuple[Path, Path, Path], missing: int) -> None:
     files[missing].unlink()

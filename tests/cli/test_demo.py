@@ -20,6 +20,7 @@ from handcal.core.display import reprojection_arcmin
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, EyeDistance, VerdictName
 from handcal.lab.demo import DemoSettings, measure_eye_distance
+from handcal.register.benefit import DISTANCES_M
 from handcal.register.prior import eye_position_m
 from handcal.register.results import USED
 from handcal.rig.example import Z_E_S_M, example_rig
@@ -96,6 +97,7 @@ def test_every_promised_key_is_there(result: dict[str, Any]) -> None:
         off_mm = np.subtract(eye["shift_mm"], eye["true_shift_mm"])
         assert eye["error_mm"] == pytest.approx(np.linalg.norm(off_mm))
         assert set(eye["depth"]) == {"before_m", "without_m", "after_m", "probability_better"}
+        assert [one["distance_m"] for one in eye["by_distance"]] == list(DISTANCES_M)
     assert set(result["reprojection_arcmin"]) == {"before", "begun", "after", "drawn"}
     for name, arcmin in result["reprojection_arcmin"].items():
         of_eyes = [eye["reprojection_arcmin"][name] for eye in result["eyes"].values()]

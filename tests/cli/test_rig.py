@@ -102,6 +102,21 @@ def test_camera_then_stereo_then_conversion(
     np.testing.assert_allclose(read_pose(tmp_path / "converted"), found, atol=1e-12)
 
 
+def test_what_other_programs_wrote_is_converted(
+    rig: Callable[..., None], shared_data: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    files, output = shared_data / "field" / "rigfiles", tmp_path / "camera.json"
+    rig("convert", files / "kalibr_camchain.yaml", output, "--format", "json")
+    assert read_intrinsics(output).fx == 1307.1793378428877
+    assert "camera cam0 is used, of cam0, cam1" in caplog.text
+    rig("convert", files / "kalibr_camchain.yaml", output, "--format", "ros", "--camera", "cam1")
+    assert read_intrinsics(output).fx == 1313.9722271268822
+    rig("convert", files / "opencv_KD.yml", output, "--format", "opencv", "--size", 1280, 720)
+    assert read_intrinsics(output).cx == 649.37
+    with pytest.raises(SystemExit):
+        rig("convert", files / "stereo_extrinsics_mm.yml", output, "--format", "json")
+
+
 def test_what_is_bad_is_not_written(
     rig: Callable[..., None],
     folders: tuple[Path, Path],
@@ -139,7 +154,7 @@ def test_a_board_without_a_file_is_misuse(
         (("board", "--png", "b.txt"), "b.txt must end in .png"),
         (("board", "--pdf", "b.png"), "b.png must end in .pdf"),
         (("board", "--pdf", "b.pdf", "--squares", "30", "30"), "too few for 30×30 squares"),
-        (("camera", "nowhere"), "no PNG or JPEG images"),
+        (("camera", "nowhere"), "no PNG, JPEG, TIFF, BMP or PGM images"),
         (
             ("camera", "{depth}", *CHECKERBOARD, "--drop", "x.png"),
             "there is no image x.png to drop",

@@ -30,6 +30,7 @@ ALL_FILES = {
     *(
         f"figures/{name}.{suffix}"
         for name in (
+            "distances",
             "shifts",
             "ellipses",
             "convergence",

@@ -8,6 +8,7 @@ import pytest
 from handcal.core.geometry import transform
 from handcal.export.figure_rows import (
     convergence_rows,
+    distance_rows,
     overlay_rows,
     residual_rows,
     running_mean_rows,
@@ -15,6 +16,7 @@ from handcal.export.figure_rows import (
 from handcal.export.figures import CELL_MM, overlay_outlines, residual_cells
 from handcal.export.outcome import SessionOutcome
 from handcal.export.report import session_report
+from handcal.report.document import Table
 
 
 def test_convergence_ends_at_what_was_solved(outcome: SessionOutcome) -> None:
@@ -28,6 +30,19 @@ def test_convergence_ends_at_what_was_solved(outcome: SessionOutcome) -> None:
                 np.array([row["rms_mm"] for row in found], dtype=float),
                 1e3 * np.sqrt(shift.history_m2),
             )
+
+
+def test_distances_are_those_of_the_benefit(outcome: SessionOutcome) -> None:
+    assert outcome.results is not None
+    rows = list(distance_rows(outcome.results))
+    of_right = outcome.results.benefits["right"].by_distance
+    assert [row["after_high_arcmin"] for row in rows if row["eye"] == "right"] == [
+        one.after_high_arcmin for one in of_right
+    ]
+    sections = {section.title: section for section in session_report(outcome).sections}
+    table = sections["Error against distance"].items[0]
+    assert isinstance(table, Table)
+    assert [row[4] for row in table.rows] == [one.texts[1] for one in of_right]
 
 
 def test_residuals_are_the_means_of_the_points_in_each_cell(outcome: SessionOutcome) -> None:

@@ -4,7 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from handcal.core.display import eye_projection, reprojection_arcmin, target_corners_m
+from handcal.core.display import (
+    arcmin_from_px,
+    eye_projection,
+    reprojection_arcmin,
+    reprojection_error_px,
+    target_corners_m,
+)
 from handcal.core.geometry import project
 from handcal.core.types import EYES, Eye, Float64
 from handcal.register import benefit as benefits
@@ -118,6 +124,37 @@ def test_expected_error_of_one_axis_by_hand() -> None:
     by_hand = 60 * np.degrees(1e-3 * at_2_m / 2.0) * np.sqrt(2 / np.pi)
     found = expected_arcmin(DISPLAY, np.zeros(3), np.diag([0.001, 0.0, 0.0]) ** 2)
     assert found == pytest.approx(by_hand, rel=0.02)
+
+
+def test_the_error_against_distance_of_one_axis_by_hand() -> None:
+    sigma_m = np.diag([1e-3, 0.0, 0.0])
+    found = benefit(DISPLAY, np.zeros(3), PRIOR_M2, np.array([0.01, 0.0, 0.0]), sigma_m**2)
+    for one in found.by_distance:
+        arcmin_per_m = 60 * np.degrees(abs(1 / one.distance_m - 1 / DISPLAY.z_C0_S_m))
+        # Mean and quantiles of a folded normal distribution; then of one far from 0.
+        after = one.after_arcmin, one.after_low_arcmin, one.after_high_arcmin
+        folded = [1e-3 * arcmin_per_m * part for part in (np.sqrt(2 / np.pi), 0.0313, 2.2414)]
+        assert after == pytest.approx(folded, rel=0.1 if one.distance_m < 2 else 0.03, abs=0.01)
+        without = one.without_arcmin, one.without_low_arcmin, one.without_high_arcmin
+        aside = [arcmin_per_m * part for part in (10e-3, 8.04e-3, 11.96e-3)]
+        assert without == pytest.approx(aside, rel=0.03, abs=1e-6)
+
+
+def test_the_error_against_distance_is_the_expected_one_and_holds_95_percent() -> None:
+    rng = np.random.default_rng(3)
+    shift_m, covariance_m2 = np.array([0.003, -0.002, 0.01]), _covariance(rng, 0.001)
+    found = benefit(DISPLAY, np.zeros(3), PRIOR_M2, shift_m, covariance_m2)
+    near = [one for one in found.by_distance if one.distance_m in (0.4, 0.5, 0.6)]
+    assert np.mean([one.after_arcmin for one in near]) == pytest.approx(
+        found.after_arcmin, rel=1e-3
+    )
+    eyes_m = rng.multivariate_normal(shift_m, covariance_m2, 1000)
+    for one in (found.by_distance[0], found.by_distance[-1]):
+        corners_m = target_corners_m(one.distance_m)
+        px = [reprojection_error_px(DISPLAY, shift_m, eye_m, corners_m).mean() for eye_m in eyes_m]
+        arcmin = arcmin_from_px(DISPLAY, px)
+        held = (arcmin > one.after_low_arcmin) & (arcmin < one.after_high_arcmin)
+        assert held.mean() == pytest.approx(0.95, abs=0.025)
 
 
 def test_the_error_in_depth_is_the_movement_of_an_object_that_covers_its_drawing() -> None:

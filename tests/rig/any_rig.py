@@ -20,20 +20,26 @@ from handcal.core.types import (
     Rig,
 )
 
-FOCAL = st.floats(1.0, 1e5)
 OFFSET = st.floats(-0.05, 0.05)
 VECTORS = st.tuples(OFFSET, OFFSET, OFFSET)
 TRANSFORMS = st.builds(rigid, st.tuples(*[st.floats(-3, 3)] * 3), VECTORS)
+VIEWS = st.builds(rigid, st.tuples(*[st.floats(-0.8, 0.8)] * 3), VECTORS)
 SIDE = st.integers(1, 16384)
+FOCAL_SIDES, AXIS_SHARE = st.floats(0.2, 9.0), st.floats(0.2, 0.8)
 DISPLAYS = st.builds(
-    EyeDisplay,
-    K=st.builds(lambda f, c: np.array([[f, 0, c], [0, f, c], [0, 0, 1]]), FOCAL, OFFSET),
+    lambda side, f, c, **others: EyeDisplay(
+        K=np.array([[f * side, 0, c * side], [0, f * side, c * side], [0, 0, 1]]),
+        width_px=side,
+        height_px=side,
+        **others,
+    ),
+    SIDE.filter(lambda side: side > 4),  # focal lengths are at least a pixel
+    FOCAL_SIDES,
+    AXIS_SHARE,
     H0=st.builds(lambda x: np.array([[1 + x, 0, x], [0, 1 - x, x], [0, 0, 1]]), OFFSET),
     t_C0_V_m=VECTORS,
     z_C0_S_m=st.floats(0.1, 100),
-    width_px=SIDE,
-    height_px=SIDE,
-    T_V_H=TRANSFORMS,
+    T_V_H=VIEWS,
 )
 LINES = st.text(st.characters(categories=["L", "N", "P"]), min_size=1, max_size=40)
 ORIGINS = st.builds(
@@ -60,7 +66,7 @@ HEADSETS = st.builds(
         st.sampled_from(EYES),
         st.builds(
             lambda T, low, high, side: HeadsetView(T, np.array([low, high] * 2), side, side),
-            *(TRANSFORMS, st.floats(-9, -0.1), st.floats(0, 9), SIDE),
+            *(VIEWS, st.floats(-2, -1), st.floats(1, 2), SIDE),
         ),
     ),
     eye_distance_m=st.none() | st.floats(0.03, 0.1),
@@ -96,13 +102,14 @@ RIGS = st.builds(
     eyes=st.fixed_dictionaries({"left": DISPLAYS, "right": DISPLAYS}),
     T_H_D=TRANSFORMS,
     depth_intrinsics=st.builds(
-        Intrinsics,
+        lambda side, f, aspect, c, d, distortion: Intrinsics(
+            side, side, f * side, aspect * f * side, c * side, d * side, distortion
+        ),
         SIDE,
-        SIDE,
-        FOCAL,
-        FOCAL,
-        FOCAL,
-        FOCAL,
+        FOCAL_SIDES,
+        st.floats(0.9, 1.1),
+        AXIS_SHARE,
+        AXIS_SHARE,
         distortion=st.sampled_from([0, 4, 5, 8, 12, 14]).flatmap(
             lambda n: st.tuples(*[st.floats(-10, 10)] * n)
         ),

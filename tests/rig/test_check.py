@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from handcal.core.geometry import rigid
-from handcal.core.types import Float64, Rig
+from handcal.core.types import Float64, HeadsetIdentity, HeadsetView, Rig
 from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
+
+LEFT = example_rig().eyes["left"]
 
 
 def with_display(**changes: object) -> Rig:
@@ -30,7 +32,13 @@ def edited(A: Float64, row: int, column: int, value: float) -> Float64:
     return A
 
 
-LEFT = example_rig().eyes["left"]
+def with_reported(tangents: list[float], T_V_H: Float64 = LEFT.T_V_H) -> Rig:
+    view = HeadsetView(T_V_H, np.array(tangents), 1280, 720)
+    headset = HeadsetIdentity("00", "", "", "", 1, {"left": view})
+    return dataclasses.replace(example_rig(), headset=headset)
+
+
+FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 LEFT_HANDED = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
@@ -59,7 +67,25 @@ LEFT_HANDED = np.diag([1.0, 1.0, -1.0, 1.0])
             lambda: dataclasses.replace(example_rig(), T_H_D=np.full((4, 4), 1e300)),
             "T_H_D .* rigid",
         ),
-        (lambda: with_depth_camera(fx=np.nan), "depth_camera must be finite"),
+        (lambda: with_depth_camera(fx=np.nan), "depth_camera: fx is nan"),
+        (lambda: with_depth_camera(fx=10.05), "depth_camera: fx is 10.05 px, but must lie between"),
+        (lambda: with_depth_camera(fy=600.0), "fx is 1005 px and fy 600 px, but pixels are about"),
+        (lambda: with_depth_camera(fx=600.0), "fx is 600 px and fy 1005 px, but pixels are about"),
+        (lambda: with_depth_camera(cx=0.0), "depth_camera: cx is 0 px, but must lie near the mid"),
+        (lambda: with_depth_camera(width=720, height=1280), "cx is 639.5 .* another size of image"),
+        (lambda: with_display(K=edited(LEFT.K, 0, 0, 24.56)), "left.K: fx is 24.56 px"),
+        (lambda: with_display(K=edited(LEFT.K, 1, 2, 10.0)), "left.K: cy is 10 px"),
+        (lambda: with_display(T_V_H=rigid(None, [0.06, 0.4, 0])), "T_V_H: .* 0.404 m from"),
+        (lambda: with_display(T_V_H=FROM_OPENGL @ LEFT.T_V_H), "T_V_H: .* 179° away .* OpenGL"),
+        (
+            lambda: with_reported([-0.5, 0.5, -0.01, 0.01]),
+            r"headset\.left\.tangents: fy is 36000 px",
+        ),
+        (
+            lambda: with_reported([-1.5, 0.1, -0.5, 0.5]),
+            r"headset\.left\.tangents: cx is .* middle",
+        ),
+        (lambda: with_reported([-0.5, 0.5, -0.3, 0.3], np.diag([-1.0, 1, -1, 1])), "180° away"),
         (lambda: with_depth_camera(width=0), "depth_camera: width_px"),
         (lambda: with_depth_camera(distortion=(0.1,)), r"depth_camera\.distortion must hold"),
         (lambda: with_depth_camera(distortion=(np.inf,) * 5), r"depth_camera\.distortion"),

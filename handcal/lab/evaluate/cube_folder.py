@@ -142,7 +142,7 @@ def find_captures(folder: Path) -> tuple[list[CapturedPose], dict[str, str]]:
 
 
 def images_in(folder: Path) -> dict[str, Path]:
-    """Return the PNG and JPEG images in a folder by their names without suffix.
+    """Return the images in a folder by their names without suffix.
 
     Where there are both, it is the PNG, which comes last.
 

@@ -9,13 +9,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import TypeAlias
 
-import cv2
 import numpy as np
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
 from handcal.core.types import Intrinsics, UInt8
-from handcal.io.images import read_image
+from handcal.io.images import read_grey
 from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
 from handcal.rig.boards.board import BoardError
@@ -149,4 +148,4 @@ def _noted(left_out: dict[str, str], name: str) -> Iterator[None]:
 
 
 def _read(path: Path) -> UInt8:
-    return read_image(path, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+    return read_grey(path)

@@ -7,12 +7,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cv2
-
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, EyeDisplay, Intrinsics, Rig
-from handcal.io.images import read_image
+from handcal.io.images import image_named, read_grey
 from handcal.report.document import Column, Report, Section, Table, facts
 from handcal.report.provenance import made_with
 from handcal.report.write import write_report
@@ -160,7 +158,7 @@ def _read_eye(
     folder = settings.folder
     camera = read_intrinsics(settings.camera or folder / "camera.json")
     grid = grid_on(display.width_px, display.height_px, settings.square_px)
-    pictures = [folder / eye / "grid.png"]
+    pictures = [image_named(folder / eye, "grid")]
     if not pictures[0].exists():
         pictures = image_files([folder / eye / "grid"])
     seen = {path.name: _find_grid(path, grid) for path in pictures}
@@ -186,7 +184,7 @@ def _read_eye(
 
 def _find_grid(picture: Path, grid: Grid) -> GridView:
     try:
-        return find_grid(read_image(picture, cv2.IMREAD_GRAYSCALE), grid)
+        return find_grid(read_grey(picture), grid)
     except BoardError as error:
         raise HandcalError(f"{picture}: {error}") from error
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
+from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import Float64, Intrinsics, UInt8
-from handcal.io.images import IMAGE_SUFFIXES, read_image
+from handcal.io.images import IMAGE_KINDS, IMAGE_SUFFIXES, read_grey
 from handcal.rig.boards.board import Board, BoardError, BoardView
 from handcal.rig.boards.finder import find_board
 from handcal.rig.lens.fit import rms
@@ -29,6 +30,8 @@ _STANDS_OUT = 1.5
 _EXPLAINED = 3
 _PRESUMED = "presumably as in the first images: "
 _LEAST_MOVED_SHARE = 0.03
+_FRACTION = r"(?:\D?(\d{1,9}))?"
+"""Of a second, in the pattern of a time stamp."""
 
 
 class ViewsError(HandcalError):
@@ -79,7 +82,7 @@ def board_image(name: str, image: UInt8, board: Board, presumed: str = "") -> Bo
 
 
 def image_files(paths: Iterable[Path]) -> list[Path]:
-    """Return the PNG and JPEG files among `paths` and in the folders among them, by name.
+    """Return the image files among `paths` and in the folders among them, by name.
 
     Raises
     ------
@@ -99,7 +102,7 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
         empty = [str(path) for path in paths if path.exists()]
         where = f" in {', '.join(empty[:3])}" if empty else ""
         why = f": {', '.join(missing[:3])} does not exist" if missing else ""
-        raise FileError(f"no PNG or JPEG images{where}{why}")
+        raise FileError(f"no {IMAGE_KINDS} images{where}{why}")
     if len(files) > MAX_VIEWS:
         raise FileError(f"{len(files)} images are more than the {MAX_VIEWS} allowed")
     name, count = Counter(file.name for file in files).most_common(1)[0]
@@ -126,8 +129,7 @@ def read_views(
     for number, file in enumerate(files):
         progress.at(number / len(files), file.name)
         try:
-            image = read_image(file, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
-            views.append(board_image(file.name, image, board, _presumed(views)))
+            views.append(board_image(file.name, read_grey(file), board, _presumed(views)))
         except (FileError, ValueError) as error:
             views.append(BoardImage(file.name, None, str(error)))
     return tuple(views)
@@ -250,23 +252,90 @@ def coverage(found: Iterable[BoardView]) -> Coverage:
 def pair_views(
     first: Sequence[BoardImage], second: Sequence[BoardImage]
 ) -> tuple[tuple[BoardImage, BoardImage], ...]:
-    """Pair the views of two cameras by the last number in their names, as left07 and right07.
+    """Pair the views of two cameras by their names.
 
-    If one view of a pair is left out, so is the other.
+    Equal names belong together, then names with the same numbers, with the nearest time stamps,
+    and with the same last number, as left07 and right07: what pairs most images is taken. If one
+    view of a pair is left out, so is the other.
 
     Raises
     ------
     ViewsError
-        If a number occurs twice in one set, or none in both.
+        If none belong together, or the last number, if nothing else pairs, occurs twice in one set.
     """
-    numbered = [_by_number(views) for views in (first, second)]
-    shared = sorted(numbered[0].keys() & numbered[1].keys())
-    if not shared:
+    pairings = [_by_key(first, second, _stem), _by_key(first, second, _numbers)]
+    pairings.append(_by_time(first, second))
+    try:
+        numbered = [_by_number(views) for views in (first, second)]
+    except ViewsError:
+        if not any(pairings):
+            raise
+    else:
+        shared = sorted(numbered[0].keys() & numbered[1].keys())
+        pairings.append([(numbered[0][number], numbered[1][number]) for number in shared])
+    pairs = max(pairings, key=len)
+    if not pairs:
         raise ViewsError(
-            "no two images belong together: the two of a pair must end in the same number, as "
-            "depth07.png and headset07.png"
+            "no two images belong together: give the two of a pair the same name, or let them end "
+            "in the same number, as depth07.png and headset07.png"
         )
-    return tuple(_as_pair(numbered[0][number], numbered[1][number]) for number in shared)
+    return tuple(_as_pair(*pair) for pair in pairs)
+
+
+def _stem(view: BoardImage) -> str:
+    return Path(view.name).stem.lower()
+
+
+def _numbers(view: BoardImage) -> tuple[int, ...]:
+    return tuple(int(one[-18:]) for one in re.findall(r"\d+", Path(view.name).stem))
+
+
+def _by_key(
+    first: Iterable[BoardImage], second: Iterable[BoardImage], key: Callable[[BoardImage], Any]
+) -> list[tuple[BoardImage, BoardImage]]:
+    """Return the pairs whose key is the same, where it is unique and not empty."""
+    ours, theirs = ({key(view): view for view in views if key(view)} for views in (first, second))
+    counts = [Counter(map(key, views)) for views in (first, second)]
+    shared = sorted(one for one in ours.keys() & theirs.keys() if counts[0][one] == counts[1][one])
+    return [(ours[one], theirs[one]) for one in shared if counts[0][one] == 1]
+
+
+def _by_time(
+    first: Sequence[BoardImage], second: Sequence[BoardImage]
+) -> list[tuple[BoardImage, BoardImage]]:
+    """Return the pairs whose time stamps are each other's nearest.
+
+    They must be less than half as far apart as the images of a camera are.
+    """
+    stamps_s = [np.array([_stamp_s(view.name) for view in views]) for views in (first, second)]
+    if any(len(one) < 2 or np.isnan(one).any() for one in stamps_s):
+        return []
+    limit_s = 0.5 * min(np.diff(np.sort(one)).min() for one in stamps_s)
+    apart_s = np.abs(stamps_s[0][:, None] - stamps_s[1])
+    nearest = apart_s.argmin(axis=1)
+    return [
+        (first[row], second[column])
+        for row, column in enumerate(nearest)
+        if apart_s[row, column] < limit_s and apart_s[:, column].argmin() == row
+    ]
+
+
+def _stamp_s(name: str) -> float:
+    """Return the time in a name, as a date with a time, or since 1970; NaN without one."""
+    stem = Path(name).stem
+    if match := re.search(rf"(20\d{{6}})\D?(\d\d)\D?(\d\d)\D?(\d\d){_FRACTION}", stem):
+        day, hours, minutes, seconds, fraction = match.groups(default="0")
+        try:
+            whole_s = 86400 * datetime.strptime(day, "%Y%m%d").toordinal()
+        except ValueError:
+            return np.nan
+        whole_s += 3600 * int(hours) + 60 * int(minutes) + int(seconds)
+    elif match := re.search(rf"(?<!\d)([12]\d{{9}}){_FRACTION}(?!\d)", stem):
+        seconds, fraction = match.groups(default="0")
+        whole_s = int(seconds)
+    else:
+        return np.nan
+    return whole_s + float(f"0.{fraction}")
 
 
 def _as_pair(first: BoardImage, second: BoardImage) -> tuple[BoardImage, BoardImage]:
@@ -282,7 +351,10 @@ def _by_number(views: Iterable[BoardImage]) -> dict[int, BoardImage]:
             continue
         number = int(numbers[-1][-18:])
         if number in numbered:
-            raise ViewsError(f"{numbered[number].name} and {one.name} end in the same number")
+            raise ViewsError(
+                f"{numbered[number].name} and {one.name} end in the same number: give the two of a "
+                "pair the same name"
+            )
         numbered[number] = one
     return numbered
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from handcal.core.errors import FileError
 from handcal.core.geometry import camera_matrix
 from handcal.core.types import Float64, Intrinsics, UInt8
-from handcal.io.images import read_image
+from handcal.io.images import image_named, read_image
 from handcal.rig.boards.board import BoardError
 from handcal.rig.displays.display import undistort
 from handcal.rig.displays.grid import GridView
@@ -52,7 +52,7 @@ def gray_patterns(
 def read_gray_code(
     folder: Path, width_px: int, height_px: int, stripe_px: int = STRIPE_PX
 ) -> GridView:
-    """Read the camera's images of all patterns, PNG named as in `gray_patterns`, and decode them.
+    """Read the camera's images of all patterns, named as in `gray_patterns`, and decode them.
 
     Raises
     ------
@@ -62,13 +62,14 @@ def read_gray_code(
         If the images are not of one size, or show too little of the display.
     """
     names = [name for name, _ in gray_patterns(width_px, height_px, stripe_px)]
-    missing = [name for name in names if not (folder / f"{name}.png").exists()]
+    paths = {name: image_named(folder, name) for name in names}
+    missing = [name for name, path in paths.items() if not path.exists()]
     if missing:
         raise FileError(
             f"{folder}: {len(missing)} of {len(names)} images are missing, such as "
             f"{missing[0]}.png: name each as the pattern that it shows"
         )
-    images = {name: read_image(folder / f"{name}.png", cv2.IMREAD_GRAYSCALE) for name in names}
+    images = {name: read_image(path, cv2.IMREAD_GRAYSCALE) for name, path in paths.items()}
     return decode_gray_code(images, width_px, height_px, stripe_px)
 
 

@@ -24,6 +24,7 @@ from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
 from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION, Rejection
+from handcal.rig.check import check_headset
 
 _LEAST_RATE_HZ = 55.0
 _MOST_LOST = 0.1
@@ -126,6 +127,10 @@ def _lost_shares(link: LinkStatistics) -> tuple[float, float]:
 
 
 def _other_than_rig(device: HeadsetIdentity, rig: Rig) -> str:
+    try:
+        check_headset(device)
+    except ValueError as error:
+        return f"what it reports is implausible, so its app or runtime is to be corrected: {error}"
     for eye in EYES:
         view, display = device.views.get(eye), rig.eyes[eye]
         if view is not None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QLabel, QStackedLayout, QTabWidget, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QStackedLayout, QStackedWidget, QTabWidget, QWidget
 
 from handcal.core.types import EYES, Alignment, Eye
 from handcal.register.results import Results
@@ -17,6 +17,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.keys import add_action
 from handcal_gui.panels.results.compare_tab import CompareTab
 from handcal_gui.panels.results.convergence_plot import ConvergencePlot
+from handcal_gui.panels.results.distance_tab import DistanceTab
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import SPACING_PX
@@ -49,7 +50,7 @@ _MARGINS_PX = 3 * SPACING_PX // 2
 
 
 class ResultsPanel(QWidget):
-    """Shows results in tabs: eyes, convergence, residuals, alignments, comparison.
+    """Shows results in tabs: eyes, plots, residuals, alignments, comparison.
 
     Attributes
     ----------
@@ -79,6 +80,7 @@ class ResultsPanel(QWidget):
         )
         self._another = QLabel()
         self._another.setWordWrap(True)
+        self._distances = DistanceTab()
         self._compare = CompareTab()
         self._compare.requested.connect(self.compare_requested)
         self._compare.cancelled.connect(self.compare_cancelled)
@@ -120,12 +122,16 @@ class ResultsPanel(QWidget):
         for card in self._cards.values():
             card.setVisible(has_verdicts)
         self._show_eyes(results)
-        for tab in (self._iterations, self._residuals, self._alone):
+        if not results.alignments:
+            self._choice.setCurrentIndex(0)
+        self._choice.setEnabled(bool(results.alignments))
+        for tab in (self._residuals, self._alone):
             self._tabs.setTabVisible(self._tabs.indexOf(tab), bool(results.alignments))
         self._convergence.show_results(results)
         self._residuals.show_results(results, alignments)
         self._alignments.show_rows([q.name for q in PHI], single_alignment_rows(results))
         self._another.setText(another_text(results))
+        self._distances.show_results(results)
         self._compare.show_results(results)
         self._fit()
 
@@ -168,7 +174,7 @@ class ResultsPanel(QWidget):
             return ""
         rows = verdict_rows(self._results, self._judged)
         verdicts = rows_as_text((tr("Verdict"), tr("Reason")), rows)
-        tables = self._numbers, self._alignments, self._compare.table
+        tables = self._numbers, self._alignments, self._distances.table, self._compare.table
         return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
 
     def _fit(self) -> None:
@@ -208,9 +214,8 @@ class ResultsPanel(QWidget):
         tabs.setUsesScrollButtons(False)  # a long title is shortened instead
         tabs.setElideMode(Qt.TextElideMode.ElideRight)
         tabs.addTab(self._eyes_tab(), tr("Eyes"))
-        self._iterations = self._iterations_tab()
-        tabs.addTab(self._iterations, tr("Iterations"))
-        tabs.setTabToolTip(1, tr("Convergence of each registration"))
+        tabs.addTab(self._plots_tab(), tr("Plots"))
+        tabs.setTabToolTip(1, tr("Error against distance, and convergence of each registration"))
         tabs.addTab(self._residuals, tr("Residuals"))
         self._alone = self._alignments_tab()
         tabs.addTab(self._alone, tr("Single"))
@@ -226,11 +231,22 @@ class ResultsPanel(QWidget):
         vbox(cards, (self._numbers, 1), on=tab, margins=SPACING_PX // 2, spacing=SPACING_PX // 2)
         return tab
 
-    def _iterations_tab(self) -> QWidget:
-        tab = QWidget()
+    def _plots_tab(self) -> QWidget:
+        tab, iterations, stack = QWidget(), QWidget(), QStackedWidget()
         meaning = paragraph("", tr("A line that ends level has converged."))
         meaning.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
-        vbox((self._convergence, 1), meaning, on=tab, margins=0, spacing=0)
+        vbox((self._convergence, 1), meaning, on=iterations, margins=0, spacing=0)
+        self._choice = QComboBox()
+        self._choice.setObjectName("plots-choice")
+        self._choice.setAccessibleName(tr("Plot"))
+        for name, plot in (
+            (tr("Error against distance"), self._distances),
+            (tr("Convergence"), iterations),
+        ):
+            self._choice.addItem(name)
+            stack.addWidget(plot)
+        self._choice.currentIndexChanged.connect(stack.setCurrentIndex)
+        vbox(self._choice, (stack, 1), on=tab, margins=SPACING_PX // 2, spacing=SPACING_PX // 2)
         return tab
 
     def _alignments_tab(self) -> QWidget:

@@ -14,6 +14,7 @@ from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.boards.choose import ALIKE
 from handcal.rig.displays.grid import Grid, draw_grid, grid_on
+from handcal.rig.steps import view_in
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -115,7 +116,7 @@ class DisplayPage(StepPage):
             )
         )
         files = tr("Matrices (*.txt *.json *.yaml *.yml)")
-        view = PathField(tr("Rendering camera"), "file", files, tr("As in the rig"))
+        view = PathField(tr("Rendering camera"), "file", files, tr("As in the rig"), read=view_in)
         view.setToolTip(
             tr(
                 "Transform from the headset rig to this eye's rendering camera, T_V_H, as the "

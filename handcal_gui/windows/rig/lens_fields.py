@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QComboBox
 
+from handcal.rig.formats import read_camera
 from handcal.rig.lens.camera import LensChoice
 from handcal_gui.translation import tr
 from handcal_gui.widgets.fields import choice
@@ -21,8 +22,12 @@ LENSES: dict[LensChoice, str] = {
 
 def intrinsics_field(name: str) -> PathField:
     """Return a field for a file of intrinsics, which are solved if it is empty."""
-    field = PathField(name, "file", INTRINSICS_FILES, tr("Solved from the images"))
-    field.setToolTip(tr("OpenCV FileStorage, ROS camera_info or handcal JSON."))
+    field = PathField(
+        name, "file", INTRINSICS_FILES, tr("Solved from the images"), read=read_camera
+    )
+    field.setToolTip(
+        tr("As OpenCV, ROS, Kalibr, RealSense, Open3D, Azure Kinect or handcal write them.")
+    )
     return field
 
 

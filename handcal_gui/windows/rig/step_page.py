@@ -19,6 +19,7 @@ from handcal_gui.translation import tr
 from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.layouts import scrollable, vbox
+from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.images_panel import ImagesPanel
 from handcal_gui.windows.rig.project import RigProject
 from handcal_gui.windows.rig.solve_box import SolveBox
@@ -221,7 +222,8 @@ class StepPage(QWidget):
             count = f" ({panel.count})" if panel.count else ""
             self._tabs.setTabText(place, f"{title}{count}")
         self._tabs.setTabEnabled(self._tabs.count() - 1, self.box.table.rowCount() > 0)
-        need = "" if self._is_looking else self.need
+        problems = (field.problem for field in self.form.findChildren(PathField))
+        need = "" if self._is_looking else next(filter(None, problems), self.need)
         self.box.allow(need, is_busy=self._is_looking or self.box.bar.is_busy)
 
 

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from handcal.camera.take_board import DEPTH_TO_COLOR, IMAGER
 from handcal.rig.boards.views import ASKED_VIEWS
+from handcal.rig.formats import read_intrinsics, read_pose
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
 from handcal_gui.widgets.path_field import INTRINSICS_FILES, PathField
@@ -20,8 +21,8 @@ from handcal_gui.windows.rig.step_page import StepPage, images_needed
 
 _HINT = tr(
     "Take {} or more pairs of simultaneous images of the board: near and far, in all parts of both "
-    "views, tilted by 20° to 45° in all directions. The names of the two images of a pair must end "
-    "in the same number, such as depth07.png and headset07.png."
+    "views, tilted by 20° to 45° in all directions. Give the two images of a pair the same name, "
+    "or let them end in the same number, as depth07.png and headset07.png do."
 ).format(ASKED_VIEWS)
 
 
@@ -30,7 +31,11 @@ class StereoPage(StepPage):
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
         imager = PathField(
-            tr("Depth imager's intrinsics"), "file", INTRINSICS_FILES, tr("Not needed")
+            tr("Depth imager's intrinsics"),
+            "file",
+            INTRINSICS_FILES,
+            tr("Not needed"),
+            read=read_intrinsics,
         )
         imager.setToolTip(
             tr(
@@ -43,6 +48,7 @@ class StereoPage(StepPage):
             "file",
             tr("Poses (*.yaml *.yml *.json)"),
             tr("Not needed"),
+            read=read_pose,
         )
         pose.setToolTip(imager.toolTip())
         form = EntriesForm(

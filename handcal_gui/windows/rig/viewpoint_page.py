@@ -8,6 +8,7 @@ from functools import partial
 from PySide6.QtWidgets import QWidget
 
 from handcal.rig.boards.views import ASKED_VIEWS
+from handcal.rig.formats import read_intrinsics
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.translation import tr
 from handcal_gui.widgets.entries_form import EntriesForm
@@ -30,7 +31,13 @@ class ViewpointPage(StepPage):
     """Images of the board and the intrinsics solved from them, or a file of intrinsics."""
 
     def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
-        given = PathField(tr("Intrinsics"), "file", INTRINSICS_FILES, tr("Solved from the images"))
+        given = PathField(
+            tr("Intrinsics"),
+            "file",
+            INTRINSICS_FILES,
+            tr("Solved from the images"),
+            read=read_intrinsics,
+        )
         form = EntriesForm(
             {
                 "images": (

@@ -369,7 +369,7 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     assert child(program, ReviewPage, "reviewPage").residuals.isHidden()
     tabs = child(program, QTabWidget, "results-tabs")
     shown = [tabs.tabText(i) for i in range(tabs.count()) if tabs.isTabVisible(i)]
-    assert shown == ["Eyes", "Compare"]
+    assert shown == ["Eyes", "Plots", "Compare"]
     assert child(program, QPushButton, "reviewExport").isEnabled()
     assert program.windows.export() is not None
     program.window.panels.results.compare_requested.emit("linear")

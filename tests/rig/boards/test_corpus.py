@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.geometry import rigid
 from handcal.rig.boards.board import Board
-from handcal.rig.boards.views import BoardImage, ViewsError, pair_views, read_views
+from handcal.rig.boards.views import BoardImage, ViewsError, image_files, pair_views, read_views
 from handcal.rig.lens.camera import CameraSettings, calibrate_camera
 from handcal.rig.lens.lens import FisheyeIntrinsics
 from handcal.rig.lens.stereo import StereoSettings, calibrate_stereo
@@ -62,6 +62,19 @@ def test_a_fisheye_is_recognised(shared_data: Path) -> None:
     assert result.rms_px < 0.59
     assert np.linalg.norm(result.T_H_D[:3, 3]) == pytest.approx(0.111, rel=0.02)
     assert "moved between the two exposures" in result.verdict.reason
+
+
+def test_pairs_with_equal_names_give_their_true_pose(shared_data: Path) -> None:
+    folder = shared_data / "field" / "stereo_names"
+    board = Board(kind="checkerboard", squares=(11, 8), square_m=0.02)
+    left, right = (read_views(image_files([folder / side]), board) for side in ("left", "right"))
+    pairs = pair_views(left, right)
+    assert [a.name for a, _ in pairs] == [b.name for _, b in pairs] == [a.name for a in left]
+    result = calibrate_stereo(pairs)
+    truth = json.loads((folder / "truth.json").read_text())
+    np.testing.assert_allclose(result.T_H_D[:3, 3], truth["t_m"], atol=2e-4)
+    turn = Rotation.from_matrix(result.T_H_D[:3, :3]).as_rotvec(degrees=True)
+    np.testing.assert_allclose(turn, truth["rotation_deg"], atol=0.03)
 
 
 Pairs = Sequence[tuple[BoardImage, BoardImage]]

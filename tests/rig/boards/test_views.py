@@ -44,18 +44,20 @@ def test_images_are_read_and_what_is_wrong_is_kept(tmp_path: Path) -> None:
     assert told == [view.name for view in views] == ["a1.png", "a2.png", "a3.jpg", "a4.png"]
     assert [view.found is not None for view in views] == [False, True, False, False]
     problems = [view.problem for view in views]
-    for problem, said in zip(problems, ("too dark", "", "neither", "at least 64"), strict=True):
+    for problem, said in zip(problems, ("too dark", "", "a PNG, ", "at least 64"), strict=True):
         assert said in problem
 
 
 def test_files_must_be_there_and_told_apart(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
-    with pytest.raises(FileError, match=f"^no PNG or JPEG images: {gone} does not exist$"):
+    with pytest.raises(
+        FileError, match=f"^no PNG, JPEG, TIFF, BMP or PGM images: {gone} does not exist$"
+    ):
         image_files([gone])
-    both = f"^no PNG or JPEG images in {tmp_path}: {gone} does not exist$"
+    both = f"^no PNG, JPEG, TIFF, BMP or PGM images in {tmp_path}: {gone} does not exist$"
     with pytest.raises(FileError, match=both):
         image_files([tmp_path, gone])
-    with pytest.raises(FileError, match="no PNG or JPEG"):
+    with pytest.raises(FileError, match="no PNG, JPEG, TIFF, BMP or PGM"):
         image_files([tmp_path])
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
@@ -112,6 +114,38 @@ def test_pairs_end_in_the_same_number() -> None:
         pair_views(left[:1], right)
     with pytest.raises(ViewsError, match="end in the same number"):
         pair_views([BoardImage("a1", None), BoardImage("b1", None)], right)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "pairs"),
+    [
+        (["a", "b", "c"], ["c", "a"], [("a", "a"), ("c", "c")]),
+        (["0014_20260303_122139_601", "0017_20260303_122142_601", "0018_20260303_122143_130"],
+         ["0017_20260303_122142_601", "0014_20260303_122139_601"],
+         [("0014_20260303_122139_601",) * 2, ("0017_20260303_122142_601",) * 2]),
+        (["left_3_601", "left_4_601"], ["right_4_601", "right_3_601"],
+         [("left_3_601", "right_3_601"), ("left_4_601", "right_4_601")]),
+        (["l_1700000001.121", "l_1700000002.130", "l_1700000003.125"],
+         ["r_1700000002.125", "r_1700000003.130", "r_1700000001.130"],
+         [("l_1700000001.121", "r_1700000001.130"), ("l_1700000002.130", "r_1700000002.125"),
+          ("l_1700000003.125", "r_1700000003.130")]),
+        (["L20261303_115959_950", "L20260303_120004_950"], [], []),
+        (["L20260303_115959_950", "L20260303_120004_950"],
+         ["R20260303_120005_020", "R20260303_120000_010"],
+         [("L20260303_115959_950", "R20260303_120000_010"),
+          ("L20260303_120004_950", "R20260303_120005_020")]),
+        (["cam0_01", "cam0_02"], ["cam1_02", "cam1_01"],
+         [("cam0_01", "cam1_01"), ("cam0_02", "cam1_02")]),
+    ],
+)  # fmt: skip
+def test_pairs_by_names(left: list[str], right: list[str], pairs: list[tuple[str, str]]) -> None:
+    views = ([BoardImage(f"{name}.png", None) for name in names] for names in (left, right))
+    if not pairs:
+        with pytest.raises(ViewsError, match="give the two of a pair the same name"):
+            pair_views(*views)
+    else:
+        found = [(Path(a.name).stem, Path(b.name).stem) for a, b in pair_views(*views)]
+        assert found == pairs
 
 
 def test_a_pair_is_left_out_if_one_of_its_views_is() -> None:

@@ -53,6 +53,9 @@ GOOD = LinkStatistics(
     bytes_sent=0, bytes_received=0,
 )  # fmt: skip
 ABSENT = replace(GOOD, connected=False)
+BACKWARD = HeadsetView(
+    np.diag([-1.0, 1.0, -1.0, 1.0]), np.array([-0.3, 0.3, -0.17, 0.17]), 1268, 720
+)
 VIEW = HeadsetView(np.eye(4), np.array([-0.3, 0.3, -0.2, 0.2]), 1440, 936)
 
 
@@ -88,6 +91,11 @@ def test_a_good_headset_is_described_by_name() -> None:
         (DEVICE, replace(GOOD, pose_rate_hz=30.0), "fewer than 60 poses"),
         (DEVICE, replace(GOOD, clock_uncertainty_ms=None), "clock is not known well"),
         (replace(DEVICE, views={"left": VIEW}), GOOD, "1440×936 px, the rig's 1268×720"),
+        (
+            replace(DEVICE, views={"left": BACKWARD}),
+            GOOD,
+            "left.T_V_H: the rendering camera looks 180° away",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_sentence(

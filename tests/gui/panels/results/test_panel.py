@@ -15,6 +15,7 @@ from pytestqt.qtbot import QtBot
 from handcal.calibration.states import State
 from handcal.core.geometry import transform
 from handcal.core.types import EYES, Alignment, Rig, Verdict, VerdictName
+from handcal.register.benefit import DISTANCES_M
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
@@ -25,6 +26,7 @@ from handcal_gui.panels.results.residual_map import ResidualMap
 from handcal_gui.panels.results.verdict_card import VerdictCard
 from handcal_gui.theme import colors
 from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import REGISTRATION
 from tests.gui.helpers import child, show
 from tests.gui.views import with_target
@@ -120,7 +122,7 @@ def test_without_alignments_no_tab_is_of_them(
     panel.show_results(replace(results, alignments={}), {})
     tabs = child(panel, QTabWidget)
     seen = [tabs.tabText(i) for i in range(tabs.count()) if tabs.isTabVisible(i)]
-    assert seen == ["Eyes", "Compare"]
+    assert seen == ["Eyes", "Plots", "Compare"]
 
 
 def test_a_low_panel_has_room_for_all_numbers(qtbot: QtBot, solved: ResultsPanel) -> None:
@@ -210,6 +212,20 @@ def test_the_measures_of_fit_have_different_names(solved: ResultsPanel, results:
         assert plot.item.getAxis("left").labelText == "Point RMS (mm)"
 
 
+def test_the_error_against_distance_is_the_benefit(solved: ResultsPanel, results: Results) -> None:
+    table = child(solved, NumberTable, "error-by-distance-table")
+    assert table.columnCount() == 4
+    assert table.rowCount() == len(DISTANCES_M)
+    lines = child(solved, Plot, "error-by-distance").item.listDataItems()
+    for place, eye in enumerate(EYES):
+        for number, one in enumerate(results.benefits[eye].by_distance):
+            shown = [table.item(number, 2 * place + column) for column in (0, 1)]
+            assert tuple(cell.text() for cell in shown if cell) == one.texts
+        after = lines[4 * place + 2].getData()[1]
+        assert list(after) == [one.after_arcmin for one in results.benefits[eye].by_distance]
+    assert results.benefits["left"].by_distance[2].texts[1] in solved.as_text()
+
+
 def test_lines_that_end_together_share_one_name(solved: ResultsPanel, results: Results) -> None:
     plot = child(solved, ConvergencePlot)
 
@@ -234,6 +250,7 @@ def test_lines_that_end_together_share_one_name(solved: ResultsPanel, results: R
 def test_the_names_of_lines_fit_into_the_plot(solved: ResultsPanel, width_px: int) -> None:
     solved.resize(width_px, 320)
     child(solved, QTabWidget).setCurrentIndex(1)
+    child(solved, QComboBox, "plots-choice").setCurrentIndex(1)
     QApplication.processEvents()
     item = child(solved, ConvergencePlot).item
     frame = item.vb.mapRectToScene(item.vb.boundingRect())

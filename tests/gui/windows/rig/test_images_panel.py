@@ -225,7 +225,7 @@ def test_the_reason_for_no_images_is_reported(
 ) -> None:
     panel.look((str(tmp_path), str(tmp_path)), photographs.work.board, ())
     qtbot.waitUntil(lambda: not panel.bar.is_busy)
-    assert "No PNG or JPEG" in text(panel.search, "imagesFound")
+    assert "No PNG, JPEG, TIFF, BMP or PGM" in text(panel.search, "imagesFound")
     panel.look((str(tmp_path), ""), photographs.work.board, ())
     assert not panel.bar.is_busy
 

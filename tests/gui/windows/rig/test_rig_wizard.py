@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -226,6 +227,27 @@ def test_intrinsics_that_nobody_judged_are_not_ticked(
     wizard.project.camera_solved()
     assert marks(wizard)[VIEWPOINT] == "the file cannot be read"
     assert child(wizard, QLabel, "verdictHealth").accessibleName() == "Problem"
+
+
+def test_a_file_is_checked_when_it_is_chosen(
+    qtbot: QtBot, wizard: RigWizard, photographs: Any, tmp_path: Path
+) -> None:
+    wizard.show_step(STEREO)
+    page, file = wizard.page, tmp_path / "camera.json"
+    assert isinstance(page, StepPage)
+    wait(qtbot, wizard)
+    assert page.main.isEnabled()
+    write_intrinsics(file, photographs.viewpoint, "json")
+    values = json.loads(file.read_text())
+    file.write_text(json.dumps(values | {"fx": values["fx"] / 100}))
+    for chosen, said in ((file, "but must lie between"), (tmp_path / "gone.json", "Cannot read")):
+        page.form.enter(depth_intrinsics=str(chosen))
+        wait(qtbot, wizard)
+        assert not page.main.isEnabled()
+        assert said in child(wizard, QLabel, "verdictFound").text()
+        page.form.enter(depth_intrinsics="")
+        wait(qtbot, wizard)
+        assert page.main.isEnabled()
 
 
 def test_a_low_screen_shows_the_buttons_below(wizard: RigWizard) -> None:
