@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from handcal.core.geometry import camera_matrix, image_points, invert, transform
 from handcal.core.types import Bool, Float64, Frame, Intrinsics
 from handcal.hand.settings import NEARER_M, Roi, RoiSettings
-from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
+from handcal.hand.view import Box, between, deproject, gate_problem, pixels_of, view_depth
 
 STEP_PX = 8
 """Step of the coarse image, in pixels of the depth image: fine enough to locate a hand."""
 
 _PIXELS_MIN = 6
 _DEPTH_SPREAD_M = 0.10  # within one hand
-_INSIDE_M = 0.05  # from an end of the gate to where all of a hand is within it
+_CROSSES = 0.1  # share of a hand beyond the gate that may leave too little of it within
 _SHIFTS, _STILL_PX = 3, 1.0
 _MEASURED_MIN = 0.1  # least share of a box with depth, to say how far it is
 
@@ -73,28 +73,24 @@ class CoarseCloud:
                 "the depth camera measures nothing where the hand is; move it back, or out of "
                 "strong light"
             )
-        near_m, far_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
+        gate_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
         nearest_m = np.quantile(depth_m, 0.1)
-        hand_m = float(np.median(depth_m[depth_m < nearest_m + _DEPTH_SPREAD_M]))
+        depth_m = depth_m[depth_m < nearest_m + _DEPTH_SPREAD_M]
+        hand_m = float(np.median(depth_m))
         side_m = float(np.sqrt(area_px)) * hand_m / self._color_camera.fx
         if side_m < settings.side_min_m:
             return (
                 f"a hand at the measured {hand_m:.2f} m would be only {100 * side_m:.0f} cm large: "
                 "depth is in a wrong unit; correct the depth scale of the camera or recording"
             )
-        where = f"at {100 * hand_m:.0f} cm"
-        if hand_m < near_m:
-            back_cm = 100 * (near_m + _INSIDE_M - hand_m)
-            return f"the hand is too near, {where}; move it back by {back_cm:.0f} cm"
-        if side_m > settings.side_max_m:
+        if hand_m >= gate_m[0] and side_m > settings.side_max_m:
             return (
                 f"the depth camera measures only the background, at {hand_m:.2f} m, where the hand "
                 "is; the hand may be too near: move it back"
             )
-        if hand_m > far_m:
-            near_cm = 100 * (hand_m - far_m + _INSIDE_M)
-            return f"the hand is too far, {where}; bring it nearer by {near_cm:.0f} cm"
-        return "most of the hand is hidden or without depth; show all of it to the camera"
+        return gate_problem(depth_m, gate_m, _CROSSES) or (
+            "most of the hand is hidden or without depth; show all of it to the camera"
+        )
 
     def follow(self, track: Track) -> Track | None:
         """Move a track's box with the pixels in it; None if most of them are gone."""
