@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.camera.images import (
-    DEPTH_SCALES_M,
+    depth_scale_from,
     intrinsics_from,
-    number_from,
     read_color,
     read_depth,
 )
@@ -93,7 +92,7 @@ class FolderCamera(PlayedCamera):
             raise FileError(f"{path} must describe depth and, unless it is null, color")
         self.depth_intrinsics = intrinsics_from(depth, path)
         self._color_intrinsics = None if color is None else intrinsics_from(color, path)
-        self._depth_scale_m = number_from(values, path, "depth_scale", *DEPTH_SCALES_M)
+        self._depth_scale_m = depth_scale_from(values, path)
         self._T_C_D = _rigid_from(values.get("T_C_D"), path)
         try:
             self.identity = identity_from_json(values.get("device"), "device")

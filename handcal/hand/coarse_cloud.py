@@ -19,6 +19,10 @@ STEP_PX = 8
 _PIXELS_MIN = 6
 _DEPTH_SPREAD_M = 0.10  # within one hand
 _CROSSES = 0.1  # share of a hand beyond the gate that may leave too little of it within
+# Something at the hand's place is an object if it fills this share of the box, and the box's
+# surroundings, of the same area, less than this multiple as much; it is as deep as that share of
+# its distance. This much larger than a hand it is one in a wrong unit.
+_OBJECT_MIN, _AROUND_MAX, _OBJECT_DEPTH, _TOO_LARGE = 0.3, 0.5, 0.25, 1.3
 _SHIFTS, _STILL_PX = 3, 1.0
 _MEASURED_MIN = 0.1  # least share of a box with depth, to say how far it is
 
@@ -84,13 +88,32 @@ class CoarseCloud:
                 "depth is in a wrong unit; correct the depth scale of the camera or recording"
             )
         if hand_m >= gate_m[0] and side_m > settings.side_max_m:
-            return (
-                f"the depth camera measures only the background, at {hand_m:.2f} m, where the hand "
-                "is; the hand may be too near: move it back"
-            )
+            if not self._is_object(color_box):
+                return (
+                    f"the depth camera measures only the background, at {hand_m:.2f} m, where the "
+                    "hand is; the hand may be too near: move it back"
+                )
+            if side_m > _TOO_LARGE * settings.side_max_m:
+                return (
+                    f"a hand at the measured {hand_m:.2f} m would be {side_m:.1f} m large: depth "
+                    "is in a wrong unit; correct the depth scale of the camera or recording"
+                )
         return gate_problem(depth_m, gate_m, _CROSSES) or (
             "most of the hand is hidden or without depth; show all of it to the camera"
         )
+
+    def _is_object(self, color_box: Float64) -> bool:
+        """Return whether the nearest surface in a box of the colour image ends around it."""
+        rows, columns = pixels_of(self._view.depth > 0)
+        px, depth = self._color_px(rows, columns), self._view.depth[rows, columns]
+        wider_px = (np.sqrt(2.0) - 1.0) / 2.0 * (color_box[2:] - color_box[:2])
+        inside = inside_box(px, color_box)
+        nearest = np.quantile(depth[inside], 0.1)
+        near = depth < (1.0 + _OBJECT_DEPTH) * nearest
+        wider = inside_box(px, color_box + np.concatenate([-wider_px, wider_px]))
+        filled, around = (np.count_nonzero(near & one) for one in (inside, wider & ~inside))
+        area = float(np.prod(color_box[2:] - color_box[:2])) / STEP_PX**2
+        return bool(filled > max(_OBJECT_MIN * area, around / _AROUND_MAX))
 
     def follow(self, track: Track) -> Track | None:
         """Move a track's box with the pixels in it; None if most of them are gone."""

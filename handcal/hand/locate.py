@@ -81,6 +81,7 @@ _COVERED_MAX_M, _COVER_JUMP_M = 0.065, 0.03
 # that share beyond it is refused.
 _ALONG_GATE_M, _BEYOND_MIN, _BEYOND_MAX = 0.008, 0.01, 0.5
 # Within and without the gate it is the same hand if neither palm nor area differs by more.
+_FAR_UNIT = 2.0  # with nothing nearer than so many times the gate's end its unit may be wrong
 _ONE_HAND_M, _ONE_HAND_AREA = 0.01, 0.03
 _NOT_A_HAND = (
     "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
@@ -209,7 +210,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             raise problem
         return located if located is not None and _are_one(located, whole) else whole
     if move := gate_problem(depth_m, gate_m, 0.0 if whole.leaves_gate else _BEYOND_MAX):
-        raise HandError(move)
+        raise HandError(move + ("" if box else _unit_hint(view, settings)))
     return whole
 
 
@@ -255,6 +256,7 @@ def _locate_within(
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
             f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
+            f"{_unit_hint(view, settings)}"
         )
     _check_wrist(found)
     _check_covered(found)
@@ -272,6 +274,21 @@ def _are_one(located: LocatedHand, other: LocatedHand) -> bool:
     areas = [np.count_nonzero(one.hand) for one in (located, other)]
     apart_m = float(np.linalg.norm(located.palm_m - other.palm_m))
     return apart_m < _ONE_HAND_M and bool(min(areas) > (1.0 - _ONE_HAND_AREA) * max(areas))
+
+
+def _unit_hint(view: DepthView, settings: SegmentSettings) -> str:
+    """Return whether all depths suggest a wrong unit: most rooms begin behind a raised hand."""
+    measured = view.depth[view.depth > 0]
+    if not len(measured):
+        return ""
+    nearest_m, farthest_m = np.quantile(measured, [0.02, 0.98]) * view.scale_m
+    if nearest_m > _FAR_UNIT * settings.depth_max_m:
+        what = f"nearer than {nearest_m:.1f} m"
+    elif farthest_m < settings.depth_min_m:
+        what = f"farther than {farthest_m:.2f} m"
+    else:
+        return ""
+    return f" (nothing is measured {what}: if a hand is in view, correct the unit of depth)"
 
 
 def _pitch(view: DepthView) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -218,6 +219,12 @@ def test_nothing_within_the_gate_is_refused(shot: Shot) -> None:
         segment_hand(shoot(at_m=(0.0, 0.02, 1.2)).frame, SETTINGS)
     with pytest.raises(HandError, match="no hand-sized"):
         segment_hand(with_depth(shot.frame, np.zeros_like(shot.frame.depth)), SETTINGS)
+
+
+@pytest.mark.parametrize(("factor", "seen"), [(0.1, "farther than 0.15"), (5, "nearer than 2")])
+def test_depths_of_another_unit_are_told(shot: Shot, factor: float, seen: str) -> None:
+    with pytest.raises(HandError, match=f"{seen}.*if a hand is in view, correct the unit"):
+        segment_hand(replace(shot.frame, depth_scale_m=factor * 1e-4), SETTINGS)
 
 
 def test_wall_is_no_hand(shot: Shot) -> None:
