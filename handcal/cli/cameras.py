@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    flag,
+    folder_option,
+    number,
+    seed,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder
@@ -50,6 +60,14 @@ _ROI = arg(
     help="search region: detector, the hand that the detector finds in the colour image (the "
     "nearest of several); left or right, the leftmost or rightmost of them; depth, the nearest "
     "hand-sized object, without the detector",
+)
+GATE = arg(
+    "--gate",
+    nargs=2,
+    type=number(float, 0.05, 5.0),
+    metavar=("NEAR_M", "FAR_M"),
+    help="distances between which a hand is looked for (default: 0.35 0.70; 0.20 0.70 of a "
+    "HoloLens 2's camera for hands)",
 )
 
 
@@ -94,6 +112,7 @@ def record(arguments: argparse.Namespace) -> None:
     arg("recording", type=Path, help=".db3 or .bag file, or a recorded folder"),
     flag("--real-time", "play at the recorded frame rate, dropping frames"),
     _ROI,
+    GATE,
     json=True,
 )
 def replay(arguments: argparse.Namespace) -> None:
@@ -107,7 +126,8 @@ def replay(arguments: argparse.Namespace) -> None:
     rows: list[dict[str, Any]] = []
     playback = PlaybackSettings(real_time=arguments.real_time)
     with open_recording(arguments.recording, playback) as camera:
-        for step in play(camera, SegmentSettings(roi=arguments.roi)):
+        segmenting = SegmentSettings(arguments.roi, *gate_of(arguments, camera.identity.model))
+        for step in play(camera, segmenting):
             rows.append(_replay_row(step))
             shown = list(rows[-1].values())[:-1]
             shown_table.add_row(*map(_cell, shown))
@@ -130,6 +150,7 @@ def replay(arguments: argparse.Namespace) -> None:
     ),
     folder_option("--output", "folder for the results", required=True),
     _ROI,
+    GATE,
 )
 def segment(arguments: argparse.Namespace) -> None:
     """Segment the hand in one image pair: cloud, contour, mask and overlay."""
@@ -139,7 +160,7 @@ def segment(arguments: argparse.Namespace) -> None:
     from handcal.hand.shipped import make_finder
 
     frame = read_frame(arguments.color, arguments.depth, arguments.intrinsics)
-    cloud = make_finder(SegmentSettings(roi=arguments.roi)).find(frame)
+    cloud = make_finder(SegmentSettings(arguments.roi, *gate_of(arguments))).find(frame)
     write_segmentation(cloud, frame, make_folder(arguments.output))
     console.print(
         f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, "
@@ -151,6 +172,18 @@ def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     """Return the settings that the options describe."""
     names = [field.name for field in fields(RealSenseSettings)]
     return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
+
+
+def gate_of(arguments: argparse.Namespace, model: str = "") -> tuple[float, float]:
+    """Return the depth gate that the options describe, or that usual for a model of camera."""
+    from handcal.hand.settings import usual_gate_m
+
+    if arguments.gate is None:
+        return usual_gate_m(model)
+    near_m, far_m = arguments.gate
+    if near_m >= far_m:
+        fail(f"--gate: NEAR_M, {near_m:g}, must be less than FAR_M, {far_m:g}", 2)
+    return near_m, far_m
 
 
 def open_source(
