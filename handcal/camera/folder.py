@@ -77,7 +77,11 @@ class FolderCamera(PlayedCamera):
         self._folder = folder
         self._place = 0
         if not (folder / DESCRIPTION).is_file():
-            raise CameraError(f"{folder} is not a recording: it has no {DESCRIPTION}")
+            raise CameraError(
+                f"{folder} is not a recording: it has no {DESCRIPTION} (handcal), no "
+                "camera_intrinsic.json beside color and depth (Open3D), no depth.txt (TUM RGB-D) and no "
+                "metadata.yaml (ROS 2)"
+            )
         try:
             self._describe(read_json(folder / DESCRIPTION), folder / DESCRIPTION)
             self._frames = _read_list(folder / LIST)

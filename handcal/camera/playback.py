@@ -34,6 +34,9 @@ class PlayedCamera(Closable):
     identity: CameraIdentity
     depth_intrinsics: Intrinsics
 
+    notes: tuple[str, ...] = ()
+    """What a recording holds that is not played, with the reason, and what it lacks."""
+
     def __init__(self, settings: PlaybackSettings | None) -> None:
         self._settings = settings or PlaybackSettings()
         self._waiting: Frame | None = None

@@ -1,4 +1,4 @@
-"""Opening and writing recordings: files of librealsense and ROS 2, and folders of images."""
+"""Opening and writing recordings: files of librealsense and ROS, and folders of images."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from handcal.camera.folder import FolderCamera, record_folder
+from handcal.camera.image_folder import ImageFolderCamera, is_image_folder
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.camera.recording import RecordingCamera
 from handcal.camera.ros import RosCamera, ros_recording
@@ -17,7 +18,9 @@ RECORDING_SUFFIXES = (".db3", ".bag")
 
 
 def open_recording(path: Path, settings: PlaybackSettings | None = None) -> PlayedCamera:
-    """Return a camera that plays a ``.db3`` or ``.bag`` file, a ROS 2 recording, or a folder.
+    """Return a camera that plays a ``.db3`` or ``.bag`` file, a recording of ROS, or a folder.
+
+    The folder is one of handcal, Open3D or TUM RGB-D.
 
     Raises
     ------
@@ -26,6 +29,8 @@ def open_recording(path: Path, settings: PlaybackSettings | None = None) -> Play
     """
     if (folder := ros_recording(path)) is not None:
         return RosCamera(folder, settings)
+    if is_image_folder(path):
+        return ImageFolderCamera(path, settings)
     return FolderCamera(path, settings) if path.is_dir() else RecordingCamera(path, settings)
 
 

@@ -129,10 +129,15 @@ def replay(arguments: argparse.Namespace) -> None:
         segmenting = SegmentSettings(arguments.roi, *gate_of(arguments, camera.identity.model))
         for step in play(camera, segmenting):
             rows.append(_replay_row(step))
-            shown = list(rows[-1].values())[:-1]
+            shown = list(rows[-1].values())[:-2]
             shown_table.add_row(*map(_cell, shown))
     console.print(shown_table)
-    save(arguments.json, {"frames": rows})
+    save(arguments.json, {"frames": rows, "notes": list(camera.notes)})
+    for note in camera.notes:
+        console.print(f"The recording: {note}", markup=False)
+    without = sum(not row["color"] for row in rows)
+    if without:
+        console.print(f"{without} of {len(rows)} frames have no colour: found by depth alone.")
     for row in rows:
         if row["problem"]:
             console.print(f"Frame {row['frame']}: {row['problem']}")
@@ -223,6 +228,7 @@ def _replay_row(step: ReplayStep) -> dict[str, Any]:
         "turned_deg": float(np.degrees(np.linalg.norm(motion.rotation_rad))) if motion else None,
         "moved_mm": float(1e3 * np.linalg.norm(motion.shift_m)) if motion else None,
         "segment_ms": 1e3 * step.segment_s,
+        "color": step.frame.color is not None,
         "problem": step.problem,
     }
 
