@@ -79,8 +79,8 @@ class FolderCamera(PlayedCamera):
         if not (folder / DESCRIPTION).is_file():
             raise CameraError(
                 f"{folder} is not a recording: it has no {DESCRIPTION} (handcal), no "
-                "camera_intrinsic.json beside color and depth (Open3D), no depth.txt (TUM RGB-D) and no "
-                "metadata.yaml (ROS 2)"
+                "camera_intrinsic.json beside color and depth (Open3D), no depth.txt (TUM RGB-D) "
+                "and no metadata.yaml (ROS 2)"
             )
         try:
             self._describe(read_json(folder / DESCRIPTION), folder / DESCRIPTION)
