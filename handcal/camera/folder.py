@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from handcal.camera.images import (
     depth_scale_from,
     intrinsics_from,
+    number_from,
     read_color,
     read_depth,
 )
@@ -97,6 +98,11 @@ class FolderCamera(PlayedCamera):
         self.depth_intrinsics = intrinsics_from(depth, path)
         self._color_intrinsics = None if color is None else intrinsics_from(color, path)
         self._depth_scale_m = depth_scale_from(values, path)
+        if (gate := values.get("gate_m")) is not None:
+            is_pair = isinstance(gate, list) and len(gate) == 2
+            near, far = gate if is_pair else (None, None)
+            near_m = number_from({"gate_m": near}, path, "gate_m", 0.01, 100.0)
+            self.gate_m = near_m, number_from({"gate_m": far}, path, "gate_m", near_m, 100.0)
         self._T_C_D = _rigid_from(values.get("T_C_D"), path)
         try:
             self.identity = identity_from_json(values.get("device"), "device")
@@ -132,7 +138,10 @@ class FolderCamera(PlayedCamera):
 
 
 def record_folder(
-    folder: Path, frames: Iterable[Frame], identity: CameraIdentity = CameraIdentity()
+    folder: Path,
+    frames: Iterable[Frame],
+    identity: CameraIdentity = CameraIdentity(),
+    gate_m: tuple[float, float] | None = None,
 ) -> int:
     """Record frames of one camera as a folder of images, without loss.
 
@@ -145,6 +154,8 @@ def record_folder(
         colour or a pose, later ones may lack it.
     identity : CameraIdentity
         Of that camera, where it is known.
+    gate_m : (float, float), optional
+        Depth gate for those who look for the hand in the recording.
 
     Returns
     -------
@@ -171,7 +182,8 @@ def record_folder(
             "color": None if first.color_intrinsics is None else asdict(first.color_intrinsics),
             "T_C_D": first.T_C_D.tolist(),
             "device": asdict(identity),
-        },
+        }
+        | ({} if gate_m is None else {"gate_m": gate_m}),
     )
     try:
         return _write_frames(folder, frames, first.T_W_D is not None)

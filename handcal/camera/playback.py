@@ -36,6 +36,8 @@ class PlayedCamera(Closable):
 
     notes: tuple[str, ...] = ()
     """What a recording holds that is not played, with the reason, and what it lacks."""
+    gate_m: tuple[float, float] | None = None
+    """The depth gate that the recording was made for, if it says so."""
 
     def __init__(self, settings: PlaybackSettings | None) -> None:
         self._settings = settings or PlaybackSettings()

@@ -35,18 +35,24 @@ def open_recording(path: Path, settings: PlaybackSettings | None = None) -> Play
 
 
 def record_frames(
-    path: Path, frames: Iterable[Frame], identity: CameraIdentity = CameraIdentity()
+    path: Path,
+    frames: Iterable[Frame],
+    identity: CameraIdentity = CameraIdentity(),
+    gate_m: tuple[float, float] | None = None,
 ) -> int:
     """Record frames as a ``.db3`` file or a folder, by the suffix of `path`; return their number.
 
-    The recording keeps the camera's `identity`.
+    The recording keeps the camera's `identity`, a folder also the depth gate, `gate_m`.
 
     Raises
     ------
     CameraError, FileError
         If it cannot be written.
     ValueError
-        If there is no frame, or they are not all of one camera.
+        If there is no frame, they are not all of one camera, or a file is to keep a depth gate.
     """
-    record = record_folder if path.suffix == "" else record_db3
-    return record(path, frames, identity)
+    if path.suffix == "":
+        return record_folder(path, frames, identity, gate_m)
+    if gate_m is not None:
+        raise ValueError(f"{path.name} cannot keep a depth gate; record into a folder")
+    return record_db3(path, frames, identity)

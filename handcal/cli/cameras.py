@@ -26,6 +26,7 @@ from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
+    from handcal.camera.playback import PlayedCamera
     from handcal.cli.replay import ReplayStep
 
 
@@ -66,8 +67,8 @@ GATE = arg(
     nargs=2,
     type=number(float, 0.05, 5.0),
     metavar=("NEAR_M", "FAR_M"),
-    help="distances between which a hand is looked for (default: 0.35 0.70; 0.20 0.70 of a "
-    "HoloLens 2's camera for hands)",
+    help="distances between which a hand is looked for (default: those kept in a recorded folder, "
+    "or else 0.35 0.70, of a HoloLens 2's camera for hands 0.20 0.70)",
 )
 
 
@@ -81,6 +82,7 @@ GATE = arg(
     value("--seconds", number(float, 0.01, 86_400.0), "S", "stop after this time", default=60.0),
     value("--frames", number(int, 1, 100_000), "N", "stop after this many frames", default=100_000),
     seed("the simulated hand and room"),
+    GATE,
     *REALSENSE_OPTIONS,
     json=True,
 )
@@ -89,7 +91,11 @@ def record(arguments: argparse.Namespace) -> None:
     from handcal.camera.record import RecordSettings
     from handcal.camera.record import record as record_camera
 
-    settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
+    settings = RecordSettings(
+        duration_s=arguments.seconds,
+        frames=arguments.frames,
+        gate_m=None if arguments.gate is None else gate_of(arguments),
+    )
     with (
         open_source(arguments.source, realsense_of(arguments), arguments.seed) as camera,
         until_interrupted() as is_stopped,
@@ -126,7 +132,7 @@ def replay(arguments: argparse.Namespace) -> None:
     rows: list[dict[str, Any]] = []
     playback = PlaybackSettings(real_time=arguments.real_time)
     with open_recording(arguments.recording, playback) as camera:
-        segmenting = SegmentSettings(arguments.roi, *gate_of(arguments, camera.identity.model))
+        segmenting = SegmentSettings(arguments.roi, *gate_of(arguments, camera))
         for step in play(camera, segmenting):
             rows.append(_replay_row(step))
             shown = list(rows[-1].values())[:-2]
@@ -179,12 +185,15 @@ def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
 
 
-def gate_of(arguments: argparse.Namespace, model: str = "") -> tuple[float, float]:
-    """Return the depth gate that the options describe, or that usual for a model of camera."""
+def gate_of(
+    arguments: argparse.Namespace, recording: PlayedCamera | None = None
+) -> tuple[float, float]:
+    """Return the depth gate of the options, or else of a recording or usual for its camera."""
     from handcal.hand.settings import usual_gate_m
 
     if arguments.gate is None:
-        return usual_gate_m(model)
+        kept_m = None if recording is None else recording.gate_m
+        return kept_m or usual_gate_m("" if recording is None else recording.identity.model)
     near_m, far_m = arguments.gate
     if near_m >= far_m:
         fail(f"--gate: NEAR_M, {near_m:g}, must be less than FAR_M, {far_m:g}", 2)

@@ -129,6 +129,8 @@ def test_nothing_is_written_over(folder: Path, make_frames: MakeFrames) -> None:
         ("color", [], "must describe depth and"),
         ("depth_scale", 0, "depth_scale is 0"),
         ("depth_scale", 5000, "enter 0.0002 if a metre is 5000 units"),
+        ("gate_m", [0.7, 0.2], "gate_m is 0.2, but must lie between 0.7"),
+        ("gate_m", [0.2], "must give gate_m as a number"),
         ("T_C_D", [[1.0]], "must be a rigid transform"),
         ("device", "D415", "device must be an object"),
         ("device", {"serial_number": 123}, r"device\.serial_number must be one line"),
