@@ -22,7 +22,7 @@ from handcal.io.images import IMAGE_SUFFIXES
 _INTRINSICS = "camera_intrinsic.json", "intrinsic.json"
 _TUM_DEPTH, _TUM_COLOR = "depth.txt", "rgb.txt"
 _TUM_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
-"""What TUM's own tools take (their page on file formats)."""
+"""As TUM's own tools assume (their page on file formats)."""
 _TUM_PER_M, _PER_M, _FPS = 5000.0, 1000.0, 30.0
 _APART_NS = 20_000_000  # as TUM's associate.py
 _MAX_LIST_BYTES, _MOST_FRAMES = 16 * 2**20, 1_000_000

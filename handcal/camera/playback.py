@@ -35,7 +35,7 @@ class PlayedCamera(Closable):
     depth_intrinsics: Intrinsics
 
     notes: tuple[str, ...] = ()
-    """What a recording holds that is not played, with the reason, and what it lacks."""
+    """Lines about the recording: topics that are not played, with the reason, and what it lacks."""
     gate_m: tuple[float, float] | None = None
     """The depth gate that the recording was made for, if it says so."""
 

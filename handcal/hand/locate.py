@@ -130,9 +130,9 @@ class LocatedHand:
     gate_m: tuple[float, float]
     """Nearest and farthest depth at which it was looked for."""
     leaves_gate: bool = False
-    """Whether the hand's surface goes on beyond that gate."""
+    """True if the hand's surface goes on beyond that gate."""
     is_sure: bool = True
-    """Whether it does not, and without a box no surface before the gate may be the hand."""
+    """True if it does not, and without a box no surface before the gate may be the hand."""
     end_log_odds: float = np.inf
     """Log of how much more the hand is at this end of its limb than at the other one."""
 

@@ -19,7 +19,7 @@ Pixels: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
 BEYOND = "the hand is too "
-"""How the text begins of a hand that is beyond the depth gate."""
+"""Beginning of the text about a hand beyond the depth gate."""
 _INSIDE_M = 0.05  # from an end of the gate to the middle of a hand that is within it
 
 
