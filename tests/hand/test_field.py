@@ -51,7 +51,7 @@ def test_a_hand_at_the_gate_is_whole_or_refused(
 )
 def test_a_wrong_unit_of_depth_is_named(shared_data: Path, name: str, roi: Roi) -> None:
     frame = field_frame(shared_data / "field" / "unit" / name)
-    with pytest.raises(HandError, match="in a wrong unit|correct the unit of depth"):
+    with pytest.raises(HandError, match=r"in a wrong unit|correct the unit of depth"):
         segment(frame, roi=roi)
 
 
