@@ -122,9 +122,9 @@ def test_paths_may_be_text_or_path(
     session = handcal.open_session(kind(ROOT / "resources/example_session"))
     rig = handcal.read_rig(kind(ROOT / "resources/example_rig.yaml"))
     handcal.write_rig(kind(tmp_path / "rig.yaml"), rig)
-    frame = handcal.read_frame(
-        *(kind(pictures / name) for name in ("color.png", "depth.png", "intrinsics.json"))
-    )
+    names = "color.png", "depth.png", "intrinsics.json"
+    color, depth, intrinsics = (kind(pictures / name) for name in names)
+    frame = handcal.read_frame(color, depth, intrinsics)
     assert len(session.alignments) == 2
     assert handcal.read_rig(kind(tmp_path / "rig.yaml")).name == rig.name
     np.testing.assert_array_equal(frame.depth, simulated_frame(seed=1).depth)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.camera.images import (
-    DEPTH_SCALES_M,
+    depth_scale_from,
     intrinsics_from,
     number_from,
     read_color,
@@ -78,7 +78,11 @@ class FolderCamera(PlayedCamera):
         self._folder = folder
         self._place = 0
         if not (folder / DESCRIPTION).is_file():
-            raise CameraError(f"{folder} is not a recording: it has no {DESCRIPTION}")
+            raise CameraError(
+                f"{folder} is not a recording: it has no {DESCRIPTION} (handcal), no "
+                "camera_intrinsic.json beside color and depth (Open3D), no depth.txt (TUM RGB-D) "
+                "and no metadata.yaml (ROS 2)"
+            )
         try:
             self._describe(read_json(folder / DESCRIPTION), folder / DESCRIPTION)
             self._frames = _read_list(folder / LIST)
@@ -93,7 +97,12 @@ class FolderCamera(PlayedCamera):
             raise FileError(f"{path} must describe depth and, unless it is null, color")
         self.depth_intrinsics = intrinsics_from(depth, path)
         self._color_intrinsics = None if color is None else intrinsics_from(color, path)
-        self._depth_scale_m = number_from(values, path, "depth_scale", *DEPTH_SCALES_M)
+        self._depth_scale_m = depth_scale_from(values, path)
+        if (gate := values.get("gate_m")) is not None:
+            is_pair = isinstance(gate, list) and len(gate) == 2
+            near, far = gate if is_pair else (None, None)
+            near_m = number_from({"gate_m": near}, path, "gate_m", 0.01, 100.0)
+            self.gate_m = near_m, number_from({"gate_m": far}, path, "gate_m", near_m, 100.0)
         self._T_C_D = _rigid_from(values.get("T_C_D"), path)
         try:
             self.identity = identity_from_json(values.get("device"), "device")
@@ -129,7 +138,10 @@ class FolderCamera(PlayedCamera):
 
 
 def record_folder(
-    folder: Path, frames: Iterable[Frame], identity: CameraIdentity = CameraIdentity()
+    folder: Path,
+    frames: Iterable[Frame],
+    identity: CameraIdentity = CameraIdentity(),
+    gate_m: tuple[float, float] | None = None,
 ) -> int:
     """Record frames of one camera as a folder of images, without loss.
 
@@ -142,6 +154,8 @@ def record_folder(
         colour or a pose, later ones may lack it.
     identity : CameraIdentity
         Of that camera, where it is known.
+    gate_m : (float, float), optional
+        Depth gate for those who look for the hand in the recording.
 
     Returns
     -------
@@ -168,7 +182,8 @@ def record_folder(
             "color": None if first.color_intrinsics is None else asdict(first.color_intrinsics),
             "T_C_D": first.T_C_D.tolist(),
             "device": asdict(identity),
-        },
+        }
+        | ({} if gate_m is None else {"gate_m": gate_m}),
     )
     try:
         return _write_frames(folder, frames, first.T_W_D is not None)

@@ -79,7 +79,7 @@ def read_frame(
             f"{intrinsics} must give depth_scale, in metres per unit of depth; or use "
             "--depth-scale: 0.001 for millimetres"
         )
-    depth_scale_m = number_from(values, intrinsics, "depth_scale", *DEPTH_SCALES_M)
+    depth_scale_m = depth_scale_from(values, intrinsics)
     depth_image = read_depth(depth, camera)
     color_image = read_color(color, camera)
     return Frame(
@@ -151,6 +151,17 @@ def intrinsics_from(values: dict[str, Any], path: Path) -> Intrinsics:
             for value in distortion
         ),
     )
+
+
+def depth_scale_from(values: dict[str, Any], path: Path) -> float:
+    """Return a JSON object's depth scale in metres per unit; FileError, with `path`, if wrong."""
+    scale = values.get("depth_scale")
+    if isinstance(scale, int | float) and 1.0 / DEPTH_SCALES_M[1] <= scale <= 1e6:
+        raise FileError(
+            f"{path}: depth_scale is {scale:g}, but must be in metres per unit; "
+            f"enter {1.0 / scale:g} if a metre is {scale:g} units"
+        )
+    return number_from(values, path, "depth_scale", *DEPTH_SCALES_M)
 
 
 def number_from(values: dict[str, Any], path: Path, key: str, low: float, high: float) -> float:

@@ -34,6 +34,11 @@ class PlayedCamera(Closable):
     identity: CameraIdentity
     depth_intrinsics: Intrinsics
 
+    notes: tuple[str, ...] = ()
+    """Lines about the recording: topics that are not played, with the reason, and what it lacks."""
+    gate_m: tuple[float, float] | None = None
+    """The depth gate that the recording was made for, if it says so."""
+
     def __init__(self, settings: PlaybackSettings | None) -> None:
         self._settings = settings or PlaybackSettings()
         self._waiting: Frame | None = None

@@ -33,6 +33,8 @@ class RecordSettings:
     lead_frames: int = 30
     """Most frames skipped at the beginning, until one has colour: cameras pair their first images
     badly."""
+    gate_m: tuple[float, float] | None = None
+    """Depth gate to keep in the recording, for `replay`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +82,7 @@ def record(
     first = next(take.frames, None)
     if first is None:
         raise CameraError(f"nothing was recorded: {take.stop_reason}")
-    count = record_frames(path, chain([first], take.frames), camera.identity)
+    count = record_frames(path, chain([first], take.frames), camera.identity, settings.gate_m)
     return Recorded(count, take.dropped, take.duration_s, take.stop_reason)
 
 

@@ -1,11 +1,14 @@
-"""Playback of ROS 2 recordings (rosbag2: a folder with ``.mcap`` or ``.db3``), with rosbags.
+"""Playback of recordings of ROS, with rosbags.
 
-Depth is ``16UC1`` in mm or ``32FC1`` in metres (REP 118), its camera ``camera_info`` beside it, and
-the place of colour a chain of transforms on ``/tf_static`` or ``/tf``.
+They are folders with ``.mcap`` or ``.db3`` files (ROS 2), or ``.bag`` files (ROS 1). Depth is
+``16UC1`` in mm or ``32FC1`` in metres (REP 118), its camera ``camera_info`` beside it, and the
+place of colour a chain of transforms on ``/tf_static`` or ``/tf``. Images may be compressed as
+image_transport does: PNG or JPEG, and ``compressedDepth`` with PNG.
 """
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -13,18 +16,20 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from handcal.camera.images import DISTORTION_COUNTS
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
-from handcal.core.errors import CameraEndError, CameraError
+from handcal.core.errors import CameraEndError, CameraError, FileError
 from handcal.core.geometry import invert, rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8, UInt16
-from handcal.io.images import MAX_SIDE_PX
+from handcal.io.images import MAX_SIDE_PX, decode_image
 
 METADATA = "metadata.yaml"
 
-_IMAGE, _INFO, _TF = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
+_IMAGE, _COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+_INFO = "sensor_msgs/msg/CameraInfo"
 _DEPTH_TYPES = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
 _COLOR_CODES = {
     "rgb8": None,
@@ -32,30 +37,52 @@ _COLOR_CODES = {
     "rgba8": cv2.COLOR_RGBA2RGB,
     "bgra8": cv2.COLOR_BGRA2RGB,
 }
+_FILES = "jpeg", "jpg", "png"
+_DEPTH_HEADER = struct.Struct("<iff")
+"""Of compressedDepth: format, and a and b of depths a / (value - b) in metres."""
 _MODELS = ("", "plumb_bob", "rational_polynomial")
 _MM_SCALE_M, _FLOAT_SCALE_M = 1e-3, 1e-4
 _APART_NS = 50_000_000
 _REACH_M = 1.0
 _MOST_TRANSFORMS = 10_000
+_MOST_IGNORED = 10
+_BAG = b"#ROSBAG V2.0\n"
+_INDEX_AT = b"index_pos="
+_SDK_TOPIC = b"/file_version"
+_LOOKED_BYTES = 2**20
 
 
 def ros_recording(path: Path) -> Path | None:
-    """Return the folder of the ROS 2 recording that a path names, itself or a file in it."""
+    """Return the recording of ROS that a path names: itself, or the folder of a ROS 2 file."""
+    if path.suffix == ".bag" and path.is_file():
+        return path if _is_ros1(path) else None
     for folder in (path, path.parent):
         if (folder / METADATA).is_file() and (folder == path or path.suffix in (".mcap", ".db3")):
             return folder
     return None
 
 
+def _is_ros1(path: Path) -> bool:
+    """Return whether a ``.bag`` file is of ROS 1, not of librealsense, which uses its format."""
+    with path.open("rb") as file:
+        start = file.read(_LOOKED_BYTES)
+        at = start.find(_INDEX_AT) + len(_INDEX_AT)
+        index = int.from_bytes(start[at : at + 8], "little")
+        if not start.startswith(_BAG) or not len(start) <= index < path.stat().st_size:
+            return start.startswith(_BAG) and _SDK_TOPIC not in start
+        file.seek(index)  # the list of topics
+        return _SDK_TOPIC not in start + file.read(_LOOKED_BYTES)
+
+
 class RosCamera(PlayedCamera):
-    """Plays a ROS 2 recording, depth with the colour nearest in time; implements `Camera`.
+    """Plays a recording of ROS, depth with the colour nearest in time; implements `Camera`.
 
     Depth comes as recorded; of several depth topics the one not aligned to colour is taken.
 
     Parameters
     ----------
     folder : Path
-        With ``metadata.yaml`` and ``.mcap`` or ``.db3`` files.
+        With ``metadata.yaml`` and ``.mcap`` or ``.db3`` files; or a ``.bag`` file of ROS 1.
     settings : PlaybackSettings
 
     Raises
@@ -72,7 +99,7 @@ class RosCamera(PlayedCamera):
             from rosbags.typesys import Stores, get_typestore
         except ImportError as error:
             raise CameraError(
-                "ROS 2 recordings need rosbags: pip install 'handcal[ros]'"
+                "recordings of ROS need rosbags: pip install 'handcal[ros]'"
             ) from error
         self.name = f"Recording {folder.name}"
         self.identity = CameraIdentity()
@@ -88,7 +115,7 @@ class RosCamera(PlayedCamera):
             raise
         except Exception as error:  # rosbags and the parsers below it raise many kinds
             self.close()
-            raise CameraError(f"{folder} cannot be read as a ROS 2 recording: {error}") from error
+            raise CameraError(f"{folder} cannot be read as a recording of ROS: {error}") from error
         self._frames = self._play()
 
     def close(self) -> None:
@@ -115,30 +142,58 @@ class RosCamera(PlayedCamera):
 
     def _describe(self) -> None:
         """Find the topics, and read the cameras and the transform between them."""
-        depth, color = {}, {}
-        for topic in self._topics(_IMAGE):
-            first = self._first(topic)
-            if first is not None and first.encoding in _DEPTH_TYPES:
-                depth[topic] = first
-            elif first is not None and first.encoding in _COLOR_CODES:
-                color[topic] = first
+        firsts = {topic: self._first(topic) for topic in self._topics(_IMAGE, _COMPRESSED)}
+        kinds = {topic: "" if one is None else _kind(one) for topic, one in firsts.items()}
+        depth = [topic for topic, kind in kinds.items() if kind == "depth"]
+        color = [topic for topic, kind in kinds.items() if kind == "color"]
         if not depth:
+            found = "; ".join(self._ignored(kinds, firsts)) or "it has no images"
             raise CameraError(
-                f"{self._folder} has no depth images (16UC1 or 32FC1, not compressed); record the "
-                "camera's raw depth topic"
+                f"{self._folder} has no depth images (16UC1 or 32FC1, or of these compressedDepth "
+                f"with PNG): {found}; record the camera's depth topic"
             )
-        self._depth_topic = min(depth, key=lambda topic: ("aligned" in topic, topic))
+        raw_first = set(self._topics(_COMPRESSED))
+        self._depth_topic = min(
+            depth, key=lambda topic: ("aligned" in topic, topic in raw_first, topic)
+        )
         self.depth_intrinsics = self._intrinsics(self._depth_topic)
         self._color_topic, self._color_intrinsics, self._T_C_D = None, None, np.eye(4)
-        known = [topic for topic in sorted(color) if self._info_topic(topic) is not None]
+        known = [topic for topic in color if self._info_topic(topic) is not None]
         if known:
-            self._color_topic = known[0]
-            self._color_intrinsics = self._intrinsics(known[0])
-            frames = (color[known[0]], depth[self._depth_topic])
+            self._color_topic = min(known, key=lambda topic: (topic in raw_first, topic))
+            self._color_intrinsics = self._intrinsics(self._color_topic)
+            frames: tuple[Any, Any] = firsts[self._color_topic], firsts[self._depth_topic]
             self._T_C_D = self._transform(*(one.header.frame_id for one in frames))
+        unused = self._ignored(kinds, firsts, self._depth_topic, self._color_topic)
+        self.notes = tuple(f"not played: {one}" for one in unused)
 
-    def _topics(self, kind: str) -> list[str]:
-        return [topic for topic, info in self._reader.topics.items() if info.msgtype == kind]
+    def _ignored(
+        self, kinds: dict[str, str], firsts: dict[str, Any], *played: str | None
+    ) -> Iterator[str]:
+        """Yield the topics that are not played, each with the reason."""
+        others = [
+            topic
+            for topic, info in self._reader.topics.items()
+            if topic not in (*played, "/tf", "/tf_static") and info.msgtype != _INFO
+        ]
+        for topic in sorted(others, key=lambda one: (one not in kinds, one))[:_MOST_IGNORED]:
+            first = firsts.get(topic)
+            if topic not in kinds:
+                kind = self._reader.topics[topic].msgtype
+                yield f"{topic} ({kind} is not read)"
+            elif first is None:
+                yield f"{topic} (empty)"
+            elif not kinds[topic]:
+                yield f"{topic} ({_encoding(first)!r} is not read)"
+            elif self._info_topic(topic) is None:
+                yield f"{topic} (no camera_info for it)"
+            else:
+                yield f"{topic} (another {'colour' if kinds[topic] == 'color' else 'depth'})"
+        if len(others) > _MOST_IGNORED:
+            yield f"{len(others) - _MOST_IGNORED} more topics"
+
+    def _topics(self, *kinds: str) -> list[str]:
+        return [topic for topic, info in self._reader.topics.items() if info.msgtype in kinds]
 
     def _messages(self, *topics: str) -> Iterator[tuple[str, Any]]:
         chosen = [one for one in self._reader.connections if one.topic in topics]
@@ -151,7 +206,8 @@ class RosCamera(PlayedCamera):
         return next((message for _, message in self._messages(topic)), None)
 
     def _info_topic(self, topic: str) -> str | None:
-        wanted = f"{topic.rpartition('/')[0]}/camera_info"
+        image = topic.rpartition("/")[0] if topic in self._topics(_COMPRESSED) else topic
+        wanted = f"{image.rpartition('/')[0]}/camera_info"
         return wanted if wanted in self._topics(_INFO) else None
 
     def _intrinsics(self, topic: str) -> Intrinsics:
@@ -159,13 +215,14 @@ class RosCamera(PlayedCamera):
         info = None if info_topic is None else self._first(info_topic)
         if info is None:
             raise CameraError(f"{self._folder} has no camera_info for {topic}; record it as well")
-        fx, skew, cx, _, fy, cy, *_ = (float(one) for one in info.k)
-        values = np.array([fx, fy, cx, cy, *info.d])
+        k, d = (info.k, info.d) if hasattr(info, "k") else (info.K, info.D)  # ROS 1
+        fx, skew, cx, _, fy, cy, *_ = (float(one) for one in k)
+        values = np.array([fx, fy, cx, cy, *d])
         if not np.isfinite(values).all() or fx < 1.0 or fy < 1.0 or skew != 0.0:
             raise CameraError(
                 f"{self._folder}: the intrinsics of {topic} are not those of a camera"
             )
-        distortion = tuple(float(one) for one in info.d) if np.any(info.d) else ()
+        distortion = tuple(float(one) for one in d) if np.any(d) else ()
         if info.distortion_model not in _MODELS or len(distortion) not in DISTORTION_COUNTS:
             raise CameraError(
                 f"{self._folder}: lens model {info.distortion_model!r} of {topic} is not known; "
@@ -182,8 +239,13 @@ class RosCamera(PlayedCamera):
             for one, _ in zip(stamped, range(_MOST_TRANSFORMS), strict=False):
                 parent, child, moved = one.header.frame_id, one.child_frame_id, one.transform
                 turn, place = moved.rotation, moved.translation
-                rotation = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
-                T_parent_child = rigid(rotation, [place.x, place.y, place.z])
+                values = [turn.x, turn.y, turn.z, turn.w, place.x, place.y, place.z]
+                if not np.isfinite(values).all() or not np.any(values[:4]):
+                    raise CameraError(
+                        f"{self._folder}: the transform between {parent!r} and {child!r} is not "
+                        "made of finite numbers; record /tf_static again"
+                    )
+                T_parent_child = rigid(Rotation.from_quat(values[:4]).as_matrix(), values[4:])
                 near.setdefault(child, {}).setdefault(parent, T_parent_child)
                 near.setdefault(parent, {}).setdefault(child, invert(T_parent_child))
         found = {src: np.eye(4)}  # T_frame_src
@@ -264,12 +326,47 @@ def _pixels(message: Any, kind: str, channels: int, camera: Intrinsics) -> Any:
     return packed.view(dtype).reshape(*size, channels)
 
 
+def _encoding(message: Any) -> str:
+    """Return an image's encoding; of a compressed one that before, or the kind of file."""
+    text = message.format if message.__msgtype__ == _COMPRESSED else message.encoding
+    return str(text).partition(";")[0].strip()
+
+
+def _kind(message: Any) -> str:
+    """Return whether an image is ``depth`` or ``color``; empty if it is neither."""
+    encoding = _encoding(message)
+    if encoding in _DEPTH_TYPES:
+        return "" if "rvl" in getattr(message, "format", "") else "depth"
+    is_file = message.__msgtype__ == _COMPRESSED and encoding in _FILES
+    if is_file and _unpacked(message, cv2.IMREAD_UNCHANGED).ndim < 3:
+        return ""  # infrared
+    return "color" if is_file or encoding in _COLOR_CODES else ""
+
+
+def _unpacked(message: Any, flags: int, skip: int = 0) -> NDArray[Any]:
+    """Decode a compressed image, beginning behind so many bytes."""
+    try:
+        return decode_image(bytes(message.data[skip:]), Path(message.format), flags)
+    except FileError as error:
+        raise CameraError(f"an image of the recording: {error}") from error
+
+
 def _depth(message: Any, camera: Intrinsics) -> tuple[UInt16, float]:
-    kind = _DEPTH_TYPES.get(message.encoding)
-    if kind is None:
-        raise CameraError(f"depth images changed to {message.encoding!r} within the recording")
-    values = _pixels(message, kind, 1, camera)[..., 0]
-    if kind == "u2":
+    encoding = _encoding(message)
+    if _kind(message) != "depth":
+        raise CameraError(f"depth images changed to {encoding!r} within the recording")
+    if message.__msgtype__ != _COMPRESSED:
+        values = _pixels(message, _DEPTH_TYPES[encoding], 1, camera)[..., 0]
+    else:
+        has_header = "compressedDepth" in message.format
+        values = _unpacked(message, cv2.IMREAD_UNCHANGED, _DEPTH_HEADER.size * has_header)
+        if values.dtype != np.uint16 or values.shape != (camera.height, camera.width):
+            raise CameraError("an image of the recording is not of its camera's size and depth")
+        if encoding == "32FC1":
+            _, a, b = _DEPTH_HEADER.unpack(bytes(message.data[: _DEPTH_HEADER.size]))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                values = np.where(values > 0, a / (values - np.float64(b)), 0.0)
+    if encoding != "32FC1":
         return values.astype(np.uint16), _MM_SCALE_M
     units = np.nan_to_num(
         values.astype(np.float64) / _FLOAT_SCALE_M, nan=0.0, posinf=0.0, neginf=0.0
@@ -280,9 +377,17 @@ def _depth(message: Any, camera: Intrinsics) -> tuple[UInt16, float]:
 
 
 def _color(message: Any, camera: Intrinsics) -> UInt8:
-    if message.encoding not in _COLOR_CODES:
-        raise CameraError(f"colour images changed to {message.encoding!r} within the recording")
-    code = _COLOR_CODES[message.encoding]
-    values = _pixels(message, "u1", 4 if "a" in message.encoding else 3, camera)
+    encoding = _encoding(message)
+    if _kind(message) != "color":
+        raise CameraError(f"colour images changed to {encoding!r} within the recording")
+    if message.__msgtype__ == _COMPRESSED:
+        image = _unpacked(message, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+        if image.shape[:2] != (camera.height, camera.width):
+            raise CameraError("an image of the recording is not of its camera's size")
+        # Files hold blue first; those packed as red first have both exchanged.
+        is_swapped = message.format.rpartition("compressed")[2].strip().startswith("rgb")
+        return np.ascontiguousarray(image[..., ::-1] if is_swapped else image)
+    code = _COLOR_CODES[encoding]
+    values = _pixels(message, "u1", 4 if "a" in encoding else 3, camera)
     rgb = values if code is None else cv2.cvtColor(values, code)
     return np.asarray(rgb, dtype=np.uint8)

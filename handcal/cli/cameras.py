@@ -10,13 +10,24 @@ from typing import TYPE_CHECKING, Any, get_args
 from handcal.camera.images import DEPTH_SCALES_M
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
-from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    fail,
+    file_option,
+    flag,
+    folder_option,
+    number,
+    seed,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder
 
 if TYPE_CHECKING:
     from handcal.camera.camera import Camera
+    from handcal.camera.playback import PlayedCamera
     from handcal.cli.replay import ReplayStep
 
 
@@ -52,6 +63,14 @@ _ROI = arg(
     "nearest of several); left or right, the leftmost or rightmost of them; depth, the nearest "
     "hand-sized object, without the detector",
 )
+GATE = arg(
+    "--gate",
+    nargs=2,
+    type=number(float, 0.05, 5.0),
+    metavar=("NEAR_M", "FAR_M"),
+    help="distances between which a hand is looked for (default: those kept in a recorded folder, "
+    "or else 0.35 0.70, of a HoloLens 2's camera for hands 0.20 0.70)",
+)
 
 
 @command(
@@ -64,6 +83,7 @@ _ROI = arg(
     value("--seconds", number(float, 0.01, 86_400.0), "S", "stop after this time", default=60.0),
     value("--frames", number(int, 1, 100_000), "N", "stop after this many frames", default=100_000),
     seed("the simulated hand and room"),
+    GATE,
     *REALSENSE_OPTIONS,
     json=True,
 )
@@ -72,7 +92,11 @@ def record(arguments: argparse.Namespace) -> None:
     from handcal.camera.record import RecordSettings
     from handcal.camera.record import record as record_camera
 
-    settings = RecordSettings(duration_s=arguments.seconds, frames=arguments.frames)
+    settings = RecordSettings(
+        duration_s=arguments.seconds,
+        frames=arguments.frames,
+        gate_m=None if arguments.gate is None else gate_of(arguments),
+    )
     with (
         open_source(arguments.source, realsense_of(arguments), arguments.seed) as camera,
         until_interrupted() as is_stopped,
@@ -95,6 +119,7 @@ def record(arguments: argparse.Namespace) -> None:
     arg("recording", type=Path, help=".db3 or .bag file, or a recorded folder"),
     flag("--real-time", "play at the recorded frame rate, dropping frames"),
     _ROI,
+    GATE,
     json=True,
 )
 def replay(arguments: argparse.Namespace) -> None:
@@ -108,12 +133,18 @@ def replay(arguments: argparse.Namespace) -> None:
     rows: list[dict[str, Any]] = []
     playback = PlaybackSettings(real_time=arguments.real_time)
     with open_recording(arguments.recording, playback) as camera:
-        for step in play(camera, SegmentSettings(roi=arguments.roi)):
+        segmenting = SegmentSettings(arguments.roi, *gate_of(arguments, camera))
+        for step in play(camera, segmenting):
             rows.append(_replay_row(step))
-            shown = list(rows[-1].values())[:-1]
+            shown = list(rows[-1].values())[:-2]
             shown_table.add_row(*map(_cell, shown))
     console.print(shown_table)
-    save(arguments.json, {"frames": rows})
+    save(arguments.json, {"frames": rows, "notes": list(camera.notes)})
+    for note in camera.notes:
+        console.print(f"The recording: {note}", markup=False)
+    without = sum(not row["color"] for row in rows)
+    if without:
+        console.print(f"{without} of {len(rows)} frames have no colour: found by depth alone.")
     for row in rows:
         if row["problem"]:
             console.print(f"Frame {row['frame']}: {row['problem']}")
@@ -138,6 +169,7 @@ def replay(arguments: argparse.Namespace) -> None:
     ),
     folder_option("--output", "folder for the results", required=True),
     _ROI,
+    GATE,
 )
 def segment(arguments: argparse.Namespace) -> None:
     """Segment the hand in one image pair: cloud, contour, mask and overlay."""
@@ -149,7 +181,7 @@ def segment(arguments: argparse.Namespace) -> None:
     frame = read_frame(
         arguments.color, arguments.depth, arguments.intrinsics, arguments.depth_scale
     )
-    cloud = make_finder(SegmentSettings(roi=arguments.roi)).find(frame)
+    cloud = make_finder(SegmentSettings(arguments.roi, *gate_of(arguments))).find(frame)
     write_segmentation(cloud, frame, make_folder(arguments.output))
     console.print(
         f"{len(cloud.points_m)} points at {cloud.median_depth_m:.3f} m, "
@@ -161,6 +193,21 @@ def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     """Return the settings that the options describe."""
     names = [field.name for field in fields(RealSenseSettings)]
     return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
+
+
+def gate_of(
+    arguments: argparse.Namespace, recording: PlayedCamera | None = None
+) -> tuple[float, float]:
+    """Return the depth gate of the options, or else of a recording or usual for its camera."""
+    from handcal.hand.settings import usual_gate_m
+
+    if arguments.gate is None:
+        kept_m = None if recording is None else recording.gate_m
+        return kept_m or usual_gate_m("" if recording is None else recording.identity.model)
+    near_m, far_m = arguments.gate
+    if near_m >= far_m:
+        fail(f"--gate: NEAR_M, {near_m:g}, must be less than FAR_M, {far_m:g}", 2)
+    return near_m, far_m
 
 
 def open_source(
@@ -200,6 +247,7 @@ def _replay_row(step: ReplayStep) -> dict[str, Any]:
         "turned_deg": float(np.degrees(np.linalg.norm(motion.rotation_rad))) if motion else None,
         "moved_mm": float(1e3 * np.linalg.norm(motion.shift_m)) if motion else None,
         "segment_ms": 1e3 * step.segment_s,
+        "color": step.frame.color is not None,
         "problem": step.problem,
     }
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handcal.cli.cameras import REALSENSE_OPTIONS, realsense_of
+from handcal.cli.cameras import GATE, REALSENSE_OPTIONS, gate_of, realsense_of
 from handcal.cli.output import console, save, show_progress, table, triple, until_interrupted
 from handcal.cli.terminal import (
     arg,
@@ -112,6 +112,7 @@ _SHARE = number(float, 0.0, 1.0)
         help="serve OpenIGTLink for 3D Slicer (default address: 127.0.0.1:18944)",
     ),
     flag("--lsl", "send the events to the Lab Streaming Layer"),
+    GATE,
     *REALSENSE_OPTIONS,
     json=True,
 )
@@ -119,7 +120,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Calibrate one wearer without a window, for scripts and for testing headset apps."""
     from handcal.bridge.bridges import open_bridges
     from handcal.station.run import RunSettings, run_calibration
-    from handcal.station.settings import StationSettings, with_source
+    from handcal.station.settings import StationSettings, with_gate, with_source
 
     station = StationSettings(
         realsense=realsense_of(arguments),
@@ -132,8 +133,11 @@ def run(arguments: argparse.Namespace) -> None:
         reorder=arguments.reorder,
         sessions=str(make_folder(arguments.output)),
     )
+    station = with_source(station, arguments.camera)
+    if arguments.gate is not None:
+        station = with_gate(station, gate_of(arguments))
     settings = RunSettings(
-        with_source(station, arguments.camera),
+        station,
         arguments.wearer,
         arguments.plan,
         arguments.alignments,

@@ -11,14 +11,18 @@ from numpy.typing import NDArray
 from handcal.core.geometry import camera_matrix, image_points, invert, transform
 from handcal.core.types import Bool, Float64, Frame, Intrinsics
 from handcal.hand.settings import NEARER_M, Roi, RoiSettings
-from handcal.hand.view import Box, between, deproject, pixels_of, view_depth
+from handcal.hand.view import Box, between, deproject, gate_problem, pixels_of, view_depth
 
 STEP_PX = 8
 """Step of the coarse image, in pixels of the depth image: fine enough to locate a hand."""
 
 _PIXELS_MIN = 6
 _DEPTH_SPREAD_M = 0.10  # within one hand
-_INSIDE_M = 0.05  # from an end of the gate to where all of a hand is within it
+_CROSSES = 0.1  # share of a hand beyond the gate that may leave too little of it within
+# Something at the hand's place is an object if it fills this share of the box, and the box's
+# surroundings, of the same area, less than this multiple as much; it is as deep as that share of
+# its distance. This much larger than a hand it is one in a wrong unit.
+_OBJECT_MIN, _AROUND_MAX, _OBJECT_DEPTH, _TOO_LARGE = 0.3, 0.5, 0.25, 1.3
 _SHIFTS, _STILL_PX = 3, 1.0
 _MEASURED_MIN = 0.1  # least share of a box with depth, to say how far it is
 
@@ -73,28 +77,43 @@ class CoarseCloud:
                 "the depth camera measures nothing where the hand is; move it back, or out of "
                 "strong light"
             )
-        near_m, far_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
+        gate_m = self._gate_m[0] + NEARER_M, self._gate_m[1]
         nearest_m = np.quantile(depth_m, 0.1)
-        hand_m = float(np.median(depth_m[depth_m < nearest_m + _DEPTH_SPREAD_M]))
+        depth_m = depth_m[depth_m < nearest_m + _DEPTH_SPREAD_M]
+        hand_m = float(np.median(depth_m))
         side_m = float(np.sqrt(area_px)) * hand_m / self._color_camera.fx
         if side_m < settings.side_min_m:
             return (
                 f"a hand at the measured {hand_m:.2f} m would be only {100 * side_m:.0f} cm large: "
                 "depth is in a wrong unit; correct the depth scale of the camera or recording"
             )
-        where = f"at {100 * hand_m:.0f} cm"
-        if hand_m < near_m:
-            back_cm = 100 * (near_m + _INSIDE_M - hand_m)
-            return f"the hand is too near, {where}; move it back by {back_cm:.0f} cm"
-        if side_m > settings.side_max_m:
-            return (
-                f"the depth camera measures only the background, at {hand_m:.2f} m, where the hand "
-                "is; the hand may be too near: move it back"
-            )
-        if hand_m > far_m:
-            near_cm = 100 * (hand_m - far_m + _INSIDE_M)
-            return f"the hand is too far, {where}; bring it nearer by {near_cm:.0f} cm"
-        return "most of the hand is hidden or without depth; show all of it to the camera"
+        if hand_m >= gate_m[0] and side_m > settings.side_max_m:
+            if not self._is_object(color_box):
+                return (
+                    f"the depth camera measures only the background, at {hand_m:.2f} m, where the "
+                    "hand is; the hand may be too near: move it back"
+                )
+            if side_m > _TOO_LARGE * settings.side_max_m:
+                return (
+                    f"a hand at the measured {hand_m:.2f} m would be {side_m:.1f} m large: depth "
+                    "is in a wrong unit; correct the depth scale of the camera or recording"
+                )
+        return gate_problem(depth_m, gate_m, _CROSSES) or (
+            "most of the hand is hidden or without depth; show all of it to the camera"
+        )
+
+    def _is_object(self, color_box: Float64) -> bool:
+        """Return whether the nearest surface in a box of the colour image ends around it."""
+        rows, columns = pixels_of(self._view.depth > 0)
+        px, depth = self._color_px(rows, columns), self._view.depth[rows, columns]
+        wider_px = (np.sqrt(2.0) - 1.0) / 2.0 * (color_box[2:] - color_box[:2])
+        inside = inside_box(px, color_box)
+        nearest = np.quantile(depth[inside], 0.1)
+        near = depth < (1.0 + _OBJECT_DEPTH) * nearest
+        wider = inside_box(px, color_box + np.concatenate([-wider_px, wider_px]))
+        filled, around = (np.count_nonzero(near & one) for one in (inside, wider & ~inside))
+        area = float(np.prod(color_box[2:] - color_box[:2])) / STEP_PX**2
+        return bool(filled > max(_OBJECT_MIN * area, around / _AROUND_MAX))
 
     def follow(self, track: Track) -> Track | None:
         """Move a track's box with the pixels in it; None if most of them are gone."""

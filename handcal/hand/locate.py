@@ -7,7 +7,7 @@ how well they fit, so that they vary continuously with the image: no single pixe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import cv2
@@ -18,7 +18,16 @@ from handcal.core.errors import HandError
 from handcal.core.types import Bool, Float32, Float64
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, covered, goes_on, on_border, solid_surface
-from handcal.hand.view import Box, DepthView, Pixels, between, crop_view, deproject, pixels_of
+from handcal.hand.view import (
+    Box,
+    DepthView,
+    Pixels,
+    between,
+    crop_view,
+    deproject,
+    gate_problem,
+    pixels_of,
+)
 from handcal.hand.wrist import EDGE_RADIUS_M, FACING_RADIUS_M, arm_fit, box_exit_m, find_wrist_m
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
@@ -67,6 +76,13 @@ _SHORT = 2.8
 # Length of the outline with something this far before it: about a palm's breadth if a thing hides
 # half of the hand; by stray pixels it was 45 mm at most.
 _COVERED_MAX_M, _COVER_JUMP_M = 0.065, 0.03
+# A hand that leaves the depth gate along more than this length of its edge, half a finger's width,
+# may go on beyond it, and does if more than this share of the whole hand is beyond. With more than
+# that share beyond it is refused.
+_ALONG_GATE_M, _BEYOND_MIN, _BEYOND_MAX = 0.008, 0.01, 0.5
+# Within and without the gate it is the same hand if neither palm nor area differs by more.
+_FAR_UNIT = 2.0  # with nothing nearer than so many times the gate's end its unit may be wrong
+_ONE_HAND_M, _ONE_HAND_AREA = 0.01, 0.03
 _NOT_A_HAND = (
     "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
     "bare hand, clear of other things"
@@ -111,8 +127,12 @@ class LocatedHand:
     limit_sigma_m: float
     """Standard deviation of the wrist along `axis`; infinite if an arm points along the line of
     sight."""
-    depth_min_m: float
-    """Nearest depth at which it was looked for."""
+    gate_m: tuple[float, float]
+    """Nearest and farthest depth at which it was looked for."""
+    leaves_gate: bool = False
+    """True if the hand's surface goes on beyond that gate."""
+    is_sure: bool = True
+    """True if it does not, and without a box no surface before the gate may be the hand."""
     end_log_odds: float = np.inf
     """Log of how much more the hand is at this end of its limb than at the other one."""
 
@@ -128,7 +148,9 @@ class _Parts:
     """(N, 5); as `cv2.connectedComponentsWithStats` gives them, the background's first."""
     ends: Bool
     borders: Bool
-    """(h, w); where the surface continues out of view, and where that is the border of the view."""
+    leaves: Bool
+    """(h, w); where the surface continues out of view, and where that is the border of the view, or
+    beyond the gate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,6 +172,8 @@ class _Limb:
 def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = None) -> LocatedHand:
     """Find the hand in a box, or else the nearest hand-sized end of a surface.
 
+    A hand of which a part lies beyond the depth gate is found whole.
+
     Parameters
     ----------
     view : DepthView
@@ -161,23 +185,54 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
     Raises
     ------
     HandError
-        If no such surface is found.
+        If no such surface is found, or most of the hand lies beyond the gate.
     """
+    near_m = settings.depth_min_m - (0.0 if box is None else NEARER_M)
+    gate_m = near_m, settings.depth_max_m
+    located: LocatedHand | None = None
+    try:
+        located = _locate_within(gate_m, view, settings, box)
+        if located.is_sure:
+            return located
+        problem = None
+    except HandError as error:
+        problem = error
+    try:
+        wide_m = near_m - _HAND_REACH_M, settings.depth_max_m + _HAND_REACH_M
+        whole = _locate_within(wide_m, view, settings, box)
+    except HandError as error:
+        if located is not None and not located.leaves_gate:
+            return located
+        raise problem or error from None
+    depth_m = whole.view.depth[whole.hand] * whole.view.scale_m
+    if not gate_problem(depth_m, gate_m, _BEYOND_MIN):
+        if problem is not None:
+            raise problem
+        return located if located is not None and _are_one(located, whole) else whole
+    if move := gate_problem(depth_m, gate_m, 0.0 if whole.leaves_gate else _BEYOND_MAX):
+        raise HandError(move + ("" if box else _unit_hint(view, settings)))
+    return whole
+
+
+def _locate_within(
+    gate_m: tuple[float, float], view: DepthView, settings: SegmentSettings, box: Box | None
+) -> LocatedHand:
+    """Find the hand within a range of depths."""
     jump = round(settings.edge_jump_m / view.scale_m)
-    depth_min_m = settings.depth_min_m - (0.0 if box is None else NEARER_M)
     solid = solid_surface(view.depth, jump)
-    gated = solid & between(view, depth_min_m, settings.depth_max_m)
+    gated = solid & between(view, *gate_m)
     borders = on_border(gated)
-    ends = borders | goes_on(gated, solid & ~gated, view.depth, jump)
+    beyond = solid & ~gated
+    leaves = goes_on(gated, beyond, view.depth, jump)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(gated.view(np.uint8), connectivity=8)
-    parts = _Parts(view, np.asarray(labels), np.asarray(stats), ends, borders)
+    parts = _Parts(view, np.asarray(labels), np.asarray(stats), borders | leaves, borders, leaves)
     if box is not None:
         within = _within(view, box)
         chosen = _seen_part(parts, within)
         candidates = [] if chosen is None else [chosen]
     else:
         within = None
-        least_px = _AREA_MIN_M2 / (_pitch(view) * settings.depth_max_m) ** 2
+        least_px = _AREA_MIN_M2 / (_pitch(view) * gate_m[1]) ** 2
         areas = parts.stats[:, cv2.CC_STAT_AREA]
         candidates = [part for part in range(1, len(areas)) if areas[part] >= least_px]
 
@@ -185,10 +240,10 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
     for part in candidates:
         limb, place = _limb(parts, part)
         likely = None if within is None else within[place][limb.pixels]
-        located = _locate_on(limb, likely, box, settings, depth_min_m)
+        located = _locate_on(limb, likely, box, settings, gate_m)
         nearest = found is None or located.palm_m[2] < found.palm_m[2]
         if nearest and _is_plausible(located):
-            found = located
+            found, edge = located, parts.leaves[place]
             if within is not None:
                 _check_arm(located, within[place])
         elif _FINGER_RADIUS_M < located.palm_radius_m < _PALM_RADIUS_M[0]:
@@ -201,10 +256,39 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
             f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
+            f"{_unit_hint(view, settings)}"
         )
     _check_wrist(found)
     _check_covered(found)
-    return found
+    edge_px = _ALONG_GATE_M / (_pitch(view) * float(found.palm_m[2]))
+    leaves_gate = bool(np.count_nonzero(found.hand & edge) > edge_px)
+    is_sure = not leaves_gate
+    if box is None and is_sure:
+        nearer_px = np.count_nonzero(beyond & between(view, 0.0, gate_m[0]))
+        is_sure = bool(nearer_px * (_pitch(view) * gate_m[0]) ** 2 < _AREA_MIN_M2)
+    return replace(found, leaves_gate=leaves_gate, is_sure=is_sure)
+
+
+def _are_one(located: LocatedHand, other: LocatedHand) -> bool:
+    """Return whether two results in one image are the same hand."""
+    areas = [np.count_nonzero(one.hand) for one in (located, other)]
+    apart_m = float(np.linalg.norm(located.palm_m - other.palm_m))
+    return apart_m < _ONE_HAND_M and bool(min(areas) > (1.0 - _ONE_HAND_AREA) * max(areas))
+
+
+def _unit_hint(view: DepthView, settings: SegmentSettings) -> str:
+    """Return whether all depths suggest a wrong unit: most rooms begin behind a raised hand."""
+    measured = view.depth[view.depth > 0]
+    if not len(measured):
+        return ""
+    nearest_m, farthest_m = np.quantile(measured, [0.02, 0.98]) * view.scale_m
+    if nearest_m > _FAR_UNIT * settings.depth_max_m:
+        what = f"nearer than {nearest_m:.1f} m"
+    elif farthest_m < settings.depth_min_m:
+        what = f"farther than {farthest_m:.2f} m"
+    else:
+        return ""
+    return f" (nothing is measured {what}: if a hand is in view, correct the unit of depth)"
 
 
 def _pitch(view: DepthView) -> float:
@@ -344,7 +428,7 @@ def _locate_on(
     likely: Float32 | None,
     box: Box | None,
     settings: SegmentSettings,
-    depth_min_m: float,
+    gate_m: tuple[float, float],
 ) -> LocatedHand:
     """Find palm and wrist on one surface; the palm where `likely` (N,), or near its tip."""
     points_m = limb.points_m
@@ -376,8 +460,8 @@ def _locate_on(
         axis.astype(np.float64),
         limit_m,
         wrist_sigma_m,
-        depth_min_m,
-        end_log_odds,
+        gate_m,
+        end_log_odds=end_log_odds,
     )
 
 

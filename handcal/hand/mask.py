@@ -65,7 +65,7 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     jump = round(settings.edge_jump_m / view.scale_m)
     pitch_m = float(located.palm_m[2]) / view.camera.fx
     solid = solid_surface(view.depth, jump)
-    within = solid & may_be_hand & between(view, located.depth_min_m, settings.depth_max_m)
+    within = solid & may_be_hand & between(view, *located.gate_m)
     near_wrist = pixels_of(within & may_be_arm)
     along_m = (deproject(view, *near_wrist).T - located.palm_m) @ located.axis
     within[near_wrist] = along_m <= located.limit_m

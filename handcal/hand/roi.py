@@ -10,7 +10,7 @@ from handcal.core.types import Float64, Frame, UInt8
 from handcal.hand.coarse_cloud import STEP_PX, CoarseCloud, Track, center, inside_box
 from handcal.hand.detect import Detections, overlaps
 from handcal.hand.settings import NEARER_M, RoiSettings, SegmentSettings
-from handcal.hand.view import Box
+from handcal.hand.view import BEYOND, Box
 
 _SAME_OVERLAP = 0.3
 _NOT_SEEN = "no hand is seen in the colour image; raise the bare hand in front of the camera"
@@ -121,14 +121,15 @@ class RoiFinder:
         found = self._detector.detect(color[y0:y1, x0:x1], pixels)
         boxes = found.boxes_px + np.array([x0, y0, x0, y0])
         hands: list[Track] = []
+        beyond: list[Float64] = []
         for box, score in zip(boxes, found.scores, strict=True):
+            if any(inside_box(center(box)[None], other).any() for other in beyond):
+                continue  # a part of that hand
             hand = cloud.track(box, float(score))
-            problem = (
-                cloud.problem(box, self._settings)
-                if hand is None
-                else self._problem(hand, box, cloud)
-            )
+            problem = self._problem(hand, box, cloud)
             if hand is None or problem:
+                if problem.startswith(BEYOND):
+                    beyond.append(box)
                 if self.problem == _NOT_SEEN:  # that of the surest
                     self.problem = problem
                 continue
@@ -136,9 +137,11 @@ class RoiFinder:
                 hands.append(hand)
         return hands
 
-    def _problem(self, track: Track, color_box: Float64, cloud: CoarseCloud) -> str:
+    def _problem(self, track: Track | None, color_box: Float64, cloud: CoarseCloud) -> str:
         """Return why the content of a box is not of a hand's size or does not fill the box."""
         settings = self._settings
+        if track is None:
+            return cloud.problem(color_box, settings)
         side_px = np.sqrt(np.prod(track.box[2:] - track.box[:2]))
         side_m = float(side_px * track.depth_m / cloud.camera.fx)
         if not settings.side_min_m <= side_m <= settings.side_max_m:

@@ -67,6 +67,11 @@ class SegmentSettings:
             )
 
 
+def usual_gate_m(model: str) -> tuple[float, float]:
+    """Return the depth gate usual for a model of camera: a HoloLens 2's AHAT sees nearer hands."""
+    return 0.20 if "AHAT" in model else SegmentSettings().depth_min_m, SegmentSettings().depth_max_m
+
+
 @dataclass(frozen=True, slots=True)
 class RoiSettings:
     """Settings of choosing and tracking the hand.

@@ -18,6 +18,11 @@ Pixels: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
 """Rows and columns."""
 
 
+BEYOND = "the hand is too "
+"""Beginning of the text about a hand beyond the depth gate."""
+_INSIDE_M = 0.05  # from an end of the gate to the middle of a hand that is within it
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthView:
     """Every `step_px`-th pixel of a box of a depth image."""
@@ -66,6 +71,30 @@ def between(view: DepthView, depth_min_m: float, depth_max_m: float) -> Bool:
     """Mark the pixels of a view within a closed range of depths."""
     nearest, farthest = depth_min_m / view.scale_m, depth_max_m / view.scale_m
     return (view.depth >= round(nearest)) & (view.depth <= round(farthest))
+
+
+def gate_problem(depth_m: NDArray[np.floating], gate_m: tuple[float, float], most: float) -> str:
+    """Return how to move a hand of which more than a share lies beyond the gate; else nothing.
+
+    Parameters
+    ----------
+    depth_m : (N,) float
+        Of the hand.
+    gate_m : (float, float)
+    most : float
+        That share, at one end of the gate.
+    """
+    near_m, far_m = gate_m
+    near, far = float(np.mean(depth_m < near_m)), float(np.mean(depth_m > far_m))
+    if max(near, far) <= most:
+        return ""
+    low_m, hand_m, high_m = np.quantile(depth_m, [0.02, 0.5, 0.98])
+    where = f"at {100 * hand_m:.0f} cm"
+    if near >= far:
+        back_cm = np.ceil(100 * max(near_m + _INSIDE_M - hand_m, near_m - low_m))
+        return f"{BEYOND}near, {where}; move it back by {back_cm:.0f} cm"
+    nearer_cm = np.ceil(100 * max(hand_m - far_m + _INSIDE_M, high_m - far_m))
+    return f"{BEYOND}far, {where}; bring it nearer by {nearer_cm:.0f} cm"
 
 
 def deproject(view: DepthView, rows: NDArray[Any], columns: NDArray[Any]) -> Float32:

@@ -44,7 +44,11 @@ def read_image(path: Path, flags: int) -> NDArray[Any]:
     FileError
         If it is missing, damaged, too large or none of `IMAGE_KINDS`.
     """
-    data = read_limited(path, _MAX_FILE_BYTES)
+    return decode_image(read_limited(path, _MAX_FILE_BYTES), path, flags)
+
+
+def decode_image(data: bytes, path: Path, flags: int) -> NDArray[Any]:
+    """Decode a PNG or JPEG as `read_image` does; its messages name `path`."""
     width, height = _image_size(data, path)
     if width * height > _MAX_PIXELS or max(width, height) > MAX_SIDE_PX:
         raise FileError(f"{path} is {width}x{height} pixels, more than is allowed")

@@ -8,9 +8,10 @@ from typing import Literal
 
 from handcal.calibration.plan import PlanSettings
 from handcal.calibration.states import CalibrationSettings
-from handcal.camera.hololens2 import hololens2_settings
+from handcal.camera.hololens2 import hololens2_settings, identity_of
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.settings import HoloLens2Settings, RealSenseSettings
+from handcal.hand.settings import usual_gate_m
 from handcal.io.files import user_path
 from handcal.io.resources import resource_path
 from handcal.sim.hand import Side
@@ -87,8 +88,31 @@ class StationSettings:
         return user_path(self.sessions)
 
 
+def with_gate(settings: StationSettings, gate_m: tuple[float, float]) -> StationSettings:
+    """Return settings with another depth gate."""
+    near_m, far_m = gate_m
+    segment = replace(settings.calibration.segment, depth_min_m=near_m, depth_max_m=far_m)
+    return replace(settings, calibration=replace(settings.calibration, segment=segment))
+
+
+def with_usual_gate(settings: StationSettings, former: StationSettings) -> StationSettings:
+    """Return settings with the depth gate usual for the camera, if it was so in `former`."""
+    segment = settings.calibration.segment
+    if (segment.depth_min_m, segment.depth_max_m) != gate_of_camera_m(former):
+        return settings
+    return with_gate(settings, gate_of_camera_m(settings))
+
+
+def gate_of_camera_m(settings: StationSettings) -> tuple[float, float]:
+    """Return the depth gate usual for a station's camera."""
+    is_own = settings.source == "hololens2"
+    return usual_gate_m(identity_of(settings.hololens2).model if is_own else "")
+
+
 def with_source(settings: StationSettings, source: str) -> StationSettings:
-    """Return settings with the camera of this name.
+    """Return settings with the camera of this name, and the depth gate usual for it.
+
+    A gate that was not the usual one of the former camera is kept.
 
     Parameters
     ----------
@@ -97,11 +121,14 @@ def with_source(settings: StationSettings, source: str) -> StationSettings:
         ``realsense``, ``simulator``, a name of `open_live`, or the path of a recording.
     """
     kind, _, serial = source.partition(":")
+    former = settings
     match source, kind:
         case ("realsense" | "simulator") as plain, _:
-            return replace(settings, source=plain)
+            settings = replace(settings, source=plain)
         case _, ("oak" | "orbbec") as named:
-            return replace(settings, source=named, serial=serial)
-    if (hololens2 := hololens2_settings(source)) is not None:
-        return replace(settings, source="hololens2", hololens2=hololens2)
-    return replace(settings, source="recording", recording=source)
+            settings = replace(settings, source=named, serial=serial)
+        case _ if (hololens2 := hololens2_settings(source)) is not None:
+            settings = replace(settings, source="hololens2", hololens2=hololens2)
+        case _:
+            settings = replace(settings, source="recording", recording=source)
+    return with_usual_gate(settings, former)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
 from handcal.core.geometry import invert
@@ -16,6 +19,9 @@ from handcal.core.types import Float64, Frame, Intrinsics
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 TYPES = STORE.types
+ROS1 = get_typestore(Stores.ROS1_NOETIC)
+_TF = "tf2_msgs/msg/TFMessage"
+ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", _TF))
 DEPTH, COLOR = "/camera/depth/image_rect_raw", "/camera/color/image_raw"
 
 
@@ -94,3 +100,50 @@ def frame_messages(frames: Iterable[Frame]) -> Iterable[tuple[str, int, Any]]:
 def write_rosbag(folder: Path, frames: Iterable[Frame], is_mcap: bool = True) -> None:
     """Write frames of one camera as a ROS 2 recording."""
     write_messages(folder, frame_messages(frames), is_mcap)
+
+
+def compressed(message: Any, a: float = 0.0, b: float = 0.0) -> Any:
+    """Return an image as image_transport compresses it: JPEG, and compressedDepth with PNG.
+
+    With a and b depth is in metres, stored as a / depth + b.
+    """
+    height, width = message.height, message.width
+    if message.encoding == "rgb8":
+        pixels = message.data.reshape(height, width, 3)[..., ::-1]
+        text, data = "rgb8; jpeg compressed bgr8", cv2.imencode(".jpg", pixels)[1].tobytes()
+    else:
+        values = message.data.view({"16UC1": np.uint16, "32FC1": np.float32}[message.encoding])
+        values = values.reshape(height, width)
+        if a:
+            with np.errstate(all="ignore"):
+                values = np.where(np.isfinite(values), a / values + b, 0.0).astype(np.uint16)
+        text = f"{message.encoding}; compressedDepth png"
+        data = struct.pack("<iff", 0, a, b) + cv2.imencode(".png", values)[1].tobytes()
+    kind = TYPES["sensor_msgs/msg/CompressedImage"]
+    return kind(message.header, text, np.frombuffer(data, np.uint8).copy())
+
+
+def write_ros1(path: Path, messages: Iterable[tuple[str, int, Any]]) -> None:
+    """Write messages of ROS 2 as a bag of ROS 1."""
+    topics: dict[str, Any] = {}
+    with Ros1Writer(path) as writer:
+        for topic, t_ns, message in messages:
+            kind = message.__msgtype__
+            if topic not in topics:
+                topics[topic] = writer.add_connection(topic, kind, typestore=ROS1)
+            writer.write(topics[topic], t_ns, ROS1.serialize_ros1(_as_ros1(message), kind))
+
+
+def _as_ros1(value: Any) -> Any:
+    """Return a message with the fields of ROS 1: `seq` in headers, `D`, `K`, `R` and `P`."""
+    if isinstance(value, list):
+        return [_as_ros1(one) for one in value]
+    kind = getattr(value, "__msgtype__", None)
+    if kind is None:
+        return value
+    fields = {name: _as_ros1(one) for name, one in vars(value).items() if name != "__msgtype__"}
+    if kind.endswith("CameraInfo"):
+        fields = {name.upper() if name in "dkrp" else name: one for name, one in fields.items()}
+    if kind.endswith("Header"):
+        fields["seq"] = 0
+    return ROS1.types[kind](**fields)

@@ -11,18 +11,21 @@ import numpy as np
 import pytest
 
 from handcal.camera.recordings import open_recording
-from handcal.camera.ros import RosCamera
+from handcal.camera.ros import RosCamera, ros_recording
 from handcal.core.errors import CameraEndError, CameraError
 from handcal.core.geometry import rigid
 from handcal.core.types import Frame, Intrinsics
 from tests.camera.rosbag import (
     COLOR,
     DEPTH,
+    TYPES,
+    compressed,
     frame_messages,
     image,
     info,
     transforms,
     write_messages,
+    write_ros1,
     write_rosbag,
 )
 
@@ -61,6 +64,105 @@ def play(folder: Path, messages: list[tuple[str, int, Any]]) -> Frame:
     write_messages(folder / "bag", messages)
     with RosCamera(folder / "bag") as camera:
         return camera.read()
+
+
+@pytest.mark.parametrize("is_ros1", [False, True])
+@pytest.mark.parametrize("is_compressed", [("color",), ("color", "depth"), ()])
+def test_compressed_images_and_ros_1_are_played_alike(
+    tmp_path: Path, make_frames: MakeFrames, is_compressed: tuple[str, ...], is_ros1: bool
+) -> None:
+    ways = {DEPTH: "compressedDepth", COLOR: "compressed"}
+    plain = np.full((60, 80, 3), [200, 100, 0], np.uint8)  # JPEG loses little of it
+    frames = [replace(frame, color=plain) for frame in make_frames(3)]
+    messages = [
+        (f"{topic}/{ways[topic]}", t_ns, compressed(message))
+        if topic in ways and topic.split("/")[2] in is_compressed
+        else (topic, t_ns, message)
+        for topic, t_ns, message in frame_messages(frames)
+    ]
+    path = tmp_path / ("some.bag" if is_ros1 else "folder")
+    (write_ros1 if is_ros1 else write_messages)(path, messages)
+    with open_recording(path) as camera:
+        assert isinstance(camera, RosCamera)
+        for wanted in frames:
+            frame = camera.read()
+            assert frame.color is not None
+            assert np.array_equal(frame.depth, wanted.depth)
+            assert np.abs(frame.color - plain.astype(int)).max() <= 3
+            np.testing.assert_allclose(frame.T_C_D, wanted.T_C_D, atol=1e-12)
+            assert frame.t_camera_ns == wanted.t_camera_ns
+        assert camera.notes == ()
+
+
+@pytest.mark.parametrize("name", ["raw_depth_compressed_colour", "compressed_depth_and_colour"])
+def test_compressed_topics_of_others_are_played_with_colour(shared_data: Path, name: str) -> None:
+    with open_recording(shared_data / "field" / "ros" / name) as camera:
+        for _ in range(3):
+            assert camera.read().color is not None
+        with pytest.raises(CameraEndError):
+            camera.read()
+
+
+def test_compressed_metres_are_a_over_value_minus_b(tmp_path: Path) -> None:
+    metres = np.array([[np.nan, 0.4, 0.5, 0.6], [0.7, 0.8, 1, 2], [0.3, 0.5, 0.5, 3]], "<f4")
+    message = compressed(image(2, "depth", "32FC1", metres), 2_000.0, 9.0)
+    frame = play(tmp_path, [INFO, (f"{DEPTH}/compressedDepth", 2, message)])
+    wanted = np.nan_to_num(metres)
+    assert np.abs(frame.depth * frame.depth_scale_m - wanted).max() < 5e-3
+    assert frame.depth[0, 0] == 0
+
+
+def test_what_is_not_played_is_said(tmp_path: Path) -> None:
+    grey = np.zeros((3, 4), np.uint8)
+    packed = compressed(image(2, "color", "rgb8", np.zeros((3, 4, 3), np.uint8)))
+    messages = [
+        INFO,
+        (DEPTH, 2, image(2, "depth", "16UC1", GRAY)),
+        ("/camera/infra1/image_rect_raw", 2, image(2, "depth", "mono8", grey)),
+        (f"{COLOR}/compressed", 2, packed),
+        ("/odom", 2, TYPES["std_msgs/msg/String"]("here")),
+    ]
+    write_messages(tmp_path / "bag", messages)
+    with RosCamera(tmp_path / "bag") as camera:
+        assert camera.read().color is None
+    assert camera.notes == (
+        f"not played: {COLOR}/compressed (no camera_info for it)",
+        "not played: /camera/infra1/image_rect_raw ('mono8' is not read)",
+        "not played: /odom (std_msgs/msg/String is not read)",
+    )
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("part", ["translation", "rotation"])
+def test_a_transform_that_is_not_finite_is_refused(tmp_path: Path, value: float, part: str) -> None:
+    message = transforms(("depth", "color", np.eye(4)))
+    getattr(message.transforms[0].transform, part).x = value
+    messages = [
+        INFO,
+        ("/camera/color/camera_info", 1, info(CAMERA, "color")),
+        ("/tf_static", 1, message),
+        (COLOR, 1, image(1, "color", "rgb8", np.zeros((3, 4, 3), np.uint8))),
+        (DEPTH, 2, image(2, "depth", "16UC1", GRAY)),
+    ]
+    with pytest.raises(CameraError, match="'depth' and 'color' is not made of finite numbers"):
+        play(tmp_path, messages)
+
+
+def test_a_bag_of_librealsense_is_not_one_of_ros_1(tmp_path: Path, shared_data: Path) -> None:
+    write_ros1(tmp_path / "ros.bag", [INFO])
+    assert ros_recording(tmp_path / "ros.bag") == tmp_path / "ros.bag"
+    for path in (shared_data / "recordings").glob("*.bag"):
+        assert ros_recording(path) is None
+
+
+def test_damaged_compressed_images_are_one_error(tmp_path: Path) -> None:
+    message = compressed(image(2, "depth", "16UC1", GRAY))
+    for data in (b"", bytes(message.data[:40]), bytes(message.data[12:])):
+        message.data = np.frombuffer(data, np.uint8)
+        folder = tmp_path / str(len(data))
+        folder.mkdir()
+        with pytest.raises(CameraError, match="an image of the recording"):
+            play(folder, [INFO, (f"{DEPTH}/compressedDepth", 2, message)])
 
 
 def test_metres_become_tenths_of_a_millimetre(tmp_path: Path) -> None:
@@ -154,5 +256,5 @@ def test_a_damaged_recording_is_one_error(
             assert [camera.read() for _ in range(3)] == []
         assert "\n" not in str(caught.value)
     (tmp_path / "bag/metadata.yaml").write_text("rosbag2_bagfile_information: []")
-    with pytest.raises(CameraError, match="cannot be read as a ROS 2 recording"):
+    with pytest.raises(CameraError, match="cannot be read as a recording of ROS"):
         open_recording(tmp_path / "bag")

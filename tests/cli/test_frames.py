@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -101,6 +102,30 @@ def test_segment_says_why_it_finds_nothing(
     code, error = fails(*segment_arguments(pictures, pictures / "out"))
     assert code == 1
     assert "0.35" in error  # the gate's near end
+
+
+def test_the_gate_is_an_option_that_a_recording_keeps(
+    handcal: Callable[..., None],
+    fails: Callable[..., tuple[int, str]],
+    pictures: Path,
+    frame: Frame,
+) -> None:
+    code, error = fails(*segment_arguments(pictures, pictures / "out"), "--gate", 0.2, 0.4)
+    assert (code, "too far, at" in error) == (1, True)
+    code, error = fails(*segment_arguments(pictures, pictures / "out"), "--gate", 0.7, 0.2)
+    assert (code, "--gate: NEAR_M, 0.7, must be less than FAR_M" in error) == (2, True)
+    record_folder(pictures / "one", [frame, replace(frame, color=None, color_intrinsics=None)])
+    kept, told = pictures / "kept", pictures / "replay.json"
+    handcal("record", kept, "--source", pictures / "one", "--gate", 0.2, 0.4)
+    for gate, problem in (((), "too far"), (("--gate", 0.3, 0.7), "")):
+        handcal("replay", kept, "--roi", "depth", "--json", told, *gate)
+        rows = json.loads(told.read_text())["frames"]
+        assert [row["color"] for row in rows] == [True, False]
+        assert all(problem in row["problem"] if problem else row["points"] for row in rows)
+    code, error = fails(
+        "record", pictures / "a.db3", "--source", pictures / "one", "--gate", 0.2, 0.4
+    )
+    assert (code, "cannot keep a depth gate" in error) == (1, True)
 
 
 def test_replay_tells_every_frame(

@@ -104,6 +104,10 @@ def test_where_the_detector_sees_a_hand_the_reason_names_what_is_there(frame: Fr
             replace(frame, depth_scale_m=0.1 * frame.depth_scale_m),
             "only [12] cm large: depth is in",
         ),
+        (
+            replace(frame, depth=np.minimum(5 * frame.depth.astype(int), 65535).astype(np.uint16)),
+            r"at the measured 2\.\d+ m would be 0\.[5-9] m large: depth is in a wrong unit",
+        ),
         (replace(frame, depth=hole), "measures nothing where the hand is"),
         (replace(frame, depth=np.full_like(hole, 15000)), "only the background, at 1.50 m"),
     ):

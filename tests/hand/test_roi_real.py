@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from handcal.camera.images import read_depth
+from handcal.core.errors import HandError
 from handcal.core.types import Bool, Float64, Frame, Intrinsics, UInt8
 from handcal.hand.detect import Detections, HandDetector, overlaps
 from handcal.hand.finder import HandFinder
 from handcal.hand.roi import RoiFinder
-from handcal.hand.settings import SegmentSettings
+from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.shipped import load_detector
 from handcal.io.images import read_image
 
@@ -67,6 +68,28 @@ def test_real_hands_are_segmented_where_the_detector_saw_them(
         cut_m = cloud.contour_m[cloud.contour_is_cut] - shot.wrist_m
         beyond_m.append((cut_m @ shot.arm_axis).mean())
     assert 0.0 < np.mean(beyond_m) < 0.03
+
+
+@pytest.mark.parametrize("end", ["near", "far"])
+@pytest.mark.parametrize("beyond", [0.1, 0.25, 0.5])
+def test_real_hands_across_the_gate_are_whole_or_refused(
+    shots: list[Shot], detector: HandDetector, end: str, beyond: float
+) -> None:
+    """Hands of which a share lies beyond the gate."""
+    whole = 0
+    for shot in shots:
+        measured = shot.is_hand & (shot.frame.depth > 0)
+        depth_m = shot.frame.depth[measured] * shot.frame.depth_scale_m
+        near_m, far_m = np.quantile(depth_m, [beyond, 1.0 - beyond])
+        gate_m = (near_m + NEARER_M, 0.95) if end == "near" else (0.1, far_m)
+        try:
+            cloud = HandFinder(SegmentSettings("detector", *gate_m), detector).find(shot.frame)
+        except HandError as error:
+            assert f"the hand is too {end}" in str(error)  # noqa: PT017 (or it is whole)
+        else:
+            assert (cloud.mask[measured] > 0).mean() > 0.97
+            whole += 1
+    assert whole > 0.5 * len(shots) or beyond > 0.1
 
 
 def test_a_look_nearby_confirms_a_real_hand(shots: list[Shot], detector: HandDetector) -> None:

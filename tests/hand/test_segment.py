@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,7 @@ from handcal.core.errors import HandError
 from handcal.core.geometry import camera_matrix, project, rigid
 from handcal.core.types import Frame, HandCloud, Intrinsics, UInt16
 from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.settings import NEARER_M
 
 from .conftest import CAMERA, Shot, shoot
 
@@ -155,6 +157,37 @@ def test_arm_that_leaves_through_the_gate_is_cut() -> None:
     assert cloud.points_m[:, 2].min() >= 0.44 - 1e-4
 
 
+@pytest.mark.parametrize("with_box", [False, True])
+@pytest.mark.parametrize("end", ["near", "far"])
+def test_a_hand_across_the_gate_is_kept_whole_or_told_where_to_go(end: str, with_box: bool) -> None:
+    shot = shoot(turn_rad=(-0.5, 0.0, 0.0))
+    whole = segment_hand(shot.frame, SETTINGS)
+    box = whole.box_px if with_box else None
+    surface = (whole.mask > 0) & (shot.frame.depth > 0)
+    depth_m = shot.frame.depth[surface] * shot.frame.depth_scale_m
+    for beyond, is_kept in ((0.05, True), (0.1, True), (0.3, True), (0.7, False), (0.9, False)):
+        if end == "near":  # a hand that the detector sees may be nearer
+            near_m = float(np.quantile(depth_m, beyond)) + NEARER_M * with_box
+            gated, way = SegmentSettings(depth_min_m=near_m, depth_max_m=1.0), "near.* back"
+        else:
+            far_m = float(np.quantile(depth_m, 1.0 - beyond))
+            gated, way = SegmentSettings(depth_min_m=0.2, depth_max_m=far_m), "far.* nearer"
+        if is_kept:
+            mask = segment_hand(shot.frame, gated, box).mask
+            assert (mask > 0)[surface].mean() > 0.97, beyond
+            continue
+        with pytest.raises(HandError, match=rf"too {way} by \d+ cm"):
+            segment_hand(shot.frame, gated, box)
+
+
+def test_a_farther_thing_is_not_taken_for_a_hand_before_the_gate() -> None:
+    near, far = shoot(), shoot(at_m=(0.1, 0.02, 0.75))
+    depth = np.where(near.frame.depth < 6000, near.frame.depth, far.frame.depth)
+    gated = SegmentSettings(depth_min_m=0.62, depth_max_m=0.9)
+    with pytest.raises(HandError, match=r"too near, at 5\d cm; move it back by 1\d cm"):
+        segment_hand(with_depth(near.frame, depth), gated)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_an_arm_that_ends_in_view_is_distinguished_from_fingers(seed: int) -> None:
     shot = shoot(seed, forearm_m=0.12, at_m=(0.0, -0.01, 0.55))
@@ -183,9 +216,15 @@ def test_a_hand_half_hidden_by_another_thing_is_refused(shot: Shot) -> None:
 
 def test_nothing_within_the_gate_is_refused(shot: Shot) -> None:
     with pytest.raises(HandError, match=r"no hand-sized object between 0\.35 and 0\.70 m"):
-        segment_hand(shoot(at_m=(0.0, 0.02, 0.9)).frame, SETTINGS)
+        segment_hand(shoot(at_m=(0.0, 0.02, 1.2)).frame, SETTINGS)
     with pytest.raises(HandError, match="no hand-sized"):
         segment_hand(with_depth(shot.frame, np.zeros_like(shot.frame.depth)), SETTINGS)
+
+
+@pytest.mark.parametrize(("factor", "seen"), [(0.1, "farther than 0.15"), (5, "nearer than 2")])
+def test_depths_of_another_unit_are_told(shot: Shot, factor: float, seen: str) -> None:
+    with pytest.raises(HandError, match=f"{seen}.*if a hand is in view, correct the unit"):
+        segment_hand(replace(shot.frame, depth_scale_m=factor * 1e-4), SETTINGS)
 
 
 def test_wall_is_no_hand(shot: Shot) -> None:

@@ -160,7 +160,7 @@ def run_segmentation_test(
     described = read_masked_names(folder)
     rows, tiles = [], []
     for shot in read_masked_frames(folder, described):
-        row, mask = evaluate_frame(shot, lambda one: make_finder(segmenting).find(one), segmenting)
+        row, mask = evaluate_frame(shot, lambda one: make_finder(segmenting).find(one))
         rows.append(row)
         tiles.append(tile(shot, mask, row))
         progress.at(_SEGMENTING * len(rows) / len(described), "Segmenting hands")

@@ -11,8 +11,6 @@ import numpy as np
 
 from handcal.core.errors import HandError
 from handcal.core.types import Bool, Frame, HandCloud
-from handcal.hand.settings import SegmentSettings
-from handcal.hand.view import between, view_depth
 from handcal.lab.evaluate.masked_frames import MaskedFrame, cropped, scaled, subsampled
 
 Find = Callable[[Frame], HandCloud]
@@ -34,7 +32,7 @@ class FrameFigures:
     iou: float | None
     """Intersection over union with the true mask."""
     kept: float | None
-    """Share of the true hand's pixels within the depth gate that the mask holds."""
+    """Share of the true hand's measured pixels that the mask holds."""
     beyond_wrist_mm: float | None
     """Mean distance of the cut edge beyond the wrist joint, along the forearm."""
     crop_change: float | None
@@ -54,32 +52,26 @@ class FrameFigures:
         return max(self.crop_change, self.scale_change, self.sampling_change)
 
 
-def evaluate_frame(
-    shot: MaskedFrame, find: Find, gate: SegmentSettings
-) -> tuple[FrameFigures, Bool | None]:
+def evaluate_frame(shot: MaskedFrame, find: Find) -> tuple[FrameFigures, Bool | None]:
     """Segment the hand in a frame and in its variants; return the figures and the frame's mask.
 
     Parameters
     ----------
     shot : MaskedFrame
     find : callable
-    gate : SegmentSettings
-        For its depth gate.
     """
     try:
         cloud = find(shot.frame)
     except HandError as error:
         return FrameFigures(shot.name, str(error), *[None] * 7), None
     mask = cloud.mask > 0
-    camera = shot.frame.depth_intrinsics
-    depth = view_depth(shot.frame, (0, 0, camera.width, camera.height))
-    gated = shot.is_hand & between(depth, gate.depth_min_m, gate.depth_max_m)
+    measured = shot.is_hand & (shot.frame.depth > 0)
     changes = [_changes(shot.frame, cloud, kind, find) for kind in _variants(shot.frame)]
     figures = FrameFigures(
         name=shot.name,
         refused=None,
         iou=_share(mask & shot.is_hand, mask | shot.is_hand),
-        kept=_share(mask & gated, gated),
+        kept=_share(mask & measured, measured),
         beyond_wrist_mm=_beyond_wrist_mm(shot, cloud),
         crop_change=changes[0][0],
         scale_change=changes[1][0],

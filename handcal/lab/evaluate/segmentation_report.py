@@ -16,7 +16,7 @@ from handcal.report.provenance import made_with
 
 _METHOD = (
     "Each frame is segmented on its own, as the first one of a camera, and compared with its true "
-    "mask. Kept is the share of the true hand's pixels within the depth gate. The area is that of "
+    "mask. Kept is the share of the true hand's measured pixels in the mask. The area is that of "
     "the mask: its greatest relative change if 1 to 8 px are cropped off a side, if the image is "
     "scaled by 0.7 to 1.2, or if every second pixel of the depth is used. The wrist is the mean "
     "distance of the cut edge beyond the wrist joint, along the forearm, where joints are given."

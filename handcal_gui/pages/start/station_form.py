@@ -10,10 +10,9 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
-from handcal.hand.settings import SegmentSettings
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.preflight import PARTS, Part, gate_problem
-from handcal.station.settings import StationSettings
+from handcal.station.settings import StationSettings, gate_of_camera_m, with_gate, with_usual_gate
 from handcal_gui.pages.start.advanced_fields import AdvancedFields
 from handcal_gui.pages.start.camera_field import CameraField
 from handcal_gui.pages.start.headset_field import HeadsetField
@@ -83,6 +82,7 @@ class StationForm(QWidget):
         self._finding_rows: dict[int, FindingLine] = {}
         self._lay_out(wearer)
         self.show_settings(settings)
+        self._camera.changed.connect(self._suit_gate)
         for field in (self._rig, self._sessions, *self._parts):
             field.changed.connect(self.changed)
 
@@ -101,6 +101,13 @@ class StationForm(QWidget):
             field.show_settings(settings)
         self._rig.set_path(settings.rig)
         self._sessions.set_path(settings.sessions)
+
+    def _suit_gate(self) -> None:
+        """Show the depth gate usual for the camera now chosen."""
+        former, self._settings = self._settings, self.settings
+        suited = with_usual_gate(self._settings, former)
+        if suited != self._settings:
+            self.show_settings(suited)
 
     def set_rig(self, path: str) -> None:
         """Show another rig file."""
@@ -174,11 +181,8 @@ def _fix(part: Part, finding: Finding, settings: StationSettings) -> tuple[str, 
     """Return a fix for a part: a button's label and changed settings; empty if there is none."""
     is_broken = finding.health is Health.BROKEN
     if part == "camera" and gate_problem(settings) is not None:
-        calibration, usual = settings.calibration, SegmentSettings()
-        segment = replace(
-            calibration.segment, depth_min_m=usual.depth_min_m, depth_max_m=usual.depth_max_m
-        )
-        return tr("Use the usual gate"), {"calibration": replace(calibration, segment=segment)}
+        usual = with_gate(settings, gate_of_camera_m(settings))
+        return tr("Use the usual gate"), {"calibration": usual.calibration}
     is_simulated, is_virtual = settings.source == "simulator", settings.headset == "virtual"
     if part == "camera" and is_broken:
         return tr("Use the si&mulator"), {"source": "simulator", "headset": "virtual"}

@@ -59,7 +59,7 @@ def changed(find: Callable[[Frame], HandCloud], edit: Callable[[HandCloud], Hand
 
 
 def test_the_truth_itself_is_perfect_and_stable(shot: MaskedFrame) -> None:
-    row, mask = evaluate_frame(shot, by_depth, GATE)
+    row, mask = evaluate_frame(shot, by_depth)
     assert mask is not None
     assert (row.name, row.refused, row.iou, row.kept) == ("7", None, 1.0, 1.0)
     assert row.beyond_wrist_mm == pytest.approx(10.0, abs=0.1)
@@ -74,30 +74,36 @@ def test_half_a_mask_is_half_as_good(shot: MaskedFrame) -> None:
     half = shot.is_hand.copy()
     half[:, int(np.median(columns)) :] = False
     halved = np.count_nonzero(half) / np.count_nonzero(shot.is_hand)
-    row, _ = evaluate_frame(replace(shot, is_hand=half), by_depth, GATE)
+    row, _ = evaluate_frame(replace(shot, is_hand=half), by_depth)
     assert row.iou == pytest.approx(halved)
     assert row.kept == 1.0
     lost = changed(by_depth, lambda cloud: replace(cloud, mask=np.where(half, cloud.mask, 0)))
     first = [lost]  # later frames differ in size
-    row, _ = evaluate_frame(
-        shot, lambda frame: first.pop()(frame) if first else by_depth(frame), GATE
-    )
+    row, _ = evaluate_frame(shot, lambda frame: first.pop()(frame) if first else by_depth(frame))
     assert row.iou == row.kept == pytest.approx(halved)
     assert row.area_change == pytest.approx(1 / halved - 1, rel=0.1)
+
+
+def test_what_lies_beyond_the_gate_counts_as_lost(shot: MaskedFrame) -> None:
+    whole = shot.is_hand & (shot.frame.depth > 0)
+    near = shot.frame.depth <= np.median(shot.frame.depth[whole])
+    lost = changed(by_depth, lambda cloud: replace(cloud, mask=np.where(near, cloud.mask, 0)))
+    row, _ = evaluate_frame(shot, lambda frame: (lost if frame is shot.frame else by_depth)(frame))
+    assert row.kept == pytest.approx((whole & near).sum() / whole.sum())
 
 
 def test_what_is_refused_is_counted_with_its_reason(shot: MaskedFrame) -> None:
     def refuse(frame: Frame) -> HandCloud:
         raise HandError("too far")
 
-    row, mask = evaluate_frame(shot, refuse, GATE)
+    row, mask = evaluate_frame(shot, refuse)
     assert mask is None
     assert (row.refused, row.iou, row.area_change) == ("too far", None, None)
 
     def only_whole(frame: Frame) -> HandCloud:
         return by_depth(frame) if frame is shot.frame else refuse(frame)
 
-    unstable, _ = evaluate_frame(shot, only_whole, GATE)
+    unstable, _ = evaluate_frame(shot, only_whole)
     assert unstable.area_change == 1.0
     figures = evaluation([row, unstable])
     assert figures.keys() == KEYS
@@ -108,7 +114,7 @@ def test_what_is_refused_is_counted_with_its_reason(shot: MaskedFrame) -> None:
 
 
 def test_steps_at_the_wrist_are_between_neighbours(shot: MaskedFrame) -> None:
-    row, _ = evaluate_frame(shot, by_depth, GATE)
+    row, _ = evaluate_frame(shot, by_depth)
     rows = [replace(row, beyond_wrist_mm=mm) for mm in (10.0, 14.0, None, 30.0, 29.0)]
     figures = evaluation(rows)
     assert figures["wrist_max_step_mm"] == 4.0

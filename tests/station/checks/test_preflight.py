@@ -31,7 +31,7 @@ from handcal.rig.rig_file import write_rig
 from handcal.station.checks import preflight
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.preflight import PARTS, Part, check_station, is_ready
-from handcal.station.settings import StationSettings, with_source
+from handcal.station.settings import StationSettings, with_gate, with_source
 
 KEY = new_pairing_key()
 D415 = Device("Intel RealSense D415", "123", "5.16", "3.2")
@@ -132,7 +132,12 @@ def test_an_sdk_that_crashes_or_is_missing_is_named(
     ],
 )
 def test_a_source_names_the_camera(source: str, expected: dict[str, Any]) -> None:
-    assert with_source(StationSettings(), source) == replace(StationSettings(), **expected)
+    chosen = with_source(StationSettings(), source)
+    assert chosen == replace(StationSettings(), calibration=chosen.calibration, **expected)
+    usual_m = 0.20 if "hololens2" in source else 0.35
+    assert with_gate(StationSettings(), (usual_m, 0.70)).calibration == chosen.calibration
+    own = with_gate(StationSettings(), (0.30, 0.60))
+    assert with_source(own, source).calibration == own.calibration
 
 
 def test_a_hololens_needs_its_address_and_others_their_libraries(

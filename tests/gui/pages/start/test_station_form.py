@@ -163,6 +163,19 @@ def test_the_usual_gate_leaves_the_other_settings(
     assert segment == SegmentSettings(roi="right")
 
 
+def test_the_gate_follows_the_camera_unless_it_was_set(open_page: Callable[..., StartPage]) -> None:
+    page = open_page()
+    near, far = (find(page, QDoubleSpinBox, name) for name in ("gateNear", "gateFar"))
+    choose(page, "source", "hololens2")
+    assert (near.value(), far.value()) == (0.20, 0.70)
+    assert page.new.settings.calibration.segment.depth_min_m == 0.20
+    choose(page, "source", "realsense")
+    assert near.value() == 0.35
+    near.setValue(0.30)
+    choose(page, "source", "hololens2")
+    assert near.value() == 0.30
+
+
 def test_the_pairing_key_is_hidden_until_asked_for(open_page: Callable[..., StartPage]) -> None:
     page = open_page(source="realsense", headset="network")
     shown = find(page, QLineEdit, "pairingKey")
