@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handcal.core.errors import HandError
+from handcal.core.errors import HandError, OutOfViewError
 from handcal.core.types import Bool, Float32, Float64
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.surface import NEIGHBOURS, covered, goes_on, on_border, solid_surface
@@ -210,7 +210,7 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             raise problem
         return located if located is not None and _are_one(located, whole) else whole
     if move := gate_problem(depth_m, gate_m, 0.0 if whole.leaves_gate else _BEYOND_MAX):
-        raise HandError(move + ("" if box else _unit_hint(view, settings)))
+        raise OutOfViewError(move + ("" if box else _unit_hint(view, settings)))
     return whole
 
 
