@@ -68,6 +68,29 @@ class Adjusted:
             [*blocks, (np.diag(prior), np.empty((len(prior), 0)))], residuals
         )
 
+    def held_out_px2(self, kept: Sequence[NDArray[np.bool_]]) -> Float64:
+        """Return the mean square residual of each frame when left out, over the corners in `kept`.
+
+        The shared parameters move by one Gauss-Newton step when the frame is left out; its own pose
+        is then solved again. This is the prediction sum of squares (Allen 1974) by frames.
+        """
+        reduced = []
+        for shared, own, residuals in self.blocks:
+            basis, _ = np.linalg.qr(own)
+            reduced.append(
+                (shared - basis @ (basis.T @ shared), residuals - basis @ (basis.T @ residuals))
+            )
+        information = sum(J.T @ J for J, _ in reduced)
+        scale = 1.0 / np.sqrt(np.diag(information))
+        squares = []
+        for (J, residuals), mine, common in zip(reduced, self.kept, kept, strict=True):
+            scaled = J * scale
+            rest = information * np.outer(scale, scale) - scaled.T @ scaled
+            move = np.linalg.lstsq(rest, scaled.T @ residuals, rcond=1e-13)[0]
+            off_px = (residuals + scaled @ move).reshape(-1, 2)
+            squares.append(np.mean(np.sum(off_px**2, axis=1)[common[mine]]))
+        return np.array(squares)
+
 
 def adjust(
     sightings: Sequence[Sighting],

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView
@@ -113,7 +112,7 @@ def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
             start = fit.setup.cameras[0]
     masks = zip(*(fit.kept for fit in fits.values()), strict=True)
     kept = [np.logical_and.reduce(of_view) for of_view in masks]
-    return tuple(_judged(lens, fit, _held_out_px2(fit, kept)) for lens, fit in fits.items())
+    return tuple(_judged(lens, fit, fit.held_out_px2(kept)) for lens, fit in fits.items())
 
 
 def best_lens(fits: Sequence[LensFit]) -> LensFit:
@@ -197,27 +196,3 @@ def _best_focal(views: Sequence[BoardView], camera: Camera, focals_px: Float64) 
 def _rms_px(seen: BoardView, pose: Float64, fit: Adjusted) -> float:
     off_px = seen.pixels - pixels_of(seen.points_m, pose, fit.setup.cameras[0])
     return float(np.sqrt(np.mean(np.sum(off_px**2, axis=1))))
-
-
-def _held_out_px2(fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> Float64:
-    """Return the mean square residual of each view when left out, over the corners in `kept`.
-
-    The camera moves by one Gauss-Newton step when the view is left out; its own pose is then
-    solved again. This is the prediction sum of squares (Allen 1974) by views.
-    """
-    reduced = []
-    for shared, own, residuals in fit.blocks:
-        basis, _ = np.linalg.qr(own)
-        reduced.append(
-            (shared - basis @ (basis.T @ shared), residuals - basis @ (basis.T @ residuals))
-        )
-    information = sum(J.T @ J for J, _ in reduced)
-    scale = 1.0 / np.sqrt(np.diag(information))
-    squares = []
-    for (J, residuals), mine, common in zip(reduced, fit.kept, kept, strict=True):
-        scaled = J * scale
-        rest = information * np.outer(scale, scale) - scaled.T @ scaled
-        move = np.linalg.lstsq(rest, scaled.T @ residuals, rcond=1e-13)[0]
-        off_px = (residuals + scaled @ move).reshape(-1, 2)
-        squares.append(np.mean(np.sum(off_px**2, axis=1)[common[mine]]))
-    return np.array(squares)
