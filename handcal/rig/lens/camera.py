@@ -29,8 +29,9 @@ from handcal.rig.boards.views import (
 )
 from handcal.rig.lens.fit import rms
 from handcal.rig.lens.lens import Camera, LensModel, as_pinhole, solved_parameters
-from handcal.rig.lens.lens_fit import LensFit, best_lens, compare_lenses, fit_lens
+from handcal.rig.lens.lens_fit import LensFit, best_lens, compare_lenses, fit_lens, shaped
 from handcal.rig.lens.reprojection import as_transform
+from handcal.rig.lens.shape import FLAT, BoardShape
 from handcal.rig.lens.uncertainty import ProjectionUncertainty, next_view
 from handcal.rig.verdict import CalibrationVerdict
 
@@ -84,6 +85,8 @@ class CameraCalibration:
     verdict: CalibrationVerdict
     uncertainty: ProjectionUncertainty | None
     """None if not determined."""
+    board: BoardShape = FLAT
+    """As solved with the camera."""
     compared: tuple[LensFit, ...] = ()
     """All lens models, if the best was to be chosen."""
 
@@ -129,6 +132,8 @@ def calibrate_camera(
         solved = fit_lens(tuple(found.values()), settings.lens)
     else:
         solved = best_lens(compared) if compared else None
+    if solved is not None and solved.fit.rms_px <= settings.max_rms_px:
+        solved = _shaped(solved, tuple(found.values()), bool(compared))
     if solved is None or not np.isfinite(solved.camera.fx) or not 0 < solved.camera.fx < np.inf:
         raise ViewsError(
             "nothing can be solved from these views: take more, of a board tilted in all directions"
@@ -155,8 +160,20 @@ def calibrate_camera(
         worst=worst,
         verdict=_judge(solved, found, poses, worst, settings),
         uncertainty=solved.uncertainty,
+        board=solved.board,
         compared=compared,
     )
+
+
+def _shaped(solved: LensFit, views: Sequence[BoardView], is_chosen: bool) -> LensFit:
+    """Return the fit with the board's shape, and if chosen the lens that fits best with it."""
+    result = shaped(solved, views)
+    if not (is_chosen and result.board.words):
+        return result
+    compared = compare_lenses([result.board.of(seen) for seen in views])
+    lens = best_lens(compared).lens if compared else solved.lens
+    again = fit_lens(views, lens) if lens != solved.lens else None
+    return result if again is None else shaped(again, views)
 
 
 def tilt(T_C_B: Float64, seen: BoardView) -> float:
@@ -235,10 +252,10 @@ def _judge(
         )
         if add is not None:
             wanting.append(f"next, the board {add.words}")
-        return CalibrationVerdict("needs more views", "; ".join(wanting))
+        return CalibrationVerdict("needs more views", "; ".join(wanting) + solved.board.also)
     return CalibrationVerdict(
         "good",
         f"corners are {rms_px:.2f} px off in {len(poses)} views over {100 * seen_area.share:.0f} % "
         f"of the image; the direction of a pixel is known to ± {uncertainty.middle_px:.2f} px "
-        f"({uncertainty.middle_px * arcmin_per_px:.1f}′)",
+        f"({uncertainty.middle_px * arcmin_per_px:.1f}′)" + solved.board.also,
     )

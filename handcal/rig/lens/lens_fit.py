@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -21,6 +21,7 @@ from handcal.rig.lens.lens import (
     undistorted_camera,
 )
 from handcal.rig.lens.reprojection import Setup, Sighting, as_vector
+from handcal.rig.lens.shape import FLAT, BoardShape, solve_shape
 from handcal.rig.lens.uncertainty import ProjectionUncertainty, projection_uncertainty
 
 # Focal lengths tried, in widths of the image, and the views that judge them.
@@ -46,6 +47,8 @@ class LensFit:
     """`Adjusted.covariance`."""
     uncertainty: ProjectionUncertainty | None
     """None if the views do not determine the camera."""
+    board: BoardShape = FLAT
+    """As solved with the camera."""
 
     @property
     def camera(self) -> Camera:
@@ -79,7 +82,7 @@ def fit_camera(
     poses = [None if camera is None else first_pose(seen, camera) for seen in views]
     if camera is None or any(pose is None for pose in poses):
         return None
-    sightings = [Sighting(number, 0, seen) for number, seen in enumerate(views)]
+    sightings = _sightings(views)
     vectors = tuple(as_vector(pose) for pose in poses if pose is not None)
     fit = adjust(sightings, Setup((camera,), vectors), [lens])
     # A plane has two poses of nearly the same image; with the first camera, PnP may take the other.
@@ -99,6 +102,12 @@ def fit_lens(views: Sequence[BoardView], lens: LensModel) -> LensFit | None:
     """Fit one lens model; None if nothing can be solved."""
     fit = fit_camera(views, lens)
     return None if fit is None else _judged(lens, fit, np.empty(0))
+
+
+def shaped(solved: LensFit, views: Sequence[BoardView]) -> LensFit:
+    """Return the fit with the board's shape solved for, or with what is not known of it."""
+    fit, board = solve_shape(_sightings(views), solved.fit, [solved.lens])
+    return replace(_judged(solved.lens, fit, solved.held_out_px2), board=board)
 
 
 def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
@@ -137,6 +146,10 @@ def best_lens(fits: Sequence[LensFit]) -> LensFit:
 def _is_worse(one: LensFit, least: LensFit) -> bool:
     more_px2 = one.held_out_px2 - least.held_out_px2
     return bool(more_px2.mean() > more_px2.std(ddof=1) / np.sqrt(len(more_px2)))
+
+
+def _sightings(views: Sequence[BoardView]) -> list[Sighting]:
+    return [Sighting(number, 0, seen) for number, seen in enumerate(views)]
 
 
 def _judged(lens: LensModel, fit: Adjusted, held_out_px2: Float64) -> LensFit:
