@@ -86,7 +86,8 @@ class Adjusted:
         """Return the mean square residual of each frame when left out, over the corners in `kept`.
 
         The shared parameters move by one Gauss-Newton step when the frame is left out; its own pose
-        is then solved again. This is the prediction sum of squares (Allen 1974) by frames.
+        is then solved again. This is the prediction sum of squares (Allen 1974) by frames. All
+        cameras see each frame, and the sightings are in the order of frames, then cameras.
         """
         reduced = []
         for shared, own, residuals in self.blocks:
@@ -96,8 +97,10 @@ class Adjusted:
             )
         information = sum(J.T @ J for J, _ in reduced) + np.diag(self.priors_px**2)
         scale = 1.0 / np.sqrt(np.diag(information))
-        squares = []
-        for (J, residuals), mine, common in zip(reduced, self.kept, kept, strict=True):
+        squares, each = [], len(self.kept) // len(self.blocks)
+        for number, (J, residuals) in enumerate(reduced):
+            of_frame = slice(each * number, each * (number + 1))
+            mine, common = (np.concatenate(one[of_frame]) for one in (self.kept, kept))
             scaled = J * scale
             rest = information * np.outer(scale, scale) - scaled.T @ scaled
             move = lstsq(rest, scaled.T @ residuals, 1e-13, lapack_driver="gelsy")[0]

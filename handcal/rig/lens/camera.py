@@ -31,7 +31,7 @@ from handcal.rig.lens.fit import rms
 from handcal.rig.lens.lens import Camera, LensModel, as_pinhole, solved_parameters
 from handcal.rig.lens.lens_fit import LensFit, best_lens, compare_lenses, fit_lens, shaped
 from handcal.rig.lens.reprojection import as_transform
-from handcal.rig.lens.shape import FLAT, BoardShape
+from handcal.rig.lens.shape import FLAT, MOST_BY_SHAPE, BoardShape
 from handcal.rig.lens.uncertainty import ProjectionUncertainty, next_view
 from handcal.rig.verdict import CalibrationVerdict
 
@@ -132,7 +132,7 @@ def calibrate_camera(
         solved = fit_lens(tuple(found.values()), settings.lens)
     else:
         solved = best_lens(compared) if compared else None
-    if solved is not None and solved.fit.rms_px <= settings.max_rms_px:
+    if solved is not None and solved.fit.rms_px <= MOST_BY_SHAPE * settings.max_rms_px:
         solved = _shaped(solved, tuple(found.values()), bool(compared))
     if solved is None or not np.isfinite(solved.camera.fx) or not 0 < solved.camera.fx < np.inf:
         raise ViewsError(

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from handcal.core.types import Float64
-from handcal.rig.boards.board import BoardView
+from handcal.rig.boards.board import BoardView, square_m
 from handcal.rig.lens.bundle import Adjusted, adjust, kept_only
 from handcal.rig.lens.lens import LensModel
 from handcal.rig.lens.reprojection import Problem, Sighting, as_transform
@@ -24,6 +24,8 @@ from handcal.rig.lens.reprojection import Problem, Sighting, as_transform
 # the board's width, the stretch in one direction, the shear, and a corner in squares.
 _BENT, _STRETCHED, _SHEARED, _CORNER_SQUARES = 0.01, 0.01, 0.003, 0.02
 _WHOLE = 5
+MOST_BY_SHAPE = 5.0
+"""A residual larger than good by more than this factor is not of the board's shape."""
 # More corners than these are freed by rows and columns.
 _MOST_FREE = 200
 _MOST_BY_CHANCE = 1e-4
@@ -149,10 +151,9 @@ def _corner_modes(points_m: Float64, whole_m: Float64) -> Float64:
     rest -= basis @ (basis.T @ rest)
     U, size, _ = np.linalg.svd(rest, full_matrices=False)
     independent = U[:, size > 1e-6 * size[0]]
-    square_m = _square_m(points_m)
     modes_m = np.zeros((len(points_m), 3, independent.shape[1]))
     # Scaled so that a corner moves by the prior, however many modes share it.
-    each_m = _CORNER_SQUARES * square_m * np.sqrt(3 * count / independent.shape[1])
+    each_m = _CORNER_SQUARES * square_m(points_m) * np.sqrt(3 * count / independent.shape[1])
     modes_m[is_seen] = each_m * independent.reshape(count, 3, -1)
     return modes_m
 
@@ -161,10 +162,6 @@ def _indicators(values: Float64) -> Float64:
     """Return which of the distinct values (K,) each of (N,) is, (N, K)."""
     rounded = values.round(6)
     return np.asarray(rounded[:, None] == np.unique(rounded), np.float64)
-
-
-def _square_m(points_m: Float64) -> float:
-    return float(np.diff(np.unique(points_m[np.isfinite(points_m[:, 0]), 0].round(6))).min())
 
 
 def _bends(fit: Adjusted) -> bool:
@@ -238,7 +235,7 @@ def _words(fit: Adjusted, points_m: Float64, off_m: Float64) -> str:
     jump, steps = _jump(points_m, off_m)
     found = [jump] if jump[0] > least_m else []
     if found:  # a stretch and a shear as the other lines show them
-        (x_x, y_x), (x_y, y_y) = steps / _square_m(points_m)
+        (x_x, y_x), (x_y, y_y) = steps / square_m(points_m)
         whole[3:] = (x_x - y_y) / _STRETCHED, (x_y + y_x) / _SHEARED
     bent_mm = 1e3 * _BENT * np.abs(whole[:2]) * [wide_m, high_m]
     sides = ("wider than high", "higher than wide")[int(whole[3] < 0)]
