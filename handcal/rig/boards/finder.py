@@ -158,23 +158,23 @@ def _goes_on(gray: UInt8, pixels: Float64, board: Board) -> bool:
     columns, rows = board.inner
     grid = pixels.reshape(rows, columns, 2)
     sides = (grid, grid[::-1], grid.swapaxes(0, 1), grid[:, ::-1].swapaxes(0, 1))
-    beyond = [np.stack([2 * side[0] - side[1], side[0], side[1]]) for side in sides]
-    contrast = np.percentile(_checker(gray, grid), 50)
-    return any(np.median(_checker(gray, side)[0]) > 0.75 * contrast for side in beyond)
-
-
-def _checker(gray: UInt8, grid: Float64) -> Float64:
-    """Return the contrast between the squares around each corner of a (rows, columns, 2) grid.
-
-    It is half as large at a board's edge.
-    """
-    down, right = (0.3 * np.gradient(grid, axis=axis) for axis in (0, 1))
-    places = np.stack(
-        [grid - right - down, grid + right + down, grid + right - down, grid - right + down]
+    return any(
+        np.median(_alternation(gray, np.stack([2 * side[0] - side[1], *side[:2]]))) > 0.5
+        for side in sides
     )
-    shades = shades_at(gray, places)
-    alternation: Float64 = np.abs(shades[:2].sum(axis=0) - shades[2:].sum(axis=0))
-    return alternation
+
+
+def _alternation(gray: UInt8, grid: Float64) -> Float64:
+    """Return how the squares beyond a grid's first row alternate, of those within it.
+
+    It is 1 on a board that goes on and 0 at its margin, however bright or glaring the margin is.
+    """
+    down, right = (0.3 * np.gradient(grid, axis=axis)[0] for axis in (0, 1))
+    steps = (-right - down, right - down, right + down, -right + down)
+    a, b, c, d = shades_at(gray, grid[0] + np.stack(steps))
+    within = c - d
+    share: Float64 = (a - b) * within / np.maximum(within**2, 1.0)
+    return share
 
 
 def _refine(gray: UInt8, pixels: Float64, board: Board) -> Float64:

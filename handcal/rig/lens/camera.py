@@ -133,7 +133,7 @@ def calibrate_camera(
     else:
         solved = best_lens(compared) if compared else None
     if solved is not None and solved.fit.rms_px <= MOST_BY_SHAPE * settings.max_rms_px:
-        solved = _shaped(solved, tuple(found.values()), bool(compared))
+        solved, compared = _shaped(solved, tuple(found.values()), compared)
     if solved is None or not np.isfinite(solved.camera.fx) or not 0 < solved.camera.fx < np.inf:
         raise ViewsError(
             "nothing can be solved from these views: take more, of a board tilted in all directions"
@@ -165,15 +165,19 @@ def calibrate_camera(
     )
 
 
-def _shaped(solved: LensFit, views: Sequence[BoardView], is_chosen: bool) -> LensFit:
-    """Return the fit with the board's shape, and if chosen the lens that fits best with it."""
+def _shaped(
+    solved: LensFit, views: Sequence[BoardView], compared: tuple[LensFit, ...]
+) -> tuple[LensFit, tuple[LensFit, ...]]:
+    """Return the fit with the board's shape, and the lens models compared on that board."""
     result = shaped(solved, views)
-    if not (is_chosen and result.board.words):
-        return result
-    compared = compare_lenses([result.board.of(seen) for seen in views])
-    lens = best_lens(compared).lens if compared else solved.lens
-    again = fit_lens(views, lens) if lens != solved.lens else None
-    return result if again is None else shaped(again, views)
+    if not (compared and result.board.words):
+        return result, compared
+    # A lens model too simple would be mended by the board's shape.
+    kinds = [one for one in compared if (one.lens == "fisheye") == (solved.lens == "fisheye")]
+    board = shaped(kinds[-1], views).board
+    compared = compare_lenses([board.of(seen) for seen in views])
+    again = fit_lens(views, best_lens(compared).lens) if compared else None
+    return (result if again is None else shaped(again, views)), compared
 
 
 def tilt(T_C_B: Float64, seen: BoardView) -> float:

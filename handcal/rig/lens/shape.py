@@ -30,8 +30,8 @@ MOST_BY_SHAPE = 5.0
 _MOST_FREE = 200
 _MOST_BY_CHANCE = 1e-4
 _SURE_SIGMAS, _STANDS_OUT = 3.0, 5.0
-# Of the board's width: smaller deviations are not named if there are larger ones.
-_LEAST_SHARE = 5e-4
+# Of the largest deviation: smaller ones are not named.
+_NAMED_SHARE = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,9 +231,8 @@ def _words(fit: Adjusted, points_m: Float64, off_m: Float64) -> str:
         sigma = np.sqrt(np.diag(covariance))[first : first + _WHOLE]
     modes_m, whole = _whole_modes(points_m), fit.setup.shape[:_WHOLE].copy()
     wide_m, high_m = (np.nanmax(points_m, axis=0) - np.nanmin(points_m, axis=0))[:2]
-    least_m = _LEAST_SHARE * wide_m
     jump, steps = _jump(points_m, off_m)
-    found = [jump] if jump[0] > least_m else []
+    found = [jump] if jump[1] else []
     if found:  # a stretch and a shear as the other lines show them
         (x_x, y_x), (x_y, y_y) = steps / square_m(points_m)
         whole[3:] = (x_x - y_y) / _STRETCHED, (x_y + y_x) / _SHEARED
@@ -250,14 +249,15 @@ def _words(fit: Adjusted, points_m: Float64, off_m: Float64) -> str:
     found += [
         (float(size_m), text)
         for size_m, text, value, known in zip(sizes_m, words, whole, sigma, strict=True)
-        if abs(value) > _SURE_SIGMAS * known and size_m > least_m
+        if abs(value) > _SURE_SIGMAS * known
     ]
     uneven_m = float(np.abs(off_m - modes_m @ fit.setup.shape[:_WHOLE]).max())
-    if uneven_m > least_m and jump not in found:
+    if len(fit.setup.shape) > _WHOLE and not jump[1]:
         found.append((uneven_m, f"uneven: single corners are off by {1e3 * uneven_m:.2f} mm"))
-    most_mm = 1e3 * float(np.abs(off_m).max())
-    texts = [text for _, text in sorted(found, reverse=True)]
-    return ", ".join(texts) or f"off by up to {most_mm:.2f} mm from a flat grid"
+    if not found:
+        return f"off by up to {1e3 * np.abs(off_m).max():.2f} mm from a flat grid"
+    least_m = _NAMED_SHARE * max(found)[0]
+    return ", ".join(text for size_m, text in sorted(found, reverse=True) if size_m >= least_m)
 
 
 def _jump(points_m: Float64, off_m: Float64) -> tuple[tuple[float, str], Float64]:
