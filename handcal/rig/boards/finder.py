@@ -17,7 +17,7 @@ from handcal.rig.boards.board import (
     charuco,
     corners_m,
 )
-from handcal.rig.boards.diagnosis import OTHER_BOARD, explain_missing, why_not_plain
+from handcal.rig.boards.diagnosis import OTHER_BOARD, explain_missing, other_squares, why_not_plain
 
 # In squares: corners farther than this from the place predicted by the others are rejected.
 _STRAY_SQUARES = 0.5
@@ -54,8 +54,10 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     fits = _is_regular(ids, pixels, board)
     is_skipping = board.kind == "checkerboard" and not _alternates(gray, pixels, board)
     if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS or is_skipping:
+        other = other_squares(gray, board) if board.kind == "charuco" else ""
         raise BoardError(
-            "the squares do not lie as on this board: check the number of squares and markers"
+            other
+            or "the squares do not lie as on this board: check the number of squares and markers"
         )
     ids, pixels = ids[fits], pixels[fits]
     if board.kind == "checkerboard" and fits.all() and _goes_on(gray, pixels, board):
