@@ -8,7 +8,7 @@ taken. What the views leave open of it is in the covariance of the cameras also 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,9 +16,10 @@ from scipy.stats import chi2
 
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView, square_m
+from handcal.rig.boards.views import ViewsError
 from handcal.rig.lens.bundle import Adjusted, adjust, kept_only
-from handcal.rig.lens.lens import LensModel
-from handcal.rig.lens.reprojection import Problem, Sighting, as_transform
+from handcal.rig.lens.lens import Camera, LensModel, first_pose
+from handcal.rig.lens.reprojection import Problem, Setup, Sighting, as_transform, as_vector
 
 # Priors of boards in labs, one standard deviation: the height of a bend or a twist as a share of
 # the board's width, the stretch in one direction, the shear, and a corner in squares.
@@ -106,6 +107,28 @@ def solve_shape(
     return best, BoardShape(_words(best, points_m, off_m), off_m)
 
 
+def boards_seen(
+    views: Mapping[str, BoardView], camera: Camera
+) -> tuple[dict[str, BoardView], BoardShape]:
+    """Return views of one board by a known camera with the corners at their real places.
+
+    Raises
+    ------
+    ViewsError
+        If the board's pose in a view cannot be solved.
+    """
+    poses = []
+    for name, seen in views.items():
+        pose = first_pose(seen, camera)
+        if pose is None:
+            raise ViewsError(f"the board's pose in {name} cannot be solved: drop it")
+        poses.append(as_vector(pose))
+    sightings = [Sighting(number, 0, seen) for number, seen in enumerate(views.values())]
+    flat = adjust(sightings, Setup((camera,), tuple(poses)), [None])
+    _, board = solve_shape(sightings, flat, [None])
+    return {name: board.of(seen) for name, seen in views.items()}, board
+
+
 def _points(sightings: Sequence[Sighting]) -> Float64:
     """Return the corners' entered places by number, (N, 3); NaN for those never seen."""
     points_m = np.full((1 + max(int(one.seen.ids.max()) for one in sightings), 3), np.nan)
@@ -123,6 +146,7 @@ def _whole_modes(points_m: Float64) -> Float64:
     modes_m = np.zeros((len(points_m), 3, _WHOLE))
     modes_m[:, 2, 0] = 2 * half_m[0] * _BENT * (1 - u * u)
     modes_m[:, 2, 1] = 2 * half_m[1] * _BENT * (1 - v * v)
+    modes_m[:, 2, :2] -= np.nanmean(modes_m[:, 2, :2], axis=0)
     modes_m[:, 2, 2] = 2 * half_m.max() * _BENT * u * v
     modes_m[:, 0, 3], modes_m[:, 1, 3] = _STRETCHED / 2 * x_m, -_STRETCHED / 2 * y_m
     modes_m[:, 0, 4], modes_m[:, 1, 4] = _SHEARED / 2 * y_m, _SHEARED / 2 * x_m
