@@ -168,6 +168,11 @@ def kept_only(sightings: Sequence[Sighting], kept: Sequence[NDArray[np.bool_]]) 
     ]
 
 
+def kept_by_all(fits: Sequence[Adjusted]) -> list[NDArray[np.bool_]]:
+    """Return the corners of each sighting, (N,), that no fit has left out."""
+    return [np.logical_and.reduce(one) for one in zip(*(fit.kept for fit in fits), strict=True)]
+
+
 def foreseen(
     points_m: Float64, setup: Setup, lenses: Sequence[LensModel | None]
 ) -> tuple[Float64, Float64]:

@@ -29,7 +29,14 @@ from handcal.rig.boards.views import (
 )
 from handcal.rig.lens.fit import rms
 from handcal.rig.lens.lens import Camera, LensModel, as_pinhole, solved_parameters
-from handcal.rig.lens.lens_fit import LensFit, best_lens, compare_lenses, fit_lens, shaped
+from handcal.rig.lens.lens_fit import (
+    LensFit,
+    best_lens,
+    compare_lenses,
+    compare_shaped,
+    fit_lens,
+    shaped,
+)
 from handcal.rig.lens.reprojection import as_transform
 from handcal.rig.lens.shape import FLAT, MOST_BY_SHAPE, BoardShape
 from handcal.rig.lens.uncertainty import ProjectionUncertainty, next_view
@@ -172,12 +179,9 @@ def _shaped(
     result = shaped(solved, views)
     if not (compared and result.board.words):
         return result, compared
-    # A lens model too simple would be mended by the board's shape.
     kinds = [one for one in compared if (one.lens == "fisheye") == (solved.lens == "fisheye")]
-    board = shaped(kinds[-1], views).board
-    compared = compare_lenses([board.of(seen) for seen in views])
-    again = fit_lens(views, best_lens(compared).lens) if compared else None
-    return (result if again is None else shaped(again, views)), compared
+    compared = compare_shaped(kinds, views)
+    return best_lens(compared), compared
 
 
 def tilt(T_C_B: Float64, seen: BoardView) -> float:

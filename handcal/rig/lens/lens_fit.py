@@ -10,7 +10,7 @@ import numpy as np
 
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView
-from handcal.rig.lens.bundle import Adjusted, adjust
+from handcal.rig.lens.bundle import Adjusted, adjust, kept_by_all
 from handcal.rig.lens.lens import (
     Camera,
     LensModel,
@@ -110,6 +110,20 @@ def shaped(solved: LensFit, views: Sequence[BoardView]) -> LensFit:
     return replace(_judged(solved.lens, fit, solved.held_out_px2), board=board)
 
 
+def compare_shaped(fits: Sequence[LensFit], views: Sequence[BoardView]) -> tuple[LensFit, ...]:
+    """Return the fits with the board's shape solved for with each lens model."""
+    results = [shaped(one, views) for one in fits]
+    # A flat board's derivatives by its shape are of no held-out error.
+    solved = [
+        now.fit if now.board.words else one.fit for one, now in zip(fits, results, strict=True)
+    ]
+    kept = kept_by_all(solved)
+    return tuple(
+        replace(now, held_out_px2=fit.held_out_px2(kept))
+        for now, fit in zip(results, solved, strict=True)
+    )
+
+
 def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
     """Fit all lens models; return those that could be solved."""
     fits: dict[LensModel, Adjusted] = {}
@@ -119,8 +133,7 @@ def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
         if fit is not None:
             fits[lens] = fit
             start = fit.setup.cameras[0]
-    masks = zip(*(fit.kept for fit in fits.values()), strict=True)
-    kept = [np.logical_and.reduce(of_view) for of_view in masks]
+    kept = kept_by_all(tuple(fits.values()))
     return tuple(_judged(lens, fit, fit.held_out_px2(kept)) for lens, fit in fits.items())
 
 

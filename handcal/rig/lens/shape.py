@@ -17,7 +17,7 @@ from scipy.stats import chi2
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView, square_m
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.lens.bundle import Adjusted, adjust, kept_only
+from handcal.rig.lens.bundle import Adjusted, adjust, kept_by_all, kept_only
 from handcal.rig.lens.lens import Camera, LensModel, first_pose
 from handcal.rig.lens.reprojection import Problem, Setup, Sighting, as_transform, as_vector
 
@@ -238,7 +238,7 @@ def _repeats(fit: Adjusted, sightings: Sequence[Sighting], count: int) -> bool:
 
 def _simplest(fits: Sequence[Adjusted]) -> Adjusted:
     """Return the first fit whose held-out error is within one standard error of the least."""
-    kept = [np.logical_and.reduce(one) for one in zip(*(fit.kept for fit in fits), strict=True)]
+    kept = kept_by_all(fits)
     held_out_px2 = np.stack([fit.held_out_px2(kept) for fit in fits])
     least = held_out_px2[held_out_px2.mean(axis=1).argmin()]
     more_px2 = held_out_px2 - least
