@@ -45,6 +45,7 @@ from handcal.rig.verdict import CalibrationVerdict
 LensChoice: TypeAlias = Literal["auto", LensModel]
 LENS_CHOICES: tuple[str, ...] = ("auto", *get_args(LensModel))
 MIN_VIEWS = 3
+_NEAR_BY_SHAPE = 1.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +182,10 @@ def _shaped(
         return result, compared
     kinds = [one for one in compared if (one.lens == "fisheye") == (solved.lens == "fisheye")]
     compared = compare_shaped(kinds, views)
-    return best_lens(compared), compared
+    # Free corners mend a lens model too simple; with the right one a simpler board is enough.
+    near_px = _NEAR_BY_SHAPE * min(one.held_out_px for one in compared)
+    plainer = [one for one in compared if one.held_out_px < near_px and not one.board.is_uneven]
+    return best_lens(plainer or compared), compared
 
 
 def tilt(T_C_B: Float64, seen: BoardView) -> float:

@@ -45,6 +45,9 @@ class BoardShape:
     """(N, 3); by the corners' numbers, real minus entered places, but for size and pose; empty if
     it does not."""
 
+    is_uneven: bool = False
+    """True if single corners had to be freed."""
+
     @property
     def also(self) -> str:
         """The ending of a sentence that says it; empty if the board does not differ."""
@@ -104,7 +107,9 @@ def solve_shape(
     if best is flat:
         return open_shape, FLAT
     off_m = modes_m[:, :, : len(best.setup.shape)] @ best.setup.shape
-    return best, BoardShape(_words(best, points_m, off_m), off_m)
+    return best, BoardShape(
+        _words(best, points_m, off_m), off_m, best is fits[-1] and len(fits) > 2
+    )
 
 
 def boards_seen(
