@@ -167,15 +167,15 @@ def _goes_on(gray: UInt8, pixels: Float64, board: Board) -> bool:
 
 
 def _alternation(gray: UInt8, grid: Float64) -> Float64:
-    """Return how the squares beyond a grid's first row alternate, of those within it.
+    """Return how the squares beyond a grid's first row alternate, of those beyond its second.
 
     It is 1 on a board that goes on and 0 at its margin, however bright or glaring the margin is.
     """
-    down, right = (0.3 * np.gradient(grid, axis=axis)[0] for axis in (0, 1))
-    steps = (-right - down, right - down, right + down, -right + down)
-    a, b, c, d = shades_at(gray, grid[0] + np.stack(steps))
-    within = c - d
-    share: Float64 = (a - b) * within / np.maximum(within**2, 1.0)
+    down, right = (0.3 * np.gradient(grid, axis=axis)[:2] for axis in (0, 1))
+    shades = shades_at(gray, grid[:2] + np.stack([right - down, -right - down]))
+    beyond, within = shades[0] - shades[1]
+    usual = np.median(np.abs(within))
+    share: Float64 = -beyond * np.sign(within) / np.maximum(np.abs(within), usual)
     return share
 
 
