@@ -13,8 +13,9 @@ from handcal.core.types import DepthCheck, DepthEdges, Frame
 from handcal.rig.boards.board import Board, BoardError, BoardView
 from handcal.rig.boards.choose import ChooseSettings, ViewSelector
 from handcal.rig.boards.views import MAX_VIEWS, ViewsError
-from handcal.rig.depth import DepthView, depth_view, fit_depth
+from handcal.rig.depth import MIN_DEPTH_VIEWS, DepthView, depth_view, fit_depth, on_real_board
 from handcal.rig.depth_border import MIN_BORDER_VIEWS, border_outside_px, fit_edges
+from handcal.rig.lens.shape import FLAT, BoardShape
 
 _SILENT_S = 5.0
 
@@ -44,6 +45,8 @@ class MeasuredDepth:
     """None if the border of the board's sheet was not seen often enough."""
     why_no_edges: str
     """The most frequent reason; empty if the edges were measured."""
+    board: BoardShape = FLAT
+    """As its corners in colour show it."""
 
 
 def run_depth_check(
@@ -69,6 +72,8 @@ def run_depth_check(
         used.
     """
     selector, views = ViewSelector(settings.choose), list[DepthView]()
+    boards: list[BoardView] = []
+    last: Frame | None = None
     borders_px: list[float] = []
     passed_over: Counter[str] = Counter()
     no_border: Counter[str] = Counter()
@@ -85,6 +90,7 @@ def run_depth_check(
         try:
             seen = _seen_in(frame, board, selector)
             views.append(depth_view(seen, frame))
+            boards, last = [*boards, seen], frame
         except BoardError as error:
             passed_over[str(error)] += 1
             continue
@@ -100,7 +106,10 @@ def run_depth_check(
             why, count = no_border.most_common(1)[0]
             why_no_edges += f"; in {count} others {why}"
     try:
-        return MeasuredDepth(fit_depth(views), edges, why_no_edges)
+        board_shape = FLAT
+        if last is not None and len(views) >= MIN_DEPTH_VIEWS:
+            views, board_shape = on_real_board(views, boards, last)
+        return MeasuredDepth(fit_depth(views), edges, why_no_edges, board_shape)
     except ViewsError as error:
         if not passed_over:
             raise

@@ -142,7 +142,10 @@ def depth(arguments: argparse.Namespace) -> None:
     finding = depth_finding(measured)
     console.print(f"{'good' if finding.is_fine else 'doubtful'}: {finding.found}", markup=False)
     if not finding.is_fine:
-        console.print(explain_depth(measured) or "add views, at more distances", markup=False)
+        why = explain_depth(measured, board.square_m)
+        console.print(why or "add views, at more distances", markup=False)
+    if found.board.words:
+        console.print(f"The board is not as entered: {found.board.words}", markup=False)
     if found.edges is None:
         console.print(f"Edges not measured: {found.why_no_edges}", markup=False)
     else:

@@ -8,7 +8,7 @@ gives scale and offset.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import cv2
@@ -22,6 +22,7 @@ from handcal.rig.boards.views import ViewsError
 from handcal.rig.check import MAX_RANGES
 from handcal.rig.displays.display import undistort
 from handcal.rig.lens.fit import clustered_covariance
+from handcal.rig.lens.shape import BoardShape, boards_seen
 from handcal.rig.lens.viewpoint import board_pose
 
 MIN_DEPTH_VIEWS = 5
@@ -95,6 +96,33 @@ def depth_view(seen: BoardView, frame: Frame) -> DepthView:
     return DepthView(middle_m, middle_m + bias_m, _flatness_m(measured_m[:, None] * rays))
 
 
+def on_real_board(
+    views: Sequence[DepthView], boards: Sequence[BoardView], frame: Frame
+) -> tuple[list[DepthView], BoardShape]:
+    """Return the views with the true depth of the board as it is, bent or stretched, and how it is.
+
+    Parameters
+    ----------
+    views : sequence of DepthView
+    boards : sequence of BoardView
+        The corners in colour of each.
+    frame : Frame
+        Any of theirs.
+    """
+    if frame.color_intrinsics is None:
+        raise ValueError("the frame needs colour")
+    named = {str(number): seen for number, seen in enumerate(boards)}
+    real, board = boards_seen(named, frame.color_intrinsics)
+
+    def middle_m(seen: BoardView) -> float:
+        return float(transform(board_in_depth(seen, frame), seen.points_m)[:, 2].mean())
+
+    return [
+        replace(view, true_m=view.true_m + middle_m(now) - middle_m(before))
+        for view, before, now in zip(views, boards, real.values(), strict=True)
+    ], board
+
+
 def fit_depth(views: Sequence[DepthView], made: str | None = None) -> DepthCheck:
     """Return scale, offset and flatness of measured depth.
 
@@ -144,10 +172,16 @@ def fit_depth(views: Sequence[DepthView], made: str | None = None) -> DepthCheck
     )
 
 
-def explain_depth(check: DepthCheck) -> str:
+def explain_depth(check: DepthCheck, square_m: float | None = None) -> str:
     """Return the likely cause of a bias, in one line; empty if neither scale nor offset is sure.
 
     One of them is not mentioned if its effect at half a metre is small beside the other's.
+
+    Parameters
+    ----------
+    check : DepthCheck
+    square_m : float, optional
+        The side of a square as entered, to say what the depth images say of it.
     """
     effects_m = np.abs([0.5 * (check.scale - 1.0), check.offset_m])
     sigmas_m = np.sqrt(np.diag(check.covariance)) * [0.5, 1.0]
@@ -157,9 +191,15 @@ def explain_depth(check: DepthCheck) -> str:
     percent = f"{signed(100.0 * (check.scale - 1.0), 2)} %"
     offset = f"{signed(1e3 * check.offset_m, 1)} mm"
     if is_scaled and not is_offset:
+        square = ""
+        if square_m is not None:
+            square = (
+                f"the depth images say that a square is {1e3 * check.scale * square_m:.1f} mm, "
+                f"not {1e3 * square_m:.1f}; "
+            )
         return (
-            f"depth differs by {percent} at every distance: measure the squares of the board, and "
-            "check the depth unit and the intrinsics of the colour camera"
+            f"depth differs by {percent} at every distance: {square}measure the squares of the "
+            "board, and check the depth unit and the intrinsics of the colour camera"
         )
     if is_offset and not is_scaled:
         return (

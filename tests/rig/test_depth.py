@@ -110,6 +110,7 @@ def test_a_wrong_square_size_is_distinguished_from_an_offset() -> None:
     check = check_of(3, square=1.04)
     assert check.scale == pytest.approx(1.0 / 1.04, abs=0.005)
     assert "at every distance: measure the squares" in explain_depth(check)
+    assert "that a square is 25.0 mm, not 26.0" in explain_depth(check, 0.026)
     assert not depth_finding(check).is_fine
 
 

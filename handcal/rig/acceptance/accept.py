@@ -30,6 +30,7 @@ from handcal.core.types import Eye, EyeDisplay, Float64, Intrinsics, Rig, RigPar
 from handcal.rig.boards.board import BoardView
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.displays.display import DisplayHomography, undistort
+from handcal.rig.lens.shape import boards_seen
 from handcal.rig.lens.viewpoint import TrackedView, board_pose, locate_viewpoint
 
 FEWEST_VIEWS = 5
@@ -194,6 +195,8 @@ def accept_eye(
             f"{len(pairs)} pairs of images show the board; take at least {FEWEST_VIEWS}, at "
             "different distances"
         )
+    _, board = boards_seen({name: seen for name, (_, seen) in pairs.items()}, depth_camera)
+    pairs = {name: (board.of(first), board.of(second)) for name, (first, second) in pairs.items()}
     T_E_H = view_of_eye(display, np.eye(4))
     T_C_B = {name: board_pose(seen, camera) for name, (seen, _) in pairs.items()}
     T_H_B = {name: rig.T_H_D @ board_pose(seen, depth_camera) for name, (_, seen) in pairs.items()}

@@ -122,6 +122,11 @@ def corners_m(board: Board) -> Float64:
     return board.square_m * np.stack([column + 1.0, row + 1.0, np.zeros(len(row))], axis=1)
 
 
+def square_m(points_m: Float64) -> float:
+    """Return the side of a square of which (N, 3) are corners; unseen ones may be NaN."""
+    return float(np.diff(np.unique(points_m[np.isfinite(points_m[:, 0]), 0].round(6))).min())
+
+
 @lru_cache(maxsize=256)
 def _beside(seen: BoardView) -> Int64:
     count = min(_NEIGHBOURS, len(seen.pixels) - 1)

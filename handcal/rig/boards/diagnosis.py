@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -11,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.core.types import Float64, UInt8
-from handcal.rig.boards.board import MIN_CORNERS, Board
+from handcal.rig.boards.board import MIN_CORNERS, Board, charuco
 
 # Fewer markers than this may be false detections, as in leaves or carpets.
 _ENOUGH_MARKERS = 4
 # Places along each side of a square, and the most that its shades differ there, of the contrast.
 _WITHIN = (0.25, 0.4, 0.5, 0.6, 0.75)
 _PLAIN_SHARE = 0.15
+# Of a marker's side: how far its corners may be from their places on a board.
+_MARKER_OFF = 0.3
 _FAMILIES = (
     "DICT_4X4_1000",
     "DICT_5X5_1000",
@@ -94,12 +97,15 @@ def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     mirrored = np.ascontiguousarray(gray[:, ::-1])
     if len(find(mirrored, board)[0]) >= MIN_CORNERS:
         return "the image is mirrored: switch that off in the camera"
+    other = other_squares(gray, board)
+    if other:
+        return other
     other_print = replace(board, legacy=not board.legacy)
     if len(find(gray, other_print)[0]) >= MIN_CORNERS:
         kind = "an older" if other_print.legacy else "a newer"
         use = "use" if other_print.legacy else "leave out"
         return f"the board was printed by {kind} OpenCV: {use} --legacy"
-    ids = _markers(gray, board.marker_dictionary)
+    ids = list(_markers(gray, board.marker_dictionary))
     on_board = (board.squares[0] * board.squares[1]) // 2
     if len(ids) >= _ENOUGH_MARKERS:
         if max(ids) >= on_board:
@@ -112,18 +118,67 @@ def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     if seen and not seen.startswith(board.dictionary[:8]):
         found = f"markers of another dictionary are seen ({seen}), not {board.dictionary}"
         return f"{found}: {OTHER_BOARD}"
-    other = _size(_checkerboard(gray))
-    if other and not seen:
-        found = f"a plain checkerboard of {other[1]}×{other[0]} squares is seen, without markers"
+    size = _size(_checkerboard(gray))
+    if size and not seen:
+        found = f"a plain checkerboard of {size[1]}×{size[0]} squares is seen, without markers"
         return f"{found}: {OTHER_BOARD}"
     if ids:
         return f"only {len(ids)} markers are seen: come closer, or uncover and light the board"
     return "no board is seen: it must be sharp, evenly lit and large enough in the image"
 
 
-def _markers(gray: UInt8, dictionary: cv2.aruco.Dictionary) -> list[int]:
-    _, ids, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(gray)
-    return [] if ids is None else [int(number) for number in ids.ravel()]
+def other_squares(gray: UInt8, board: Board) -> str:
+    """Return a message with the number of squares that the markers' numbers and places show.
+
+    It is empty if they do not show it, or lie as on the board entered.
+    """
+    seen = _markers(gray, board.marker_dictionary)
+    if len(seen) < _ENOUGH_MARKERS or _fits(seen, board):
+        return ""
+    fitting = []
+    for columns in range(3, 41):
+        # Rows up to that of the last marker seen; whether they are even says how they begin.
+        for rows in {-(-2 * (max(seen) + 1) // columns) + more for more in (-1, 0, 1)}:
+            with suppress(ValueError):
+                tried = replace(board, squares=(columns, rows))
+                if _fits(seen, tried):
+                    fitting.append(tried)
+    if len({one.squares[0] for one in fitting}) != 1:
+        return ""
+    columns, rows = min(one.squares for one in fitting)
+    width, height = board.squares
+    if columns == height:  # exchanged; the last rows may be outside the image
+        rows = max(rows, width)
+    return (
+        f"the markers lie as on a board of {columns}×{rows} squares, not {width}×{height}: "
+        f"{OTHER_BOARD}"
+    )
+
+
+def _fits(seen: Mapping[int, Float64], board: Board) -> bool:
+    """Return whether markers (4, 2), by number, lie as on a board, but for its pose."""
+    places = charuco(board).getObjPoints()
+    if max(seen) >= len(places):
+        return False
+    flat = np.concatenate([places[number] for number in seen])[:, :2].astype(np.float64)
+    pixels = np.concatenate(list(seen.values()))
+    H = cv2.findHomography(flat, pixels)[0]
+    if H is None:
+        return False
+    off_px = np.linalg.norm(cv2.perspectiveTransform(flat[None], H)[0] - pixels, axis=1)
+    side_px = np.linalg.norm(np.diff(pixels.reshape(-1, 4, 2), axis=1), axis=2)
+    return bool(np.median(off_px) < _MARKER_OFF * np.median(side_px))
+
+
+def _markers(gray: UInt8, dictionary: cv2.aruco.Dictionary) -> dict[int, Float64]:
+    """Return the corners (4, 2) of the markers seen, by number."""
+    corners, ids, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(gray)
+    if ids is None:
+        return {}
+    return {
+        int(number): np.asarray(one, np.float64).reshape(4, 2)
+        for number, one in zip(ids.ravel(), corners, strict=True)
+    }
 
 
 def _markers_of_some_family(gray: UInt8) -> str:

@@ -17,7 +17,7 @@ from handcal.rig.boards.board import (
     charuco,
     corners_m,
 )
-from handcal.rig.boards.diagnosis import OTHER_BOARD, explain_missing, why_not_plain
+from handcal.rig.boards.diagnosis import OTHER_BOARD, explain_missing, other_squares, why_not_plain
 
 # In squares: corners farther than this from the place predicted by the others are rejected.
 _STRAY_SQUARES = 0.5
@@ -54,8 +54,10 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
     fits = _is_regular(ids, pixels, board)
     is_skipping = board.kind == "checkerboard" and not _alternates(gray, pixels, board)
     if np.mean(fits) < 0.8 or fits.sum() < MIN_CORNERS or is_skipping:
+        other = other_squares(gray, board) if board.kind == "charuco" else ""
         raise BoardError(
-            "the squares do not lie as on this board: check the number of squares and markers"
+            other
+            or "the squares do not lie as on this board: check the number of squares and markers"
         )
     ids, pixels = ids[fits], pixels[fits]
     if board.kind == "checkerboard" and fits.all() and _goes_on(gray, pixels, board):
@@ -158,23 +160,23 @@ def _goes_on(gray: UInt8, pixels: Float64, board: Board) -> bool:
     columns, rows = board.inner
     grid = pixels.reshape(rows, columns, 2)
     sides = (grid, grid[::-1], grid.swapaxes(0, 1), grid[:, ::-1].swapaxes(0, 1))
-    beyond = [np.stack([2 * side[0] - side[1], side[0], side[1]]) for side in sides]
-    contrast = np.percentile(_checker(gray, grid), 50)
-    return any(np.median(_checker(gray, side)[0]) > 0.75 * contrast for side in beyond)
-
-
-def _checker(gray: UInt8, grid: Float64) -> Float64:
-    """Return the contrast between the squares around each corner of a (rows, columns, 2) grid.
-
-    It is half as large at a board's edge.
-    """
-    down, right = (0.3 * np.gradient(grid, axis=axis) for axis in (0, 1))
-    places = np.stack(
-        [grid - right - down, grid + right + down, grid + right - down, grid - right + down]
+    return any(
+        np.median(_alternation(gray, np.stack([2 * side[0] - side[1], *side[:2]]))) > 0.5
+        for side in sides
     )
-    shades = shades_at(gray, places)
-    alternation: Float64 = np.abs(shades[:2].sum(axis=0) - shades[2:].sum(axis=0))
-    return alternation
+
+
+def _alternation(gray: UInt8, grid: Float64) -> Float64:
+    """Return how the squares beyond a grid's first row alternate, of those beyond its second.
+
+    It is 1 on a board that goes on and 0 at its margin, however bright or glaring the margin is.
+    """
+    down, right = (0.3 * np.gradient(grid, axis=axis)[:2] for axis in (0, 1))
+    shades = shades_at(gray, grid[:2] + np.stack([right - down, -right - down]))
+    beyond, within = shades[0] - shades[1]
+    usual = np.median(np.abs(within))
+    share: Float64 = -beyond * np.sign(within) / np.maximum(np.abs(within), usual)
+    return share
 
 
 def _refine(gray: UInt8, pixels: Float64, board: Board) -> Float64:

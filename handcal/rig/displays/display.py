@@ -301,7 +301,8 @@ def _judge(
         return CalibrationVerdict(
             "bad",
             f"the camera was {1e3 * offset_m:.0f} mm from the headset's own viewpoint: left and "
-            "right exchanged, or poses of another camera place",
+            "right exchanged, poses of another camera place, or a wrong side of the board's "
+            "squares",
         )
     if viewpoint.name != "good":
         return viewpoint

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lstsq
 
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView
@@ -41,7 +42,9 @@ class Adjusted:
     """Of each frame, derivatives of its kept corners by the shared parameters, (M, P), and by its
     own pose, (M, 6), and their residuals, (M,)."""
     is_coefficient: NDArray[np.bool_]
-    """(P,); which shared parameters are a lens's coefficients."""
+    """(P - K,); which shared parameters are a lens's coefficients."""
+    noise_px: float = 0.0
+    """Noise of a corner along each axis, as the prior of the board's shape was weighed with."""
 
     @property
     def rms_px(self) -> float:
@@ -54,19 +57,56 @@ class Adjusted:
         """Number of corners left out."""
         return int(sum((~kept).sum() for kept in self.kept))
 
+    @property
+    def priors_px(self) -> Float64:
+        """(P,); weight of each shared parameter's prior."""
+        residuals = np.concatenate([block[2] for block in self.blocks])
+        weak_px = float(np.sqrt(np.mean(residuals**2))) / _COEFFICIENT_SIGMA
+        shapes = self.blocks[0][0].shape[1] - len(self.is_coefficient)
+        return np.append(np.where(self.is_coefficient, weak_px, 0.0), shapes * [self.noise_px])
+
     def covariance(self) -> Float64 | None:
-        """Return the covariance of the shared parameters; None if they are not determined.
+        """Return the covariance of the cameras' parameters; None if they are not determined.
 
         They are the second camera's pose and the solved parameters of each camera, in this order.
-        A coefficient that the views do not determine is taken as 0 ± `_COEFFICIENT_SIGMA`.
+        A coefficient that the views do not determine is taken as 0 ± `_COEFFICIENT_SIGMA`. What is
+        not known of the board's shape is contained.
         """
+        whole, count = self.whole_covariance(), len(self.is_coefficient)
+        return None if whole is None else whole[:count, :count]
+
+    def whole_covariance(self) -> Float64 | None:
+        """Return `covariance` with the board's shape as the last parameters."""
         residuals = np.concatenate([block[2] for block in self.blocks])
-        sigma_px = float(np.sqrt(np.mean(residuals**2)))
-        prior = np.where(self.is_coefficient, sigma_px / _COEFFICIENT_SIGMA, 0.0)
         blocks = [block[:2] for block in self.blocks]
-        return marginal_covariance(
-            [*blocks, (np.diag(prior), np.empty((len(prior), 0)))], residuals
-        )
+        prior = np.diag(self.priors_px)
+        return marginal_covariance([*blocks, (prior, np.empty((len(prior), 0)))], residuals)
+
+    def held_out_px2(self, kept: Sequence[NDArray[np.bool_]]) -> Float64:
+        """Return the mean square residual of each frame when left out, over the corners in `kept`.
+
+        The shared parameters move by one Gauss-Newton step when the frame is left out; its own pose
+        is then solved again. This is the prediction sum of squares (Allen 1974) by frames. All
+        cameras see each frame, and the sightings are in the order of frames, then cameras.
+        """
+        reduced = []
+        for shared, own, residuals in self.blocks:
+            basis, _ = np.linalg.qr(own)
+            reduced.append(
+                (shared - basis @ (basis.T @ shared), residuals - basis @ (basis.T @ residuals))
+            )
+        information = sum(J.T @ J for J, _ in reduced) + np.diag(self.priors_px**2)
+        scale = 1.0 / np.sqrt(np.diag(information))
+        squares, each = [], len(self.kept) // len(self.blocks)
+        for number, (J, residuals) in enumerate(reduced):
+            of_frame = slice(each * number, each * (number + 1))
+            mine, common = (np.concatenate(one[of_frame]) for one in (self.kept, kept))
+            scaled = J * scale
+            rest = information * np.outer(scale, scale) - scaled.T @ scaled
+            move = lstsq(rest, scaled.T @ residuals, 1e-13, lapack_driver="gelsy")[0]
+            off_px = (residuals + scaled @ move).reshape(-1, 2)
+            squares.append(np.mean(np.sum(off_px**2, axis=1)[common[mine]]))
+        return np.array(squares)
 
 
 def adjust(
@@ -76,6 +116,8 @@ def adjust(
     *,
     solve_place: bool = True,
     steps: int = _MAX_STEPS,
+    modes_m: Float64 | None = None,
+    noise_px: float = 0.0,
 ) -> Adjusted:
     """Minimise the reprojection error over all poses and what is free of the cameras.
 
@@ -91,26 +133,44 @@ def adjust(
         False if the pose between the cameras is given too.
     steps : int
         Limit.
+    modes_m : (N, 3, K) float64, optional
+    noise_px : float
+        As for `Problem`; `setup.shape` then has K numbers.
     """
+    has_place = solve_place and setup.place is not None
+
+    def problem_of(some: Sequence[Sighting]) -> Problem:
+        return Problem(some, lenses, has_place, modes_m, noise_px)
+
     counts = [len(one.seen.pixels) for one in sightings]
     beside = _beside(sightings)
-    whole = Problem(sightings, lenses, solve_place and setup.place is not None)
+    whole = problem_of(sightings)
     problem, kept, linear = whole, [np.ones(count, np.bool_) for count in counts], None
     for least_gain in _LEAST_GAINS:
         setup, linear = problem.minimised(setup, steps, least_gain, linear)
         off_px = whole.residuals(linear if problem is whole else whole.linear(setup))
         before, kept = kept, _regular(off_px, beside)
         if not all(np.array_equal(old, new) for old, new in zip(before, kept, strict=True)):
-            some = [
-                replace(one, seen=one.seen.only(keep))
-                for one, keep in zip(sightings, kept, strict=True)
-            ]
-            problem = Problem(some, lenses, solve_place and setup.place is not None)
+            problem = problem_of(kept_only(sightings, kept))
             linear = None
         elif least_gain == _LEAST_GAINS[-1]:
             break
     linear = problem.linear(setup) if linear is None else linear
-    return Adjusted(setup, tuple(off_px), tuple(kept), problem.blocks(linear), whole.is_coefficient)
+    return Adjusted(
+        setup, tuple(off_px), tuple(kept), problem.blocks(linear), whole.is_coefficient, noise_px
+    )
+
+
+def kept_only(sightings: Sequence[Sighting], kept: Sequence[NDArray[np.bool_]]) -> list[Sighting]:
+    """Return the sightings with the corners that are kept, (N,) each."""
+    return [
+        replace(one, seen=one.seen.only(keep)) for one, keep in zip(sightings, kept, strict=True)
+    ]
+
+
+def kept_by_all(fits: Sequence[Adjusted]) -> list[NDArray[np.bool_]]:
+    """Return the corners of each sighting, (N,), that no fit has left out."""
+    return [np.logical_and.reduce(one) for one in zip(*(fit.kept for fit in fits), strict=True)]
 
 
 def foreseen(

@@ -29,14 +29,23 @@ from handcal.rig.boards.views import (
 )
 from handcal.rig.lens.fit import rms
 from handcal.rig.lens.lens import Camera, LensModel, as_pinhole, solved_parameters
-from handcal.rig.lens.lens_fit import LensFit, best_lens, compare_lenses, fit_lens
+from handcal.rig.lens.lens_fit import (
+    LensFit,
+    best_lens,
+    compare_lenses,
+    compare_shaped,
+    fit_lens,
+    shaped,
+)
 from handcal.rig.lens.reprojection import as_transform
+from handcal.rig.lens.shape import FLAT, MOST_BY_SHAPE, BoardShape
 from handcal.rig.lens.uncertainty import ProjectionUncertainty, next_view
 from handcal.rig.verdict import CalibrationVerdict
 
 LensChoice: TypeAlias = Literal["auto", LensModel]
 LENS_CHOICES: tuple[str, ...] = ("auto", *get_args(LensModel))
 MIN_VIEWS = 3
+_NEAR_BY_SHAPE = 1.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +93,8 @@ class CameraCalibration:
     verdict: CalibrationVerdict
     uncertainty: ProjectionUncertainty | None
     """None if not determined."""
+    board: BoardShape = FLAT
+    """As solved with the camera."""
     compared: tuple[LensFit, ...] = ()
     """All lens models, if the best was to be chosen."""
 
@@ -129,6 +140,8 @@ def calibrate_camera(
         solved = fit_lens(tuple(found.values()), settings.lens)
     else:
         solved = best_lens(compared) if compared else None
+    if solved is not None and solved.fit.rms_px <= MOST_BY_SHAPE * settings.max_rms_px:
+        solved, compared = _shaped(solved, tuple(found.values()), compared)
     if solved is None or not np.isfinite(solved.camera.fx) or not 0 < solved.camera.fx < np.inf:
         raise ViewsError(
             "nothing can be solved from these views: take more, of a board tilted in all directions"
@@ -155,8 +168,24 @@ def calibrate_camera(
         worst=worst,
         verdict=_judge(solved, found, poses, worst, settings),
         uncertainty=solved.uncertainty,
+        board=solved.board,
         compared=compared,
     )
+
+
+def _shaped(
+    solved: LensFit, views: Sequence[BoardView], compared: tuple[LensFit, ...]
+) -> tuple[LensFit, tuple[LensFit, ...]]:
+    """Return the fit with the board's shape, and the lens models compared on that board."""
+    result = shaped(solved, views)
+    if not (compared and result.board.words):
+        return result, compared
+    kinds = [one for one in compared if (one.lens == "fisheye") == (solved.lens == "fisheye")]
+    compared = compare_shaped(kinds, views)
+    # Free corners mend a lens model too simple; with the right one a simpler board is enough.
+    near_px = _NEAR_BY_SHAPE * min(one.held_out_px for one in compared)
+    plainer = [one for one in compared if one.held_out_px < near_px and not one.board.is_uneven]
+    return best_lens(plainer or compared), compared
 
 
 def tilt(T_C_B: Float64, seen: BoardView) -> float:
@@ -235,10 +264,10 @@ def _judge(
         )
         if add is not None:
             wanting.append(f"next, the board {add.words}")
-        return CalibrationVerdict("needs more views", "; ".join(wanting))
+        return CalibrationVerdict("needs more views", "; ".join(wanting) + solved.board.also)
     return CalibrationVerdict(
         "good",
         f"corners are {rms_px:.2f} px off in {len(poses)} views over {100 * seen_area.share:.0f} % "
         f"of the image; the direction of a pixel is known to ± {uncertainty.middle_px:.2f} px "
-        f"({uncertainty.middle_px * arcmin_per_px:.1f}′)",
+        f"({uncertainty.middle_px * arcmin_per_px:.1f}′)" + solved.board.also,
     )

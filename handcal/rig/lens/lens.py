@@ -202,7 +202,11 @@ def first_pose(seen: BoardView, camera: Camera) -> Float64 | None:
         return None
     try:
         found, rotations, translations, _ = cv2.solvePnPGeneric(
-            seen.points_m[usable], plane[usable], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+            seen.points_m[usable] * [1.0, 1.0, 0.0],
+            plane[usable],
+            np.eye(3),
+            None,
+            flags=cv2.SOLVEPNP_IPPE,
         )
     except cv2.error:
         return None

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView
-from handcal.rig.lens.bundle import Adjusted, adjust
+from handcal.rig.lens.bundle import Adjusted, adjust, kept_by_all
 from handcal.rig.lens.lens import (
     Camera,
     LensModel,
@@ -22,6 +21,7 @@ from handcal.rig.lens.lens import (
     undistorted_camera,
 )
 from handcal.rig.lens.reprojection import Setup, Sighting, as_vector
+from handcal.rig.lens.shape import FLAT, BoardShape, solve_shape
 from handcal.rig.lens.uncertainty import ProjectionUncertainty, projection_uncertainty
 
 # Focal lengths tried, in widths of the image, and the views that judge them.
@@ -47,6 +47,8 @@ class LensFit:
     """`Adjusted.covariance`."""
     uncertainty: ProjectionUncertainty | None
     """None if the views do not determine the camera."""
+    board: BoardShape = FLAT
+    """As solved with the camera."""
 
     @property
     def camera(self) -> Camera:
@@ -80,7 +82,7 @@ def fit_camera(
     poses = [None if camera is None else first_pose(seen, camera) for seen in views]
     if camera is None or any(pose is None for pose in poses):
         return None
-    sightings = [Sighting(number, 0, seen) for number, seen in enumerate(views)]
+    sightings = _sightings(views)
     vectors = tuple(as_vector(pose) for pose in poses if pose is not None)
     fit = adjust(sightings, Setup((camera,), vectors), [lens])
     # A plane has two poses of nearly the same image; with the first camera, PnP may take the other.
@@ -102,6 +104,26 @@ def fit_lens(views: Sequence[BoardView], lens: LensModel) -> LensFit | None:
     return None if fit is None else _judged(lens, fit, np.empty(0))
 
 
+def shaped(solved: LensFit, views: Sequence[BoardView]) -> LensFit:
+    """Return the fit with the board's shape solved for, or with what is not known of it."""
+    fit, board = solve_shape(_sightings(views), solved.fit, [solved.lens])
+    return replace(_judged(solved.lens, fit, solved.held_out_px2), board=board)
+
+
+def compare_shaped(fits: Sequence[LensFit], views: Sequence[BoardView]) -> tuple[LensFit, ...]:
+    """Return the fits with the board's shape solved for with each lens model."""
+    results = [shaped(one, views) for one in fits]
+    # A flat board's derivatives by its shape are of no held-out error.
+    solved = [
+        now.fit if now.board.words else one.fit for one, now in zip(fits, results, strict=True)
+    ]
+    kept = kept_by_all(solved)
+    return tuple(
+        replace(now, held_out_px2=fit.held_out_px2(kept))
+        for now, fit in zip(results, solved, strict=True)
+    )
+
+
 def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
     """Fit all lens models; return those that could be solved."""
     fits: dict[LensModel, Adjusted] = {}
@@ -111,9 +133,8 @@ def compare_lenses(views: Sequence[BoardView]) -> tuple[LensFit, ...]:
         if fit is not None:
             fits[lens] = fit
             start = fit.setup.cameras[0]
-    masks = zip(*(fit.kept for fit in fits.values()), strict=True)
-    kept = [np.logical_and.reduce(of_view) for of_view in masks]
-    return tuple(_judged(lens, fit, _held_out_px2(fit, kept)) for lens, fit in fits.items())
+    kept = kept_by_all(tuple(fits.values()))
+    return tuple(_judged(lens, fit, fit.held_out_px2(kept)) for lens, fit in fits.items())
 
 
 def best_lens(fits: Sequence[LensFit]) -> LensFit:
@@ -138,6 +159,10 @@ def best_lens(fits: Sequence[LensFit]) -> LensFit:
 def _is_worse(one: LensFit, least: LensFit) -> bool:
     more_px2 = one.held_out_px2 - least.held_out_px2
     return bool(more_px2.mean() > more_px2.std(ddof=1) / np.sqrt(len(more_px2)))
+
+
+def _sightings(views: Sequence[BoardView]) -> list[Sighting]:
+    return [Sighting(number, 0, seen) for number, seen in enumerate(views)]
 
 
 def _judged(lens: LensModel, fit: Adjusted, held_out_px2: Float64) -> LensFit:
@@ -197,27 +222,3 @@ def _best_focal(views: Sequence[BoardView], camera: Camera, focals_px: Float64) 
 def _rms_px(seen: BoardView, pose: Float64, fit: Adjusted) -> float:
     off_px = seen.pixels - pixels_of(seen.points_m, pose, fit.setup.cameras[0])
     return float(np.sqrt(np.mean(np.sum(off_px**2, axis=1))))
-
-
-def _held_out_px2(fit: Adjusted, kept: Sequence[NDArray[np.bool_]]) -> Float64:
-    """Return the mean square residual of each view when left out, over the corners in `kept`.
-
-    The camera moves by one Gauss-Newton step when the view is left out; its own pose is then
-    solved again. This is the prediction sum of squares (Allen 1974) by views.
-    """
-    reduced = []
-    for shared, own, residuals in fit.blocks:
-        basis, _ = np.linalg.qr(own)
-        reduced.append(
-            (shared - basis @ (basis.T @ shared), residuals - basis @ (basis.T @ residuals))
-        )
-    information = sum(J.T @ J for J, _ in reduced)
-    scale = 1.0 / np.sqrt(np.diag(information))
-    squares = []
-    for (J, residuals), mine, common in zip(reduced, fit.kept, kept, strict=True):
-        scaled = J * scale
-        rest = information * np.outer(scale, scale) - scaled.T @ scaled
-        move = np.linalg.lstsq(rest, scaled.T @ residuals, rcond=1e-13)[0]
-        off_px = (residuals + scaled @ move).reshape(-1, 2)
-        squares.append(np.mean(np.sum(off_px**2, axis=1)[common[mine]]))
-    return np.array(squares)

@@ -7,7 +7,7 @@ complement (Triggs et al., "Bundle adjustment: a modern synthesis", 2000).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -46,12 +46,16 @@ class Setup:
     """each (6,); of the board of each frame in the first camera's frame: rotation vector, m."""
     place: Float64 | None = None
     """(6,); from the first to the second camera's frame: rotation vector, m."""
+    shape: Float64 = field(default_factory=lambda: np.empty(0))
+    """(K,); how much of each of a problem's modes the board has."""
 
 
 class _Corners(NamedTuple):
     """All corners that one camera sees, sighting after sighting."""
 
     points_m: Float64
+    modes_m: Float64
+    """(N, 3, K); by how much each mode of the board moves each corner."""
     pixels: Float64
     frame: NDArray[np.int64]
     parts: list[tuple[int, int, slice]]
@@ -76,25 +80,47 @@ class _Corners(NamedTuple):
 
 
 class Problem:
-    """The sightings, and which parameters of a setup are free."""
+    """The sightings, and which parameters of a setup are free.
+
+    Parameters
+    ----------
+    sightings : sequence of Sighting
+    lenses : sequence of LensModel or None
+        Of each camera, the model whose parameters are solved for; None if they are given.
+    has_place : bool
+        True if the pose between the cameras is solved for.
+    modes_m : (N, 3, K) float64, optional
+        Ways in which the board may differ, by corners' numbers: the places are moved by
+        ``modes_m @ shape``, with a prior of 0 ± 1 for each number in `Setup.shape`.
+    noise_px : float
+        Of a corner along each axis; weighs the prior.
+    """
 
     def __init__(
-        self, sightings: Sequence[Sighting], lenses: Sequence[LensModel | None], has_place: bool
+        self,
+        sightings: Sequence[Sighting],
+        lenses: Sequence[LensModel | None],
+        has_place: bool,
+        modes_m: Float64 | None = None,
+        noise_px: float = 0.0,
     ) -> None:
+        self._noise_px = noise_px
+        self._shape = 0 if modes_m is None else modes_m.shape[2]
         self._sightings = sightings
         self._has_place = has_place
         self._free = [[] if lens is None else solved_parameters(lens) for lens in lenses]
         ends = np.cumsum([6 * has_place, *(len(free) for free in self._free)])
         self._columns = [slice(a, b) for a, b in pairwise(ends)]
-        self._count = int(ends[-1])
+        self._count = int(ends[-1]) + self._shape
         self._frames = 1 + max(one.frame for one in sightings)
         self._corners = [
             _corners_of(
                 sightings,
                 camera,
                 free,
-                np.r_[0 : 6 * (has_place and camera > 0), columns],
+                np.r_[0 : 6 * (has_place and camera > 0), columns, ends[-1] : self._count],
                 self._frames,
+                modes_m,
             )
             for camera, (free, columns) in enumerate(zip(self._free, self._columns, strict=True))
         ]
@@ -115,13 +141,13 @@ class Problem:
             Of the given setup, if known.
         """
         linear = self.linear(setup) if linear is None else linear
-        cost, damping = _cost(linear), 1e-3
+        cost, damping = self._cost(linear, setup), 1e-3
         for _ in range(steps):
-            normal, enough = self._normal(linear), max(damping / 10.0, 1e-12)
+            normal, enough = self._normal(linear, setup), max(damping / 10.0, 1e-12)
             while damping < 1e10:
                 trial = self._moved(setup, *_step(*normal, damping))
                 of_trial = self.linear(trial)
-                gain = cost - _cost(of_trial)
+                gain = cost - self._cost(of_trial, trial)
                 if gain >= 0.0:
                     break
                 # Less would be refused the next time, too.
@@ -168,7 +194,8 @@ class Problem:
             if not len(rows):
                 continue
             of_boards = R[: len(boards)].swapaxes(1, 2)
-            turned_m = corners.of_frames(corners.points_m, of_boards)
+            on_board_m = corners.points_m + corners.modes_m @ setup.shape[: self._shape]
+            turned_m = corners.of_frames(on_board_m, of_boards)
             points_m = turned_m + boards[corners.frame, 3:]
             place = setup.place if number > 0 else None
             if place is not None:
@@ -177,7 +204,7 @@ class Problem:
                 points_m = replaced_m + place[3:]
             pixels, by_point, by_parameters = derivatives_at(points_m, camera)
             of_place = 6 if self._has_place and place is not None else 0
-            rows[:, of_place:-7] = by_parameters[:, corners.free]
+            rows[:, of_place : -7 - self._shape] = by_parameters[:, corners.free]
             if place is not None:
                 if of_place:
                     rows[:, :3] = _crossed(replaced_m, by_point) @ J_place
@@ -185,11 +212,15 @@ class Problem:
                 by_point = by_point @ R_place
             rows[:, -7:-4] = corners.of_frames(_crossed(turned_m, by_point), J[: len(boards)])
             rows[:, -4:-1] = by_point
+            if self._shape:
+                by_place = corners.of_frames(by_point, R[: len(boards)]).reshape(-1, 2, 3)
+                by_shape = (by_place @ corners.modes_m).reshape(-1, self._shape)
+                rows[:, -7 - self._shape : -7] = by_shape
             rows[:, -1] = (corners.pixels - pixels).ravel()
         return found
 
     def _normal(
-        self, linear: Sequence[Float64]
+        self, linear: Sequence[Float64], setup: Setup
     ) -> tuple[Float64, Float64, Float64, Float64, Float64]:
         """Return the blocks of the normal equations, and the gradients."""
         count = self._count
@@ -212,7 +243,18 @@ class Problem:
             W[:, used] += own[:, :, : len(used)].swapaxes(1, 2)
             V += own[:, :, -7:-1]
             g_own += own[:, :, -1]
+        if self._shape:
+            places = np.arange(count - self._shape, count)
+            U[places, places] += self._noise_px**2
+            g_shared[places] -= self._noise_px**2 * setup.shape
         return U, W, V, g_shared, g_own
+
+    def _cost(self, linear: Sequence[Float64], setup: Setup) -> float:
+        """Return the sum of squared residuals; infinite if a prediction is not finite."""
+        cost = sum(float(one[:, -1] @ one[:, -1]) for one in linear)
+        if self._shape:
+            cost += self._noise_px**2 * float(setup.shape @ setup.shape)
+        return cost if np.isfinite(cost) else np.inf
 
     def foreseen(self, setup: Setup) -> tuple[Float64, Float64]:
         """Return what `foreseen` does; all detected pixels are 0."""
@@ -244,7 +286,10 @@ class Problem:
         if place is not None and self._has_place:
             place = place + shared[:6]
         poses = tuple(pose + move for pose, move in zip(setup.poses, own, strict=True))
-        return replace(setup, cameras=tuple(cameras), poses=poses, place=place)
+        shape = setup.shape
+        if self._shape:
+            shape = shape + shared[-self._shape :]
+        return Setup(tuple(cameras), poses, place, shape)
 
 
 def _step(
@@ -268,18 +313,13 @@ def _step(
     return shared, by_own - by_shared @ shared
 
 
-def _cost(linear: Sequence[Float64]) -> float:
-    """Return the sum of squared residuals; infinite if a prediction is not finite."""
-    cost = sum(float(one[:, -1] @ one[:, -1]) for one in linear)
-    return cost if np.isfinite(cost) else np.inf
-
-
 def _corners_of(
     sightings: Sequence[Sighting],
     camera: int,
     free: list[int],
     used: NDArray[np.int64],
     frames: int,
+    modes_m: Float64 | None,
 ) -> _Corners:
     chosen = [(number, one) for number, one in enumerate(sightings) if one.camera == camera]
     ends = np.cumsum([0, *(len(one.seen.pixels) for _, one in chosen)]).tolist()
@@ -287,8 +327,10 @@ def _corners_of(
         (number, one.frame, slice(*part))
         for (number, one), part in zip(chosen, pairwise(ends), strict=True)
     ]
+    ids = np.concatenate([np.empty(0, np.int64), *(one.seen.ids for _, one in chosen)])
     return _Corners(
         np.concatenate([np.empty((0, 3)), *(one.seen.points_m for _, one in chosen)]),
+        np.empty((len(ids), 3, 0)) if modes_m is None else modes_m[ids],
         np.concatenate([np.empty((0, 2)), *(one.seen.pixels for _, one in chosen)]),
         np.repeat(np.array([one.frame for _, one in chosen], np.int64), np.diff(ends)),
         parts,

@@ -13,7 +13,7 @@ import numpy as np
 
 from handcal.core.frozen import freeze
 from handcal.core.types import Float64
-from handcal.rig.boards.board import BoardView
+from handcal.rig.boards.board import BoardView, square_m
 from handcal.rig.boards.views import (
     ASKED_VIEWS,
     BoardImage,
@@ -33,6 +33,7 @@ from handcal.rig.lens.camera import (
 from handcal.rig.lens.fit import rms
 from handcal.rig.lens.lens import Camera, LensModel
 from handcal.rig.lens.reprojection import Setup, Sighting, as_transform, as_vector
+from handcal.rig.lens.shape import FLAT, MOST_BY_SHAPE, BoardShape, solve_shape
 from handcal.rig.lens.stereo_pairs import (
     SWAPPED,
     Alone,
@@ -88,6 +89,8 @@ class StereoCalibration:
     """Pairs excluded by the user."""
     worst: WorstView
     verdict: CalibrationVerdict
+    board: BoardShape = FLAT
+    """As solved with the cameras."""
     left_out: int = 0
     """Number of single corners that contradict those beside them."""
     solved: tuple[CameraCalibration | None, CameraCalibration | None] = (None, None)
@@ -140,6 +143,15 @@ def calibrate_stereo(
     else:
         alone = _as_solved(pairs, both, of_depth, of_headset)
     fit = _fit(both, alone, (depth, headset), lenses)
+    board, points_m = FLAT, max((pair.depth.points_m for pair in both.values()), key=len)
+    if fit.rms_px <= MOST_BY_SHAPE * settings.max_rms_px:
+        fit, board = solve_shape(_sightings(both), fit, lenses)
+        if board.words:
+            both = {
+                name: Pair(board.of(pair.depth), board.of(pair.headset))
+                for name, pair in both.items()
+            }
+            alone = each_alone(both, fit.setup.cameras[0], fit.setup.cameras[1], alone)
     if fit.rms_px > settings.max_rms_px:
         # Pairs that contradict each other bend intrinsics that are free until nothing is sound.
         lenses = [None, None]
@@ -177,11 +189,13 @@ def calibrate_stereo(
             covariance,
             lenses,
             T_D_B,
-            max((pair.depth.points_m for pair in both.values()), key=len),
+            points_m,
             why_apart(both, alone, np.array(list(residuals_px.values()))),
             worst,
+            board,
             settings,
         ),
+        board=board,
         left_out=fit.left_out,
         solved=(of_depth, of_headset),
     )
@@ -223,12 +237,15 @@ def _fit(
     T_H_D = alone.T_H_D
     place = as_vector(T_H_D[middle(T_H_D)])
     poses = tuple(as_vector(T) for T in alone.T_D_B)
-    sightings = [
+    return adjust(_sightings(both), Setup(cameras, poses, place), lenses)
+
+
+def _sightings(both: Mapping[str, Pair]) -> list[Sighting]:
+    return [
         Sighting(number, camera, seen)
         for number, pair in enumerate(both.values())
         for camera, seen in enumerate((pair.depth, pair.headset))
     ]
-    return adjust(sightings, Setup(cameras, poses, place), lenses)
 
 
 def _rms_px(both: Mapping[str, Pair], cameras: tuple[Camera, Camera]) -> float:
@@ -314,6 +331,7 @@ def _judge(
     points_m: Float64,
     apart: tuple[str, bool],
     worst: WorstView,
+    board: BoardShape,
     settings: StereoSettings,
 ) -> CalibrationVerdict:
     rms_px = fit.rms_px
@@ -340,21 +358,26 @@ def _judge(
         float(np.sqrt(np.linalg.eigvalsh(part).max()))
         for part in (covariance[:3, :3], covariance[3:6, 3:6])
     )
-    known = f"± {np.degrees(angle_sigma):.3f}°, ± {1e3 * shift_sigma:.2f} mm"
+    # In proportion to the squares, whose side nothing here can tell.
+    known = (
+        f"± {np.degrees(angle_sigma):.3f}°, ± {1e3 * shift_sigma:.2f} mm if a square is exactly "
+        f"{1e3 * square_m(points_m):.2f} mm (1 % more is {10 * shift_m:.1f} mm more)"
+    )
     wanting = [why] if why else []
     if len(T_D_B) < settings.good_pairs:
         wanting.append(f"{len(T_D_B)} pairs, {max(ASKED_VIEWS, settings.good_pairs)} are better")
     if spread_rad < settings.good_spread_rad:
         wanting.append(f"the board was tilted by {np.degrees(spread_rad):.0f}° only")
     if angle_sigma > settings.max_angle_sigma_rad or shift_sigma > settings.max_shift_sigma_m:
-        wanting.append(f"the pose is known to {known} only")
+        wanting.append(f"the pose is not known well: {known}")
     if wanting:
         limits = settings.max_angle_sigma_rad, settings.max_shift_sigma_m
         add = next_pair(fit.setup, lenses, covariance, points_m, rms_px / np.sqrt(2), limits)
         if add is not None:
             wanting.append(f"next, the board {add.words} (in the depth camera's image)")
-        return CalibrationVerdict("needs more views", "; ".join(wanting))
+        return CalibrationVerdict("needs more views", "; ".join(wanting) + board.also)
     return CalibrationVerdict(
         "good",
-        f"corners are {rms_px:.2f} px off in {len(T_D_B)} pairs; the pose is known to {known}",
+        f"corners are {rms_px:.2f} px off in {len(T_D_B)} pairs; the pose is known to {known}"
+        + board.also,
     )

@@ -13,15 +13,20 @@ from scipy.optimize import least_squares
 from handcal.core.frozen import freeze
 from handcal.core.geometry import camera_matrix, image_points, invert, rigid, transform
 from handcal.core.types import Float64, Intrinsics
-from handcal.rig.boards.board import BoardView
+from handcal.rig.boards.board import BoardView, square_m
 from handcal.rig.boards.views import BoardImage, ViewsError, require_size, used
 from handcal.rig.lens.fit import clustered_covariance, rms
+from handcal.rig.lens.shape import BoardShape, boards_seen
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.verdict import CalibrationVerdict
 
 MIN_TRACKED_VIEWS = 3
 _GOOD_PX, _BAD_PX = 1.5, 5.0
 _GOOD_SIGMA_M = 0.001
+# A side of the squares is contradicted by more than these.
+_SURE_SIGMAS, _LEAST_SCALE = 4.0, 0.01
+# Of the residual: what remains with another side.
+_EXPLAINED_SHARE = 0.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,9 +70,10 @@ def board_pose(view: BoardView, camera: Intrinsics) -> Float64:
 
 
 def plane_pose(points: Float64, pixels: Float64, camera: Intrinsics) -> Float64:
-    """Return ``T_camera_plane`` (4, 4) by PnP from points (N, 3) with z = 0, in any unit."""
+    """Return ``T_camera_plane`` (4, 4) by PnP from points (N, 3) with z near 0, in any unit."""
     K, distortion = camera_matrix(camera), np.array(camera.distortion)
-    _, rotation, translation = cv2.solvePnP(points, pixels, K, distortion, flags=cv2.SOLVEPNP_IPPE)
+    flat = points * [1.0, 1.0, 0.0]
+    _, rotation, translation = cv2.solvePnP(flat, pixels, K, distortion, flags=cv2.SOLVEPNP_IPPE)
     rotation, translation = cv2.solvePnPRefineLM(
         points, pixels, K, distortion, rotation, translation
     )
@@ -98,26 +104,43 @@ def locate_viewpoint(views: Mapping[str, TrackedView], camera: Intrinsics) -> Vi
             f"{len(views)} views with a tracked board are too few: take {MIN_TRACKED_VIEWS} or "
             "more, with the board at other distances and angles"
         )
-    points_H_m = np.concatenate([transform(one.T_H_B, one.view.points_m) for one in views.values()])
+    seen, board = boards_seen({name: one.view for name, one in views.items()}, camera)
+    tracked = [(one.T_H_B, seen[name].points_m) for name, one in views.items()]
+    points_H_m = np.concatenate([transform(*one) for one in tracked])
     pixels = np.concatenate([one.view.pixels for one in views.values()])
     of_view = np.repeat(np.arange(len(views)), [len(one.view.pixels) for one in views.values()])
     T_H_C0 = _first_guess(points_H_m, pixels, camera)
 
+    # What a point moves by in H if the squares are larger than entered.
+    larger_m = np.concatenate([points_m @ T[:3, :3].T for T, points_m in tracked])
+
     def off_px(x: Float64) -> Float64:
-        points_C_m = transform(invert(_moved(T_H_C0, x)), points_H_m)
-        off: Float64 = image_points(points_C_m, camera) - pixels
+        points_m = points_H_m + x[6:].sum() * larger_m
+        off: Float64 = (
+            image_points(transform(invert(_moved(T_H_C0, x[:6])), points_m), camera) - pixels
+        )
         return off.ravel()
 
+    scaled = least_squares(off_px, np.zeros(7), method="lm")
+    of_scale = clustered_covariance(np.asarray(scaled.jac), scaled.fun, np.repeat(of_view, 2))
     solved = least_squares(off_px, np.zeros(6), method="lm")
     off = solved.fun.reshape(-1, 2)
     covariance = clustered_covariance(np.asarray(solved.jac), solved.fun, np.repeat(of_view, 2))
+    square = _square(
+        1e3 * square_m(next(iter(views.values())).view.points_m),
+        float(scaled.x[6]),
+        float(np.sqrt(of_scale[6, 6])),
+        explains=rms(scaled.fun.reshape(-1, 2)) < _EXPLAINED_SHARE * rms(off),
+    )
     residuals_px = {name: rms(off[of_view == number]) for number, name in enumerate(views)}
     return ViewpointPose(
         T_H_C=_moved(T_H_C0, solved.x),
         covariance=covariance,
         residuals_px=residuals_px,
         rms_px=rms(off),
-        verdict=_judge(residuals_px, rms(off), float(np.sqrt(np.trace(covariance[3:, 3:])))),
+        verdict=_judge(
+            residuals_px, rms(off), float(np.sqrt(np.trace(covariance[3:, 3:]))), square, board
+        ),
     )
 
 
@@ -175,16 +198,39 @@ def _moved(T_H_C: Float64, x: Float64) -> Float64:
     return T
 
 
-def _judge(residuals_px: Mapping[str, float], rms_px: float, sigma_m: float) -> CalibrationVerdict:
+def _square(entered_mm: float, scale: float, sigma: float, *, explains: bool) -> tuple[str, str]:
+    """Return what the tracked poses say against the side of a square, and what stays open."""
+    if explains and abs(scale) > max(_SURE_SIGMAS * sigma, _LEAST_SCALE):
+        return (
+            f"the tracked poses say that a square is {(1 + scale) * entered_mm:.1f} mm, not "
+            f"{entered_mm:.1f}: measure it, and enter what it is",
+            "",
+        )
+    if _SURE_SIGMAS * sigma > _LEAST_SCALE:
+        return "", f" if a square is exactly {entered_mm:.2f} mm"
+    return "", ""
+
+
+def _judge(
+    residuals_px: Mapping[str, float],
+    rms_px: float,
+    sigma_m: float,
+    square: tuple[str, str],
+    board: BoardShape,
+) -> CalibrationVerdict:
     worst = max(residuals_px, key=lambda name: residuals_px[name])
     residual = f"residual {rms_px:.2f} px ({worst} {residuals_px[worst]:.2f} px)"
+    wrong, condition = square
+    if wrong:
+        return CalibrationVerdict("bad", wrong)
     if rms_px > _BAD_PX:
         return CalibrationVerdict(
             "bad",
             f"boards are not seen where they were tracked, {residual}: the camera moved, or poses "
             "and images do not belong together",
         )
-    place = f"the camera's place is known to {1e3 * sigma_m:.2f} mm, {residual}"
+    place = f"the camera's place is known to {1e3 * sigma_m:.2f} mm{condition}, {residual}"
     if sigma_m > _GOOD_SIGMA_M or rms_px > _GOOD_PX:
-        return CalibrationVerdict("needs more views", f"{place}: add views, or drop the worst")
-    return CalibrationVerdict("good", place)
+        words = f"{place}: add views, or drop the worst{board.also}"
+        return CalibrationVerdict("needs more views", words)
+    return CalibrationVerdict("good", place + board.also)

@@ -86,7 +86,12 @@ def _mostly_covered() -> UInt8:
         (
             draw_board(Board(squares=(12, 8)), SQUARE_PX),
             Board(squares=(5, 4)),
-            "marker 47 is seen, but the board has only 10",
+            "as on a board of 12×8 squares, not 5×4",
+        ),
+        (
+            draw_board(CHARUCO, SQUARE_PX),
+            dataclasses.replace(CHARUCO, squares=CHARUCO.squares[::-1]),
+            "as on a board of 10×7 squares, not 7×10",
         ),
         (draw_board(CHECKERBOARD, SQUARE_PX), CHARUCO, "plain checkerboard of 10×7 squares"),
         (draw_board(CHARUCO, SQUARE_PX), Board(kind="checkerboard", squares=(9, 9)), "markers"),
@@ -149,6 +154,14 @@ def test_a_photograph_of_a_charuco_board(shared_data: Path) -> None:
     assert len(find_board(image, board).ids) == 24
     with pytest.raises(BoardError, match="DICT_6X6"):
         find_board(image, dataclasses.replace(board, dictionary="DICT_4X4_50"))
+
+
+def test_glare_beside_a_board_is_not_more_squares(shared_data: Path) -> None:
+    file = shared_data / "field" / "glare" / "Image__2018-09-17__16-43-53.png"
+    if not file.exists():
+        pytest.skip(f"{file} is absent")
+    image = read_image(file, cv2.IMREAD_GRAYSCALE)
+    assert len(find_board(image, Board(kind="checkerboard", squares=(17, 11))).ids) == 160
 
 
 def test_part_of_a_larger_checkerboard_is_not_taken_for_the_board(shared_data: Path) -> None:

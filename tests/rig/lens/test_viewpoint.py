@@ -1,3 +1,6 @@
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +50,17 @@ def test_the_covariance_covers_wrong_tracked_poses() -> None:
         told_m2.append(np.trace(found.covariance[3:, 3:]))
     assert np.sqrt(np.mean(actual_m2)) < 0.0015
     assert 0.5 < np.mean(told_m2) / np.mean(actual_m2) < 2.0
+
+
+@pytest.mark.parametrize("count", [5, 15])
+def test_a_wrong_side_of_the_squares_is_named_with_the_right_one(count: int) -> None:
+    views = {
+        name: replace(one, view=replace(one.view, points_m=1.08 * one.view.points_m))
+        for name, one in tracked_views(np.random.default_rng(3), count, 0.1, 0.0003).items()
+    }
+    verdict = locate_viewpoint(views, CAMERA).verdict
+    assert verdict.name == "bad"
+    assert re.search(r"that a square is 2(4\.9|5\.[01]) mm, not 27\.0: measure", verdict.reason)
 
 
 def test_a_mistaken_view_is_named() -> None:
