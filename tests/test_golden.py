@@ -116,7 +116,7 @@ def file_digest(path: Path) -> dict[str, Any]:
 
 
 def text_digest(text: str) -> dict[str, Any]:
-    words = _NUMBER.sub("#", text)
+    words = " ".join(_NUMBER.sub("#", text).split())  # where a line breaks, the last digits decide
     numbers = [float(number) for number in _NUMBER.findall(text)]
     return {"words": hashlib.md5(words.encode()).hexdigest(), "numbers": digest(numbers)}
 
