@@ -14,7 +14,7 @@ from handcal.core.conventions import unity_transform
 from handcal.core.display import projection_matrix
 from handcal.core.geometry import project, rigid, transform
 from handcal.core.types import EYES, Eye, Float64, Projection
-from handcal.link.nudges import VerifyRequest
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
 from handcal.link.shapes import Shape
@@ -216,6 +216,39 @@ def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
     assert last.problem == ""
     assert last.moved.right_arcmin > 0
     assert (last.moved.down_arcmin, last.moved.size) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "gesture",
+    ["TriggerButton", "left PrimaryButton", "right PointerActivated", "right PinchTouched"],
+)
+def test_a_hand_confirms_and_never_nudges(
+    start: Start, server: HeadsetServer, gesture: str
+) -> None:
+    """An air tap of HoloLens 2 is its hand's primary button, which enlarges on a controller."""
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    server.send_cursor(SQUARE_M, 7)
+    app.until(lambda told: told["cursor"])
+    app.do("hold left GripButton", "hold right SecondaryButton", f"hold {gesture}", "frames 5")
+    confirmations: list[Confirmation] = []
+
+    def is_confirmed(_: object) -> bool:
+        confirmations.extend(server.confirmations())
+        return bool(confirmations)
+
+    app.until(is_confirmed)
+    server.send_verify(VerifyRequest(3, "right", 1.0, 0.002))
+    nudges: list[Nudge] = []
+
+    def is_nudged(_: object) -> bool:
+        app.do(f"release {gesture}", "frames 2", f"hold {gesture}")
+        nudges.extend(server.nudges())
+        return bool(nudges)
+
+    app.until(is_nudged)
+    assert all(nudge.fits and nudge.moved == NudgeSum() for nudge in nudges)
+    assert len(confirmations) == 1
 
 
 def test_the_calibration_is_kept_when_the_app_and_the_pc_are_gone(

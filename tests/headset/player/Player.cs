@@ -59,6 +59,8 @@ namespace Handcal.Tests
                 case "eyes": Eyes(Numbers(rest)[0]); break;
                 case "parent": Parent(Numbers(rest)); break;
                 case "press": Input.StubPressed.Add((KeyCode)Enum.Parse(typeof(KeyCode), rest)); break;
+                case "hold": InputDevice.StubFeatures[rest] = true; break;
+                case "release": InputDevice.StubFeatures[rest] = false; break;
                 case "type":
                     TouchScreenKeyboard.StubOpen.text = rest;
                     TouchScreenKeyboard.StubOpen.status = TouchScreenKeyboard.Status.Done;

@@ -41,18 +41,25 @@ namespace UnityEngine.XR
         public static InputFeatureUsage<Quaternion> centerEyeRotation = new InputFeatureUsage<Quaternion>("CenterEyeRotation");
     }
 
+    [Flags]
+    public enum InputDeviceCharacteristics : uint { None = 0, HeadMounted = 1, HeldInHand = 4, HandTracking = 8, Controller = 64 }
+
     public struct InputDevice
     {
-        /// <summary>The head, the eyes and a controller's buttons, by the names of the features.</summary>
+        /// <summary>The head, the eyes, a controller's and the hands' buttons, by the names of the features.</summary>
         public static readonly Dictionary<string, object> StubFeatures = new Dictionary<string, object>();
+        public InputDeviceCharacteristics characteristics { get; set; }
         public bool TryGetFeatureValue(InputFeatureUsage<bool> usage, out bool value) { return Get(usage.name, out value); }
         public bool TryGetFeatureValue(InputFeatureUsage<Vector2> usage, out Vector2 value) { return Get(usage.name, out value); }
         public bool TryGetFeatureValue(InputFeatureUsage<Vector3> usage, out Vector3 value) { return Get(usage.name, out value); }
         public bool TryGetFeatureValue(InputFeatureUsage<Quaternion> usage, out Quaternion value) { return Get(usage.name, out value); }
 
-        static bool Get<T>(string name, out T value)
+        /// <summary>Features of a hand begin with its place among the devices.</summary>
+        public string StubPrefix;
+
+        bool Get<T>(string name, out T value)
         {
-            bool isKnown = StubFeatures.TryGetValue(name, out object found);
+            bool isKnown = StubFeatures.TryGetValue(StubPrefix + name, out object found);
             value = isKnown ? (T)found : default(T);
             return isKnown;
         }
@@ -62,11 +69,16 @@ namespace UnityEngine.XR
     {
         public static void GetDevices(List<InputDevice> devices)
         {
+            GetDevicesAtXRNode(XRNode.Head, devices);
+            foreach (string hand in new[] { "left ", "right " })
+                devices.Add(new InputDevice { characteristics = InputDeviceCharacteristics.HandTracking, StubPrefix = hand });
+        }
+
+        public static void GetDevicesAtXRNode(XRNode node, List<InputDevice> devices)
+        {
             devices.Clear();
             devices.Add(new InputDevice());
         }
-
-        public static void GetDevicesAtXRNode(XRNode node, List<InputDevice> devices) { GetDevices(devices); }
     }
 
     public static class XRSettings
