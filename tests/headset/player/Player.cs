@@ -58,6 +58,7 @@ namespace Handcal.Tests
                 case "head": Head(Numbers(rest)); break;
                 case "eyes": Eyes(Numbers(rest)[0]); break;
                 case "parent": Parent(Numbers(rest)); break;
+                case "edges": Edges(Numbers(rest)); break;
                 case "press": Input.StubPressed.Add((KeyCode)Enum.Parse(typeof(KeyCode), rest)); break;
                 case "hold": InputDevice.StubFeatures[rest] = true; break;
                 case "release": InputDevice.StubFeatures[rest] = false; break;
@@ -68,7 +69,7 @@ namespace Handcal.Tests
                 case "set": Set(rest); break;
                 case "kept": headset.ShowKept(rest); break;
                 case "mono": camera.stereoEnabled = false; break;
-                case "single": XRSettings.stereoRenderingMode = XRSettings.StereoRenderingMode.SinglePassInstanced; break;
+                case "single": XRDisplaySubsystem.StubOnly.StubIsSinglePass = true; break;
                 case "pipeline": UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline = new UnityEngine.Rendering.StubPipeline(); break;
                 case "disable": Call(headset, "OnDisable"); headset.enabled = false; break;
                 case "enable": headset.enabled = true; Call(headset, "OnEnable"); break;
@@ -137,6 +138,7 @@ namespace Handcal.Tests
                 Say("view" + eye, Matrix(Views[eye]));
                 Say("hidden" + eye, Hidden[eye]);
             }
+            Say("culling", Matrix(camera.cullingMatrix));
             Vector3 focus = XRDisplaySubsystem.StubOnly.StubFocus;
             Say("focus", Write(focus.x, focus.y, focus.z));
             Console.WriteLine();
@@ -186,6 +188,15 @@ namespace Handcal.Tests
                 InputDevice.StubFeatures[side + "EyePosition"] = new Vector3(x, 0, 0);
                 InputDevice.StubFeatures[side + "EyeRotation"] = Quaternion.identity;
             }
+        }
+
+        /// <summary>The runtime's projection, by the tangents of its right and its upper edge.</summary>
+        static void Edges(float[] n)
+        {
+            var projection = Matrix4x4.TRS(Vector3.zero, Quaternion.identity, new Vector3(1 / n[0], 1 / n[1], -1));
+            projection[3, 2] = -1;
+            projection[3, 3] = 0;
+            Camera.StubRuntimeProjection = projection;
         }
 
         /// <summary>Gives the camera a parent: position, quaternion and scale.</summary>

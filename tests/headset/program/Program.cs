@@ -91,7 +91,7 @@ namespace Handcal.Link.Tests
             double[] all = Read(line);
             double[] P = Part(all, 0, 12), view = Part(all, 12, 12);
             double[] clip = Link.Matrices.UnityProjection(P, (int)all[24], (int)all[25], all[26], all[27]);
-            return Write(clip) + " " + Write(Link.Matrices.UnityViewFromHead(view));
+            return Write(clip) + " " + Write(Link.Matrices.UnityViewFromHead(view, P));
         }
 
         /// <summary>The pose, then its inverse, then their product.</summary>

@@ -81,21 +81,44 @@ namespace UnityEngine.XR
         }
     }
 
-    public static class XRSettings
+    public class XRDisplaySubsystemDescriptor
     {
-        public enum StereoRenderingMode { MultiPass, SinglePass, SinglePassInstanced, SinglePassMultiview }
-        public static StereoRenderingMode stereoRenderingMode { get; set; }
-        public static int eyeTextureWidth { get { return 1440; } }
-        public static int eyeTextureHeight { get { return 936; } }
-        public static string loadedDeviceName { get { return "stub"; } }
+        public string id { get { return "stub"; } }
     }
 
     public class XRDisplaySubsystem
     {
+        public struct XRRenderParameter
+        {
+            public Matrix4x4 view, projection;
+        }
+
+        public struct XRRenderPass
+        {
+            public RenderTextureDescriptor renderTargetDesc;
+            public int StubEyes;
+            public int GetRenderParameterCount() { return StubEyes; }
+
+            public void GetRenderParameter(Camera camera, int renderParameterIndex, out XRRenderParameter renderParameter)
+            {
+                renderParameter = new XRRenderParameter { projection = Camera.StubRuntimeProjection };
+            }
+        }
+
         public static readonly XRDisplaySubsystem StubOnly = new XRDisplaySubsystem();
         public Vector3 StubFocus;
+        public bool StubIsSinglePass;
+        public XRDisplaySubsystemDescriptor subsystemDescriptor { get { return new XRDisplaySubsystemDescriptor(); } }
+        public XRDisplaySubsystemDescriptor SubsystemDescriptor { get { return subsystemDescriptor; } }
         public bool running { get { return true; } }
         public void SetFocusPlane(Vector3 point, Vector3 normal, Vector3 velocity) { StubFocus = point; }
+        public int GetRenderPassCount() { return StubIsSinglePass ? 1 : 2; }
+
+        public void GetRenderPass(int renderPassIndex, out XRRenderPass renderPass)
+        {
+            renderPass.StubEyes = StubIsSinglePass ? 2 : 1;
+            renderPass.renderTargetDesc = new RenderTextureDescriptor { width = 1440, height = 936 };
+        }
     }
 }
 

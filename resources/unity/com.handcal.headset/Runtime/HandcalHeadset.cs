@@ -119,6 +119,15 @@ namespace Handcal
             }
         }
 
+        /// <summary>
+        /// The plane of the virtual image, in the world: where the compositor should stabilise the
+        /// picture. The component sets it where XRDisplaySubsystem.SetFocusPlane does.
+        /// </summary>
+        public void FocusPlane(out Vector3 point, out Vector3 normal)
+        {
+            cameras.FocusPlane(FocusDistanceM, out point, out normal);
+        }
+
         /// <summary>The headset's clock, ns.</summary>
         public static long NowNs()
         {
@@ -271,7 +280,9 @@ namespace Handcal
             cameras.Reset();
             views.Read();
             cameras.Apply(drawn);
-            if (setsFocusPlane) cameras.SetFocusPlane(FocusDistanceM);
+            if (!setsFocusPlane) return;
+            FocusPlane(out Vector3 point, out Vector3 normal);
+            EyeCameras.Display()?.SetFocusPlane(point, normal, Vector3.zero);
         }
 
         void OnPreRender()

@@ -9,39 +9,57 @@ namespace Handcal.Link
     public static class Matrices
     {
         /// <summary>
-        /// The 4×4 for Camera.SetStereoProjectionMatrix: from OpenGL's axes in V (x right, y up,
-        /// z back) to clip space, the eye's translation included.
+        /// The 4×4 for Camera.SetStereoProjectionMatrix: from the eye, in OpenGL's axes of V (x right,
+        /// y up, z back), to clip space. The view holds the eye's place; here it would make the last
+        /// number other than 0, which shaders take for an orthographic camera.
         /// </summary>
         public static double[] UnityProjection(double[] P, int widthPx, int heightPx, double nearM, double farM)
         {
             double scale = 1 / Math.Sqrt(P[8] * P[8] + P[9] * P[9] + P[10] * P[10]);
             double zScale = (farM + nearM) / (farM - nearM), zOffset = -2 * farM * nearM / (farM - nearM);
             var clip = new double[16];
-            for (int i = 0; i < 4; i++)
+            for (int i = 0; i < 3; i++)
             {
                 double u = scale * P[i], v = scale * P[4 + i], depth = scale * P[8 + i];
-                double sign = i == 1 || i == 2 ? -1 : 1;  // from OpenGL's axes to OpenCV's
+                double sign = i == 0 ? 1 : -1;  // from OpenGL's axes to OpenCV's
                 clip[i] = sign * (2 * (u + 0.5 * depth) / widthPx - depth);
                 clip[4 + i] = sign * (depth - 2 * (v + 0.5 * depth) / heightPx);
-                clip[8 + i] = sign * (zScale * depth + (i == 3 ? zOffset : 0));
+                clip[8 + i] = sign * zScale * depth;
                 clip[12 + i] = sign * depth;
             }
+            clip[11] = zOffset;
             return clip;
         }
 
         /// <summary>
         /// The 4×4 for Camera.SetStereoViewMatrix, to be multiplied with the head's worldToLocal:
-        /// T_V_H from Unity's axes of the head to OpenGL's of the camera.
+        /// from Unity's axes of the head to the eye, in OpenGL's axes of V.
         /// </summary>
-        public static double[] UnityViewFromHead(double[] TVH)
+        public static double[] UnityViewFromHead(double[] TVH, double[] P)
         {
+            double[] eye = EyeInV(P);
             var view = new double[16];
             for (int row = 0; row < 3; row++)
                 for (int column = 0; column < 4; column++)
-                    view[4 * row + column] =
-                        (row == 0 ? 1 : -1) * (column == 1 ? -1 : 1) * TVH[4 * row + column];
+                    view[4 * row + column] = (row == 0 ? 1 : -1) * (column == 1 ? -1 : 1)
+                        * (TVH[4 * row + column] - (column == 3 ? eye[row] : 0));
             view[15] = 1;
             return view;
+        }
+
+        /// <summary>The eye, P's centre of projection, in V; by Cramer's rule.</summary>
+        public static double[] EyeInV(double[] P)
+        {
+            double det = Minor(P, 0, 1, 2);
+            return new[] { -Minor(P, 3, 1, 2) / det, -Minor(P, 0, 3, 2) / det, -Minor(P, 0, 1, 3) / det };
+        }
+
+        /// <summary>The determinant of three columns of P.</summary>
+        static double Minor(double[] P, int a, int b, int c)
+        {
+            return P[a] * (P[4 + b] * P[8 + c] - P[4 + c] * P[8 + b])
+                - P[b] * (P[4 + a] * P[8 + c] - P[4 + c] * P[8 + a])
+                + P[c] * (P[4 + a] * P[8 + b] - P[4 + b] * P[8 + a]);
         }
 
         /// <summary>
