@@ -11,13 +11,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handcal.core.conventions import unity_transform
-from handcal.core.display import projection_matrix
+from handcal.core.display import projection_matrix, target_corners_m
 from handcal.core.geometry import project, rigid, transform
 from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
-from handcal.link.shapes import Shape
+from handcal.link.shapes import Shape, Target
 from handcal.rig.example import example_rig
 from tests.headset.conftest import PACKAGE
 from tests.headset.unity_player import PATIENCE_S, UnityPlayer, numbers
@@ -160,7 +160,14 @@ def test_points_are_drawn_where_the_eye_needs_them(
         P = projection_matrix(display, SHIFT_M)
         expected_px = project(P, transform(display.T_V_H, SQUARE_M))
         clip = numbers(told[f"projection{number}"]).reshape(4, 4)
+        assert clip[3].tolist() == [0, 0, -1, 0]  # else shaders take it for orthographic
         clip = clip @ numbers(told[f"view{number}"]).reshape(4, 4)
+        # All that an eye sees is in the frustum of culling, which is not much wider.
+        corners = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1], [1]), -1).reshape(-1, 4)
+        seen = corners @ np.linalg.inv(clip).T
+        culled = seen @ numbers(told["culling"]).reshape(4, 4).T
+        reach = np.abs(culled[:, :3] / culled[:, 3:]).max(axis=0)
+        assert ((reach > [0.9, 0.7, 0.9]) & (reach < 1)).all()
         for what, most_px in (("shape", 0.01), ("cursor", 0.3)):  # float32; quanta of 0.1 mm
             world = numbers(told[what]).reshape(-1, 3)
             found = np.column_stack([world, np.ones(4)]) @ clip.T
@@ -175,9 +182,36 @@ def test_points_are_drawn_where_the_eye_needs_them(
     distance_m = display.z_C0_S_m - display.t_C0_V_m[2]
     clip = numbers(told["view0"]).reshape(4, 4)
     in_V = (clip @ [*numbers(told["focus"]), 1.0])[:3]
-    in_H = display.T_V_H[:3, :3].T @ (in_V * [1, -1, -1] - display.T_V_H[:3, 3])
+    P = projection_matrix(display, SHIFT_M)
+    in_V = in_V * [1, -1, -1] - np.linalg.solve(P[:, :3], P[:, 3])
+    in_H = display.T_V_H[:3, :3].T @ (in_V - display.T_V_H[:3, 3])
     np.testing.assert_allclose(in_H, [0, 0, distance_m], atol=1e-3)
     assert faults(told) == []
+
+
+def test_the_target_is_drawn_where_the_eye_needs_it(start: Start, server: HeadsetServer) -> None:
+    """It is fixed in V, while the view that is drawn with has the eye at its origin."""
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    corners_V_m = target_corners_m(0.5)
+    server.send_target(Target("right", corners_V_m))
+    display = example_rig().eyes["right"]
+    for shift_m in (SHIFT_M, (-0.002, 0.004, -0.003)):
+        P = projection_matrix(display, shift_m)
+        size = display.width_px, display.height_px
+        server.send_projection(Projection("right", P, *size, display.T_V_H, P, "Ada", "rig A"))
+        expected_px = project(P, corners_V_m)
+
+        def is_there(told: Mapping[str, str], expected_px: Float64 = expected_px) -> bool:
+            in_view = numbers(told["target"]).reshape(-1, 3)
+            if len(in_view) != 4:
+                return False
+            clip = np.column_stack([in_view, np.ones(4)])
+            clip = clip @ numbers(told["projection1"]).reshape(4, 4).T
+            ndc = clip[:, :2] / clip[:, 3:] * [1, -1]
+            return bool(np.abs(0.5 * (1 + ndc) * size - 0.5 - expected_px).max() < 0.01)
+
+        app.until(is_there)
 
 
 def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
@@ -285,8 +319,31 @@ def test_settings_that_make_a_calibration_worthless_are_said_in_view(
     assert len(faults(app.state(3))) == 1  # said once
 
 
+def test_the_runtime_s_views_are_told_as_they_are_now(start: Start, server: HeadsetServer) -> None:
+    app = start(invitation=invitation(server))
+    app.place("eyes", [0.0630])
+    app.until(is_connected)
+    app.state(70)  # more than a second of identities
+    assert server.device is not None
+    assert not server.device.views
+    send_projections(server)
+    app.until(lambda told: told["wearer"] == "Ada")
+    for right, up in ((0.4, 0.3), (0.5, 0.35)):
+        app.place("edges", [right, up])
+
+        def is_told(_: object, edges: Float64 = np.array([-right, right, -up, up])) -> bool:
+            views = () if server.device is None else server.device.views.values()
+            found = [
+                (view.width_px, np.allclose(view.tangents, edges, atol=1e-6)) for view in views
+            ]
+            return found == [(1440, True)] * 2
+
+        app.until(is_told)
+
+
 def test_a_view_that_moves_is_said_once(start: Start) -> None:
     app = start()
+    app.place("edges", [0.4, 0.3])
     app.place("eyes", [0.0630])
     app.state(2)
     app.place("eyes", [0.0650])
@@ -338,7 +395,8 @@ def test_a_disabled_component_leaves_nothing_and_comes_back(
     told = app.state()
     assert (told["connected"], told["text"]) == ("False", "")
     assert "cursor" not in told
-    assert numbers(told["projection0"])[0] == 2.0  # the runtime's own
+    assert numbers(told["projection0"])[0] == 1.0  # the runtime's own
+    assert not numbers(told["culling"]).any()
     eventually(lambda: not server.connected, PATIENCE_S)
     app.do("enable")
     app.until(is_connected)

@@ -69,8 +69,8 @@ def test_the_manifest() -> None:
     manifest = json.loads((PACKAGE / "package.json").read_text())
     assert manifest["name"] == PACKAGE.name
     assert manifest["version"] == __version__
-    # Unity's own modules of XRSettings and XRDisplaySubsystem; a project may lack them.
-    assert set(manifest["dependencies"]) == {"com.unity.modules.vr", "com.unity.modules.xr"}
+    # Unity's own module of XRDisplaySubsystem; a project may lack it. That of XRSettings is no more.
+    assert set(manifest["dependencies"]) == {"com.unity.modules.xr"}
     for sample in manifest["samples"]:
         assert (PACKAGE / sample["path"]).is_dir()
     link = json.loads((PACKAGE / "Runtime/Link/Handcal.Link.asmdef").read_text())
