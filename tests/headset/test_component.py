@@ -196,9 +196,9 @@ def test_the_target_is_drawn_where_the_eye_needs_it(start: Start, server: Headse
     corners_V_m = target_corners_m(0.5)
     server.send_target(Target("right", corners_V_m))
     display = example_rig().eyes["right"]
+    size = display.width_px, display.height_px
     for shift_m in (SHIFT_M, (-0.002, 0.004, -0.003)):
         P = projection_matrix(display, shift_m)
-        size = display.width_px, display.height_px
         server.send_projection(Projection("right", P, *size, display.T_V_H, P, "Ada", "rig A"))
         expected_px = project(P, corners_V_m)
 
@@ -331,7 +331,8 @@ def test_the_runtime_s_views_are_told_as_they_are_now(start: Start, server: Head
     for right, up in ((0.4, 0.3), (0.5, 0.35)):
         app.place("edges", [right, up])
 
-        def is_told(_: object, edges: Float64 = np.array([-right, right, -up, up])) -> bool:
+        def is_told(_: object, right: float = right, up: float = up) -> bool:
+            edges = [-right, right, -up, up]
             views = () if server.device is None else server.device.views.values()
             found = [
                 (view.width_px, np.allclose(view.tangents, edges, atol=1e-6)) for view in views

@@ -42,12 +42,32 @@ def test_forged_datagrams_delay_no_frame(program: Path) -> None:
                 found.append((calm_ms, flooded_ms, round(sent[0]), checked))
                 is_flooded = sent[0] > 0.8 * PER_SECOND and checked > PER_SECOND
                 if is_flooded and flooded_ms <= max(2 * calm_ms, FRAME_MS):
-                    print(found)
                     break
             else:
-                pytest.fail(f"slowest frame before and under the flood, ms; sent per second; checked: {found}")
+                pytest.fail(
+                    f"slowest frame before and under the flood, ms; sent per second; checked: {found}"
+                )
             assert app.stdin is not None
             app.stdin.close()
+
+
+def test_forged_datagrams_do_not_keep_a_pairing_from_its_end(program: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pc:
+        pc.bind(("127.0.0.1", 0))
+        port = str(pc.getsockname()[1])
+        command = ["mono", str(program), "pair", "127.0.0.1", port, "12345678", "7"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as app:
+            _, headset = pc.recvfrom(2048)
+            is_over, sent = threading.Event(), list[float]()
+            flood = threading.Thread(target=_send, args=(pc, headset, is_over, sent))
+            flood.start()
+            try:
+                answer, _ = app.communicate(timeout=20.0)
+            finally:
+                is_over.set()
+                flood.join()
+                app.kill()
+    assert "No PC answered" in answer
 
 
 def _frames(app: subprocess.Popen[str]) -> tuple[int, int]:

@@ -69,7 +69,7 @@ def test_the_manifest() -> None:
     manifest = json.loads((PACKAGE / "package.json").read_text())
     assert manifest["name"] == PACKAGE.name
     assert manifest["version"] == __version__
-    # Unity's own module of XRDisplaySubsystem; a project may lack it. That of XRSettings is no more.
+    # Unity's own module of XRDisplaySubsystem; a project may lack it.
     assert set(manifest["dependencies"]) == {"com.unity.modules.xr"}
     for sample in manifest["samples"]:
         assert (PACKAGE / sample["path"]).is_dir()

@@ -15,7 +15,8 @@ namespace Handcal.Link
     {
         const double HelloPeriodS = 0.1, RefusedPeriodS = 1.0, SilenceS = 2.0, ReopenPeriodS = 1.0;
         const int IdleWaitUs = 20000, ReceiveBufferBytes = 4 << 20, PosesPerDatagram = 3, Byes = 3;
-        const int BatchDatagrams = 256, MostUdpBytes = 1 << 16;
+        const int BatchDatagrams = 256;
+        internal const int MostUdpBytes = 1 << 16;  // Windows has an error for what is longer than the buffer
         static readonly Stopwatch Clock = Stopwatch.StartNew();
 
         readonly object gate = new object();
