@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.conventions import unity_transform
 from handcal.core.display import projection_matrix, target_corners_m
+from handcal.core.errors import PoseError
 from handcal.core.geometry import project, rigid, transform
 from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.link.nudges import NudgeSum, VerifyRequest
@@ -24,7 +26,7 @@ from tests.headset.unity_player import PATIENCE_S, UnityPlayer, numbers
 from tests.helpers import ROOT, eventually
 
 pytestmark = pytest.mark.process
-DEFINES = "UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"
+DEFINES = "HANDCAL_OPENXR_TIME;UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"
 SHIFT_M = (0.003, 0.001, 0.005)
 SQUARE_M = np.array(
     [[x, y, 0.5] for x, y in ((-0.04, -0.03), (0.04, -0.03), (0.04, 0.05), (-0.04, 0.05))]
@@ -36,7 +38,7 @@ Start = Callable[..., UnityPlayer]
 @pytest.fixture(scope="session")
 def player(compiled: Callable[..., Path]) -> Path:
     folders = ("tests/headset/stubs", "tests/headset/player")
-    package = ("Runtime", "Runtime/Link", "Samples~/Calibration")
+    package = ("Runtime", "Runtime/Link", "Runtime/MixedReality", "Samples~/Calibration")
     sources = [*(ROOT / one for one in folders), *(PACKAGE / one for one in package)]
     return compiled("player.exe", *sources, defines=DEFINES)
 
@@ -186,7 +188,16 @@ def test_points_are_drawn_where_the_eye_needs_them(
     in_V = in_V * [1, -1, -1] - np.linalg.solve(P[:, :3], P[:, 3])
     in_H = display.T_V_H[:3, :3].T @ (in_V - display.T_V_H[:3, 3])
     np.testing.assert_allclose(in_H, [0, 0, distance_m], atol=1e-3)
+    # HoloLens 2 takes it under OpenXR by another call in each frame, of each pipeline.
+    mode, *plane = told["reprojection"].split()
+    assert mode == "PlanarManual"
+    np.testing.assert_array_equal(np.float32(plane[:3]), np.float32(told["focus"].split()))
+    assert np.linalg.norm(np.array(plane[3:], float)) == pytest.approx(1, abs=1e-6)
+    app.do("pipeline")
+    assert app.state()["reprojection"] == told["reprojection"]
     assert faults(told) == []
+    app.do("set setsFocusPlane=false")
+    assert "PlanarManual" not in app.state()["reprojection"]
 
 
 def test_the_target_is_drawn_where_the_eye_needs_it(start: Start, server: HeadsetServer) -> None:
@@ -317,6 +328,25 @@ def test_settings_that_make_a_calibration_worthless_are_said_in_view(
     assert said in told["text"].replace("/", " ")
     assert said in told["warning"]
     assert len(faults(app.state(3))) == 1  # said once
+
+
+def test_a_pose_is_stamped_with_the_time_that_the_runtime_predicts(
+    start: Start, server: HeadsetServer
+) -> None:
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+
+    def is_ahead(_: object) -> bool:
+        try:
+            server.pose_at_host_ns(time.monotonic_ns() + 20_000_000)
+        except PoseError:
+            return False
+        return True
+
+    app.state(30)
+    assert not is_ahead(None)
+    app.do("ahead 40")
+    app.until(is_ahead)
 
 
 def test_the_runtime_s_views_are_told_as_they_are_now(start: Start, server: HeadsetServer) -> None:

@@ -45,7 +45,7 @@ def test_forged_datagrams_delay_no_frame(program: Path) -> None:
                     break
             else:
                 pytest.fail(
-                    f"slowest frame before and under the flood, ms; sent per second; checked: {found}"
+                    f"slowest frame without and with the flood, ms; sent each s; checked: {found}"
                 )
             assert app.stdin is not None
             app.stdin.close()

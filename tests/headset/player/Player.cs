@@ -29,6 +29,9 @@ namespace Handcal.Tests
         {
             CultureInfo.CurrentCulture = new CultureInfo("de-DE");  // a decimal comma changes nothing
             Application.persistentDataPath = arguments[0];
+            const BindingFlags Static = BindingFlags.Static | BindingFlags.NonPublic;
+            foreach (MethodInfo one in typeof(HandcalHeadset).Assembly.GetTypes().SelectMany(type => type.GetMethods(Static)))
+                if (one.GetCustomAttributes(typeof(RuntimeInitializeOnLoadMethodAttribute), false).Any()) one.Invoke(null, null);
             var holder = new GameObject("Main Camera");
             camera = holder.AddComponent<Camera>();
             headset = Add<HandcalHeadset>(holder);
@@ -59,6 +62,7 @@ namespace Handcal.Tests
                 case "eyes": Eyes(Numbers(rest)[0]); break;
                 case "parent": Parent(Numbers(rest)); break;
                 case "edges": Edges(Numbers(rest)); break;
+                case "ahead": Microsoft.MixedReality.OpenXR.OpenXRTime.StubAheadNs = (long)(1e6 * Numbers(rest)[0]); break;
                 case "press": Input.StubPressed.Add((KeyCode)Enum.Parse(typeof(KeyCode), rest)); break;
                 case "hold": InputDevice.StubFeatures[rest] = true; break;
                 case "release": InputDevice.StubFeatures[rest] = false; break;
@@ -88,9 +92,11 @@ namespace Handcal.Tests
             foreach (MonoBehaviour one in Behaviours.Where(one => one.enabled).ToList()) Call(one, "Update");
             Input.StubPressed.Clear();
             Application.StubBeforeRender();
+            Microsoft.MixedReality.OpenXR.ViewConfiguration.StubSettings = new Microsoft.MixedReality.OpenXR.ReprojectionSettings();
             // A scriptable pipeline renders without these calls.
             bool isBuiltIn = UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline == null;
             for (int eye = 0; eye < (camera.stereoEnabled ? 2 : 1) && isBuiltIn; eye++) Render(eye);
+            if (!isBuiltIn) UnityEngine.Rendering.RenderPipelineManager.StubEnd(camera);
             Time.realtimeSinceStartup += 1f / 60;  // whatever a frame takes here
             Thread.Sleep(4);
         }
@@ -104,6 +110,7 @@ namespace Handcal.Tests
             var side = (Camera.StereoscopicEye)eye;
             Projections[eye] = camera.stereoEnabled ? camera.GetStereoProjectionMatrix(side) : camera.projectionMatrix;
             Views[eye] = camera.stereoEnabled ? camera.GetStereoViewMatrix(side) : camera.worldToCameraMatrix;
+            Camera.onPostRender?.Invoke(camera);
             Hidden[eye] = string.Join(",", Drawn().Where(IsHidden).Select(one => one.name.Substring(8)));
         }
 
@@ -141,6 +148,9 @@ namespace Handcal.Tests
             Say("culling", Matrix(camera.cullingMatrix));
             Vector3 focus = XRDisplaySubsystem.StubOnly.StubFocus;
             Say("focus", Write(focus.x, focus.y, focus.z));
+            var plane = Microsoft.MixedReality.OpenXR.ViewConfiguration.StubSettings;
+            Vector3 at = plane.ReprojectionPlaneOverridePosition ?? Vector3.zero, normal = plane.ReprojectionPlaneOverrideNormal ?? Vector3.zero;
+            Say("reprojection", plane.ReprojectionMode + " " + Write(at.x, at.y, at.z, normal.x, normal.y, normal.z));
             Console.WriteLine();
         }
 

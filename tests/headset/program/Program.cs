@@ -27,6 +27,11 @@ namespace Handcal.Link.Tests
                 case "hostile": Lines(Hostile); break;
                 case "run": new Remote(arguments).Run(); break;
                 case "time": Timing.Run(arguments); break;
+                case "made":
+                    using (var random = RandomNumberGenerator.Create()) Console.WriteLine(random.GetType());
+                    using (var hash = SHA256.Create()) Console.WriteLine(hash.GetType());
+                    using (var hash = HashAlgorithm.Create(new HMACSHA256().HashName)) Console.WriteLine(hash.GetType());
+                    break;
                 case "frames": Timing.Frames(int.Parse(arguments[1])); break;
                 default: return 2;
             }

@@ -104,6 +104,14 @@ namespace UnityEngine
         public BeforeRenderOrderAttribute(int order) { this.order = order; }
     }
 
+    public enum RuntimeInitializeLoadType { AfterSceneLoad, BeforeSceneLoad }
+
+    [AttributeUsage(AttributeTargets.Method)]
+    public class RuntimeInitializeOnLoadMethodAttribute : Attribute
+    {
+        public RuntimeInitializeOnLoadMethodAttribute(RuntimeInitializeLoadType loadType) { }
+    }
+
     public delegate void UnityAction();
 
     public class Application
@@ -154,6 +162,9 @@ namespace UnityEngine
     {
         public enum StereoscopicEye { Left, Right }
         public enum MonoOrStereoscopicEye { Left, Right, Mono }
+
+        public delegate void CameraCallback(Camera cam);
+        public static CameraCallback onPostRender;
 
         /// <summary>At first the identity, as Unity's documentation says of the first frames.</summary>
         public static Matrix4x4 StubRuntimeProjection = Matrix4x4.identity;

@@ -10,6 +10,14 @@ namespace UnityEngine.Rendering
     public abstract class RenderPipelineAsset : Object { }
     public sealed class StubPipeline : RenderPipelineAsset { }
 
+    public struct ScriptableRenderContext { }
+
+    public static class RenderPipelineManager
+    {
+        public static event Action<ScriptableRenderContext, Camera> endCameraRendering;
+        public static void StubEnd(Camera camera) { endCameraRendering?.Invoke(new ScriptableRenderContext(), camera); }
+    }
+
     public sealed class GraphicsSettings : Object
     {
         public static RenderPipelineAsset currentRenderPipeline { get; set; }

@@ -25,7 +25,7 @@ namespace Handcal
         [Tooltip("Name by which the PC calls this headset. Empty: the device's own.")]
         public string deviceName = "";
 
-        [Tooltip("Time from the camera's pose to its display, ms, if the app sets no PoseTimeNs.")]
+        [Tooltip("Time from the camera's pose to its display, ms, if neither the runtime nor the app tells the time of display.")]
         public float poseDelayMs;
 
         [Tooltip("Stabilise the picture at the virtual image, where reprojection does not reduce the correction.")]
@@ -45,9 +45,12 @@ namespace Handcal
 
         /// <summary>
         /// The time that the camera's present pose is for, ns on <see cref="NowNs"/>'s clock: the
-        /// predicted time of display where the runtime tells it. Null: now + poseDelayMs.
+        /// predicted time of display. Null: as the runtime predicts it, else now + poseDelayMs.
         /// </summary>
         public Func<long> PoseTimeNs;
+
+        /// <summary>The same of the runtime, set by the package's part for a plug-in; 0: not known.</summary>
+        public static Func<long> PredictedTimeNs = () => 0;
 
         const string HowToPair = "On the PC, run handcal pair. Then scan its QR code, or type its address "
             + "and the 8 digits, as 192.168.1.20 12345678";
@@ -271,7 +274,8 @@ namespace Handcal
             // In the space of the camera's parent, in which everything is drawn as well.
             Vector3 p = transform.localPosition;
             Quaternion q = transform.localRotation;
-            long timeNs = PoseTimeNs != null ? PoseTimeNs() : NowNs() + (long)(1e6 * poseDelayMs);
+            long timeNs = (PoseTimeNs ?? PredictedTimeNs)();
+            if (timeNs == 0) timeNs = NowNs() + (long)(1e6 * poseDelayMs);
             link.SendPose(Matrices.FromUnity(p.x, p.y, p.z, q.x, q.y, q.z, q.w), timeNs);
         }
 
