@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -11,10 +13,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.core.conventions import unity_transform
+from handcal.core.conventions import opengl_transform, pose, unity_transform
 from handcal.core.display import projection_matrix, target_corners_m
 from handcal.core.errors import PoseError
-from handcal.core.geometry import project, rigid, transform
+from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.types import EYES, Eye, Float64, Projection
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairings
@@ -38,9 +40,29 @@ Start = Callable[..., UnityPlayer]
 @pytest.fixture(scope="session")
 def player(compiled: Callable[..., Path]) -> Path:
     folders = ("tests/headset/stubs", "tests/headset/player")
-    package = ("Runtime", "Runtime/Link", "Runtime/MixedReality", "Samples~/Calibration")
+    package = (
+        *map("Runtime/{}".format, ("", "Link", "MixedReality", "OpenXR")),
+        "Samples~/Calibration",
+    )
     sources = [*(ROOT / one for one in folders), *(PACKAGE / one for one in package)]
     return compiled("player.exe", *sources, defines=DEFINES)
+
+
+@pytest.fixture(scope="session")
+def library(player: Path) -> None:
+    """Build the library of the native views, and a runtime, where the player finds them."""
+    needed = Path("/usr/include/openxr/openxr.h"), ROOT / "resources/openxr/views.c"
+    if shutil.which("gcc") is None or not all(path.exists() for path in needed):
+        pytest.skip("needs gcc, libopenxr-dev and the views of the layer for OpenXR")
+    for name, sources in (
+        ("handcal_unity", ("views.c", "unity.c")),
+        ("unity_runtime", ("test/unity_runtime.c",)),
+    ):
+        paths = [str(ROOT / "resources/openxr" / source) for source in sources]
+        command = ["gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", *paths, "-lm"]
+        command += ["-o", str(player.parent / f"lib{name}.so")]
+        run = subprocess.run(command, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
 
 
 @pytest.fixture
@@ -336,17 +358,10 @@ def test_a_pose_is_stamped_with_the_time_that_the_runtime_predicts(
     app = start(invitation=invitation(server))
     app.until(is_connected)
 
-    def is_ahead(_: object) -> bool:
-        try:
-            server.pose_at_host_ns(time.monotonic_ns() + 20_000_000)
-        except PoseError:
-            return False
-        return True
-
     app.state(30)
-    assert not is_ahead(None)
+    assert not is_ahead(server)
     app.do("ahead 40")
-    app.until(is_ahead)
+    app.until(lambda _: is_ahead(server))
 
 
 def test_the_runtime_s_views_are_told_as_they_are_now(start: Start, server: HeadsetServer) -> None:
@@ -463,3 +478,87 @@ def test_an_app_that_cannot_write_says_so_and_is_paired(
     (tmp_path / "app/handcal-pairing.txt.part").mkdir(parents=True)
     told = start(invitation=invitation(server)).until(is_connected)
     assert "Cannot write" in told["warning"]
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize(("native", "wider_m"), [("stays", 0.0), ("moves", 0.004)])
+def test_the_openxr_plug_in_draws_with_the_calibration_in_every_pipeline(
+    start: Start, server: HeadsetServer, native: str, wider_m: float
+) -> None:
+    """Unity gets the calibrated views, and the runtime its own, whatever the head does."""
+    app = start(invitation=invitation(server), native=native)
+    own_H = np.reshape(own_views(wider_m), (2, 11))
+    app.place("own", own_H.ravel())
+    app.do("pipeline", "single")
+    app.until(is_connected)
+    send_projections(server)
+    app.until(lambda told: told["wearer"] == "Ada")
+    for _ in range(20):
+        told = app.state()
+        given, received, own = numbers(told["native"]).reshape(3, 2, 11)
+        np.testing.assert_array_equal(received, own)
+        for number, eye in enumerate(EYES):
+            display = example_rig().eyes[eye]
+            T_W_H = at(own[number]) @ invert(at(own_H[number]))
+            T_W_V = T_W_H @ opengl_transform(invert(display.T_V_H))
+            seen_m = transform(invert(at(given[number])) @ T_W_V, SQUARE_M * [1, -1, -1])
+            left, right, up, down = np.tan(given[number, 7:])
+            share = (seen_m[:, :2] / -seen_m[:, 2:] - [left, up]) / [right - left, down - up]
+            pixels = share * [display.width_px, display.height_px] - 0.5
+            P = projection_matrix(display, SHIFT_M)
+            np.testing.assert_allclose(pixels, project(P, SQUARE_M), atol=0.01)
+    assert numbers(told["projection0"])[0] == 0.0  # the camera is left alone
+    assert told["warning"] == ""
+    app.until(lambda _: server.device is not None and len(server.device.views) == 2)
+    assert server.device is not None
+    for eye, view in server.device.views.items():
+        T_H_V = opengl_transform(at(own_H[EYES.index(eye)]))
+        np.testing.assert_allclose(view.T_V_H, invert(T_H_V), atol=1e-6)
+        np.testing.assert_allclose(view.tangents, [-0.4, 0.5, -0.3, 0.2], atol=1e-6)
+    app.until(lambda _: is_ahead(server))
+    assert faults(told) == []
+    app.do("disable")
+    given, _, own = numbers(app.state(2)["native"]).reshape(3, 2, 11)
+    np.testing.assert_array_equal(given, own)
+
+
+@pytest.mark.usefixtures("library")
+def test_views_that_are_not_the_rig_s_are_refused_in_view(
+    start: Start, server: HeadsetServer
+) -> None:
+    app = start(invitation=invitation(server), native="stays")
+    app.place("own", own_views(wider_m=0.004))
+    app.until(is_connected)
+    send_projections(server)
+    told = app.until(lambda told: "4.0 mm" in told["text"].replace("/", " "))
+    given, _, own = numbers(told["native"]).reshape(3, 2, 11)
+    np.testing.assert_array_equal(given, own)
+    app.place("own", own_views())
+    told = app.until(lambda told: "mm" not in told["text"])
+    assert len(faults(told)) == 1
+
+
+def own_views(wider_m: float = 0.0) -> list[float]:
+    """Return the rig's views in the head for OpenXR, perhaps farther apart: poses and angles."""
+    found: list[float] = []
+    for eye in EYES:
+        T_H_V = opengl_transform(invert(example_rig().eyes[eye].T_V_H))
+        one = pose(T_H_V)
+        apart_m = [wider_m * (eye == "right"), 0.0, 0.0]
+        fov_rad = np.arctan([-0.4, 0.5, 0.3, -0.2])
+        found += [*one.quaternion_xyzw, *(one.position_m + apart_m), *fov_rad]
+    return found
+
+
+def at(view: Float64) -> Float64:
+    """Return the transform of a view's pose, from the view to its space."""
+    return rigid(Rotation.from_quat(view[:4]).as_rotvec(), view[4:7])
+
+
+def is_ahead(server: HeadsetServer) -> bool:
+    """Return whether the PC knows a pose for a time that is still to come."""
+    try:
+        server.pose_at_host_ns(time.monotonic_ns() + 20_000_000)
+    except PoseError:
+        return False
+    return True

@@ -32,7 +32,8 @@ def test_components_and_samples_compile_against_unity(
     link = compiled("Handcal.Link.dll", PACKAGE / "Runtime/Link")
     unity = compiled("UnityEngine.dll", ROOT / "tests/headset/stubs")
     uses = [f"-r:{link}", f"-r:{unity}", f"-define:{defines}"]
-    parts = [PACKAGE / "Runtime", PACKAGE / "Runtime/MixedReality", PACKAGE / "Editor", SAMPLE]
+    inside = ("Runtime", "Runtime/MixedReality", "Runtime/OpenXR", "Editor")
+    parts = [*(PACKAGE / one for one in inside), SAMPLE]
     sources = sorted(source for part in parts for source in part.glob("*.cs"))
     command = ["mcs", "-langversion:7", "-warn:4", "-warnaserror", "-target:library", *uses]
     command += [f"-out:{tmp_path / 'package.dll'}", *map(str, sources)]

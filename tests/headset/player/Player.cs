@@ -3,6 +3,7 @@ using System.Collections.Generic;
 using System.Globalization;
 using System.Linq;
 using System.Reflection;
+using System.Runtime.InteropServices;
 using System.Text;
 using System.Threading;
 using UnityEngine;
@@ -21,6 +22,8 @@ namespace Handcal.Tests
         static readonly List<MonoBehaviour> Behaviours = new List<MonoBehaviour>();
         static readonly Matrix4x4[] Projections = new Matrix4x4[2], Views = new Matrix4x4[2];
         static readonly string[] Hidden = { "", "" };
+        static readonly float[] NativeViews = new float[66];
+        static IntPtr hook;
         static Camera camera;
         static HandcalHeadset headset;
 
@@ -37,13 +40,34 @@ namespace Handcal.Tests
             headset = Add<HandcalHeadset>(holder);
             Add<FollowHead>(holder);
             Add<PairByTyping>(holder).headset = headset;
-            foreach (string field in arguments.Skip(1)) Set(field);
+            foreach (string field in arguments.Skip(1).Where(one => !one.StartsWith("native="))) Set(field);
             Head(new float[] { 0, 0, 0, 0, 0, 0, 1 });
+            string native = arguments.FirstOrDefault(one => one.StartsWith("native="));
+            if (native != null) Hook(native == "native=moves");
             foreach (MonoBehaviour one in Behaviours) Call(one, "OnEnable");
             string line;
             while ((line = Console.ReadLine()) != null) Obey(line.Split(new[] { ' ' }, 2));
             foreach (MonoBehaviour one in Behaviours) Call(one, "OnDisable");
         }
+
+        /// <summary>Hooks the views into the runtime of resources/openxr/test, as Unity's plug-in does.</summary>
+        static void Hook(bool movesViews)
+        {
+            MethodInfo get = typeof(HandcalViews).GetMethod("HookGetInstanceProcAddr", BindingFlags.Instance | BindingFlags.NonPublic);
+            hook = (IntPtr)get.Invoke(new HandcalViews { movesViews = movesViews }, new object[] { dlsym(dlopen("libunity_runtime.so", 2), "test_get") });
+        }
+
+        [DllImport("libdl.so.2")]
+        static extern IntPtr dlopen(string name, int flags);
+
+        [DllImport("libdl.so.2")]
+        static extern IntPtr dlsym(IntPtr library, string name);
+
+        [DllImport("unity_runtime")]
+        static extern void test_views(float[] numbers);
+
+        [DllImport("unity_runtime")]
+        static extern void test_frame(IntPtr get, float[] to);
 
         static T Add<T>(GameObject holder) where T : MonoBehaviour
         {
@@ -63,6 +87,7 @@ namespace Handcal.Tests
                 case "parent": Parent(Numbers(rest)); break;
                 case "edges": Edges(Numbers(rest)); break;
                 case "ahead": Microsoft.MixedReality.OpenXR.OpenXRTime.StubAheadNs = (long)(1e6 * Numbers(rest)[0]); break;
+                case "own": test_views(Numbers(rest)); break;
                 case "press": Input.StubPressed.Add((KeyCode)Enum.Parse(typeof(KeyCode), rest)); break;
                 case "hold": InputDevice.StubFeatures[rest] = true; break;
                 case "release": InputDevice.StubFeatures[rest] = false; break;
@@ -91,6 +116,7 @@ namespace Handcal.Tests
             }
             foreach (MonoBehaviour one in Behaviours.Where(one => one.enabled).ToList()) Call(one, "Update");
             Input.StubPressed.Clear();
+            if (hook != IntPtr.Zero) test_frame(hook, NativeViews);
             Application.StubBeforeRender();
             Microsoft.MixedReality.OpenXR.ViewConfiguration.StubSettings = new Microsoft.MixedReality.OpenXR.ReprojectionSettings();
             // A scriptable pipeline renders without these calls.
@@ -116,8 +142,8 @@ namespace Handcal.Tests
 
         static bool IsHidden(GameObject one)
         {
-            one.StubComponents.OfType<MeshRenderer>().Single().sharedMaterial.StubFloats.TryGetValue("_IsHidden", out float hidden);
-            return hidden > 0.5f;
+            var floats = one.StubComponents.OfType<MeshRenderer>().Single().sharedMaterial.StubFloats;
+            return floats["_Eyes"] != 3 && floats["_Eyes"] != floats["_Eye"];
         }
 
         static IEnumerable<GameObject> Drawn()
@@ -145,6 +171,7 @@ namespace Handcal.Tests
                 Say("view" + eye, Matrix(Views[eye]));
                 Say("hidden" + eye, Hidden[eye]);
             }
+            Say("native", Write(NativeViews));
             Say("culling", Matrix(camera.cullingMatrix));
             Vector3 focus = XRDisplaySubsystem.StubOnly.StubFocus;
             Say("focus", Write(focus.x, focus.y, focus.z));

@@ -11,7 +11,7 @@ namespace Handcal
     /// <summary>
     /// Makes the headset's camera one that handcal calibrates: it connects to the PC, sends poses,
     /// draws each eye with its calibrated projection and the rig's view, shows what the PC asks
-    /// for, and confirms. Built-in render pipeline, multi-pass.
+    /// for, and confirms. In the built-in render pipeline and multi-pass; with HandcalViews in all.
     /// </summary>
     [RequireComponent(typeof(Camera))]
     [DisallowMultipleComponent]
@@ -51,6 +51,9 @@ namespace Handcal
 
         /// <summary>The same of the runtime, set by the package's part for a plug-in; 0: not known.</summary>
         public static Func<long> PredictedTimeNs = () => 0;
+
+        /// <summary>The part that draws with the calibration below Unity; null: the camera's matrices are set.</summary>
+        public static INativeViews Native;
 
         const string HowToPair = "On the PC, run handcal pair. Then scan its QR code, or type its address "
             + "and the 8 digits, as 192.168.1.20 12345678";
@@ -211,6 +214,13 @@ namespace Handcal
             return link != null && link.ShowKept(wearer);
         }
 
+        // handcal's layer would correct a second time; before Unity loads OpenXR, with which it would come.
+        [RuntimeInitializeOnLoadMethod(RuntimeInitializeLoadType.SubsystemRegistration)]
+        static void SwitchLayerOff()
+        {
+            Environment.SetEnvironmentVariable("HANDCAL_OPENXR_OFF", "1");
+        }
+
         void OnEnable()
         {
             var eyes = GetComponent<Camera>();
@@ -233,6 +243,7 @@ namespace Handcal
             drawing.Dispose();
             drawing = null;
             cameras.Reset();
+            Native?.Calibrate(null);
         }
 
         void OnTransformParentChanged()
@@ -243,6 +254,7 @@ namespace Handcal
         void Update()
         {
             while (agreed.TryDequeue(out Action connect)) connect();
+            if (Native != null) views.Read();
             views.CheckProject();
             if (views.ProjectFault.Length > 0 && warning != views.ProjectFault) Warn(views.ProjectFault);
             if (views.Movement.Length > 0 && warning.Length == 0) Warn(views.Movement);
@@ -260,6 +272,7 @@ namespace Handcal
                 if (presses.IsConfirmed) Confirm();
             }
             drawn = link.State();
+            Native?.Calibrate(drawn);
             byte[] kept = link.TakeKept();
             if (kept != null && !pairing.StoreKept(kept)) Warn(pairing.Problem);
             if (views.HasChanged()) link.SetDevice(Introduction());
@@ -281,9 +294,12 @@ namespace Handcal
 
         void OnPreCull()
         {
-            cameras.Reset();
-            views.Read();
-            cameras.Apply(drawn);
+            if (Native == null)
+            {
+                cameras.Reset();
+                views.Read();
+                cameras.Apply(drawn);
+            }
             if (!setsFocusPlane) return;
             FocusPlane(out Vector3 point, out Vector3 normal);
             EyeCameras.Display()?.SetFocusPlane(point, normal, Vector3.zero);
@@ -291,7 +307,7 @@ namespace Handcal
 
         void OnPreRender()
         {
-            drawing.BeginEye(cameras.ActiveEye);
+            if (Native == null) drawing.BeginEye(cameras.ActiveEye);
         }
 
         void ConfirmAt(long timeNs)

@@ -23,7 +23,7 @@ namespace Handcal
             this.camera = camera;
         }
 
-        /// <summary>The setting of the project that keeps calibrations from being drawn; empty if there is none.</summary>
+        /// <summary>The setting of the project, or another reason, that keeps calibrations from being drawn; empty if there is none.</summary>
         public string ProjectFault { get; private set; } = "";
 
         /// <summary>Says that the runtime moves its view; empty if it does not.</summary>
@@ -32,6 +32,11 @@ namespace Handcal
         /// <summary>Checks the project. Scriptable pipelines call neither OnPreCull nor OnPreRender: do it in Update.</summary>
         public void CheckProject()
         {
+            if (HandcalHeadset.Native != null)
+            {
+                ProjectFault = HandcalHeadset.Native.Refusal;
+                return;
+            }
             XRDisplaySubsystem display = EyeCameras.Display();
             bool isSinglePass = false;
             for (int i = 0; display != null && i < display.GetRenderPassCount(); i++)
@@ -52,7 +57,7 @@ namespace Handcal
         {
             if (!camera.stereoEnabled || Time.realtimeSinceStartup < nextS) return;
             nextS = Time.realtimeSinceStartup + PeriodS;
-            var found = new List<View>();
+            List<View> found = HandcalHeadset.Native == null ? new List<View>() : HandcalHeadset.Native.Own();
             XRDisplaySubsystem display = EyeCameras.Display();
             int eyes = 0;
             for (int i = 0; display != null && i < display.GetRenderPassCount(); i++)
@@ -63,12 +68,19 @@ namespace Handcal
                     // Not the camera's: that may return what was set, and at first the identity.
                     pass.GetRenderParameter(camera, k, out XRDisplaySubsystem.XRRenderParameter eye);
                     RenderTextureDescriptor size = pass.renderTargetDesc;
-                    if (eyes++ == 0)
+                    if (HandcalHeadset.Native != null)
+                    {
+                        if (eyes < found.Count) found[eyes].WidthPx = size.width;
+                        if (eyes < found.Count) found[eyes].HeightPx = size.height;
+                        eyes++;
+                    }
+                    else if (eyes++ == 0)
                         AddView(found, Eyes.Left, eye.projection, size, CommonUsages.leftEyePosition, CommonUsages.leftEyeRotation);
                     else
                         AddView(found, Eyes.Right, eye.projection, size, CommonUsages.rightEyePosition, CommonUsages.rightEyeRotation);
                 }
             }
+            if (eyes == 0) found.Clear();
             views = found;
             if (found.Count < 2) return;
             first = first ?? found;

@@ -47,6 +47,33 @@ namespace Handcal.Link
             return view;
         }
 
+        /// <summary>
+        /// One eye for OpenXR, in its axes (x right, y up, z back): its place in V, the tangents left,
+        /// right, up and down of its field of view, and the pose of V in the head, a quaternion and
+        /// metres. Null if P has skew or rotation, which OpenXR cannot express.
+        /// </summary>
+        public static double[] OpenXr(double[] P, double[] TVH, int widthPx, int heightPx)
+        {
+            double fx = P[0] / P[10], fy = P[5] / P[10], cx = P[2] / P[10], cy = P[6] / P[10];
+            double skew = Math.Abs(P[1] / P[0]) + Math.Abs(P[4] / P[5]) + Math.Abs(P[8] / P[10]) + Math.Abs(P[9] / P[10]);
+            if (!(skew < 1e-9)) return null;
+            double[] eye = EyeInV(P), m = Invert(TVH);
+            return new[]
+            {
+                eye[0], -eye[1], -eye[2],
+                (-0.5 - cx) / fx, (widthPx - 0.5 - cx) / fx, (cy + 0.5) / fy, (cy + 0.5 - heightPx) / fy,
+                Part(1 + m[0] - m[5] - m[10], m[9] - m[6]), Part(1 - m[0] + m[5] - m[10], m[8] - m[2]),
+                Part(1 - m[0] - m[5] + m[10], m[1] - m[4]), Part(1 + m[0] + m[5] + m[10], 1),
+                m[3], -m[7], -m[11],
+            };
+        }
+
+        /// <summary>A part of a quaternion, from four times its square and its sign.</summary>
+        static double Part(double square, double sign)
+        {
+            return (sign < 0 ? -0.5 : 0.5) * Math.Sqrt(Math.Max(0, square));
+        }
+
         /// <summary>The eye, P's centre of projection, in V; by Cramer's rule.</summary>
         public static double[] EyeInV(double[] P)
         {

@@ -1,0 +1,16 @@
+// The part of Unity's OpenXR plug-in that the package uses; see UnityEngine.cs.
+using System;
+
+namespace UnityEngine
+{
+    public class ScriptableObject : Object { }
+}
+
+namespace UnityEngine.XR.OpenXR.Features
+{
+    public abstract class OpenXRFeature : ScriptableObject
+    {
+        /// <summary>Protected and internal in another assembly, which looks the same from here.</summary>
+        protected virtual IntPtr HookGetInstanceProcAddr(IntPtr func) { return func; }
+    }
+}
