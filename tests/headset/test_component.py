@@ -507,6 +507,7 @@ def test_the_openxr_plug_in_draws_with_the_calibration_in_every_pipeline(
             pixels = share * [display.width_px, display.height_px] - 0.5
             P = projection_matrix(display, SHIFT_M)
             np.testing.assert_allclose(pixels, project(P, SQUARE_M), atol=0.01)
+    assert told["layer"] == "1"  # switched off: it would correct as well
     assert numbers(told["projection0"])[0] == 0.0  # the camera is left alone
     assert told["warning"] == ""
     app.until(lambda _: server.device is not None and len(server.device.views) == 2)
@@ -535,7 +536,7 @@ def test_views_that_are_not_the_rig_s_are_refused_in_view(
     np.testing.assert_array_equal(given, own)
     app.place("own", own_views())
     told = app.until(lambda told: "mm" not in told["text"])
-    assert len(faults(told)) == 1
+    assert (told["warning"], len(faults(told))) == ("", 1)
 
 
 def own_views(wider_m: float = 0.0) -> list[float]:

@@ -57,6 +57,9 @@ namespace Handcal.Tests
             hook = (IntPtr)get.Invoke(new HandcalViews { movesViews = movesViews }, new object[] { dlsym(dlopen("libunity_runtime.so", 2), "test_get") });
         }
 
+        [DllImport("libc.so.6")]
+        static extern IntPtr getenv(string name);
+
         [DllImport("libdl.so.2")]
         static extern IntPtr dlopen(string name, int flags);
 
@@ -171,6 +174,7 @@ namespace Handcal.Tests
                 Say("view" + eye, Matrix(Views[eye]));
                 Say("hidden" + eye, Hidden[eye]);
             }
+            Say("layer", Marshal.PtrToStringAnsi(getenv("HANDCAL_OPENXR_OFF")));
             Say("native", Write(NativeViews));
             Say("culling", Matrix(camera.cullingMatrix));
             Vector3 focus = XRDisplaySubsystem.StubOnly.StubFocus;

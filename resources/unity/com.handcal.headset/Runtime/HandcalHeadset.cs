@@ -69,7 +69,7 @@ namespace Handcal
         RuntimeViews views;
         NudgeSum moved;
         uint movedId;
-        string pairingProblem = "", warning = "";
+        string pairingProblem = "", warning = "", fault = "";
         int pairings;  // that go on
         float connectedS = float.NegativeInfinity;
         bool wasConnected;
@@ -256,7 +256,12 @@ namespace Handcal
             while (agreed.TryDequeue(out Action connect)) connect();
             if (Native != null) views.Read();
             views.CheckProject();
-            if (views.ProjectFault.Length > 0 && warning != views.ProjectFault) Warn(views.ProjectFault);
+            if (views.ProjectFault != fault)
+            {
+                fault = views.ProjectFault;
+                if (fault.Length > 0) Warn(fault);
+                else warning = "";
+            }
             if (views.Movement.Length > 0 && warning.Length == 0) Warn(views.Movement);
             if (IsConnected && !wasConnected) connectedS = Time.realtimeSinceStartup;
             wasConnected = IsConnected;
