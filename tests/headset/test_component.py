@@ -213,8 +213,8 @@ def test_points_are_drawn_where_the_eye_needs_them(
     # HoloLens 2 takes it under OpenXR by another call in each frame, of each pipeline.
     mode, *plane = told["reprojection"].split()
     assert mode == "PlanarManual"
-    np.testing.assert_array_equal(np.float32(plane[:3]), np.float32(told["focus"].split()))
-    assert np.linalg.norm(np.array(plane[3:], float)) == pytest.approx(1, abs=1e-6)
+    np.testing.assert_array_equal(numbers(" ".join(plane[:3])), numbers(told["focus"]))
+    assert np.linalg.norm(numbers(" ".join(plane[3:]))) == pytest.approx(1, abs=1e-6)
     app.do("pipeline")
     assert app.state()["reprojection"] == told["reprojection"]
     assert faults(told) == []
@@ -376,7 +376,7 @@ def test_the_runtime_s_views_are_told_as_they_are_now(start: Start, server: Head
     for right, up in ((0.4, 0.3), (0.5, 0.35)):
         app.place("edges", [right, up])
 
-        def is_told(_: object, right: float = right, up: float = up) -> bool:
+        def is_reported(_: object, right: float = right, up: float = up) -> bool:
             edges = [-right, right, -up, up]
             views = () if server.device is None else server.device.views.values()
             found = [
@@ -384,7 +384,7 @@ def test_the_runtime_s_views_are_told_as_they_are_now(start: Start, server: Head
             ]
             return found == [(1440, True)] * 2
 
-        app.until(is_told)
+        app.until(is_reported)
 
 
 def test_a_view_that_moves_is_said_once(start: Start) -> None:
