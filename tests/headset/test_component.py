@@ -539,6 +539,18 @@ def test_views_that_are_not_the_rig_s_are_refused_in_view(
     assert (told["warning"], len(faults(told))) == ("", 1)
 
 
+def test_without_the_library_the_cameras_are_set_and_it_is_said(
+    player: Path, server: HeadsetServer, tmp_path: Path
+) -> None:
+    alone = Path(shutil.copy(player, tmp_path))  # libraries are looked for beside it
+    with UnityPlayer(alone, tmp_path / "app", invitation=invitation(server), native="stays") as app:
+        app.until(is_connected)
+        send_projections(server)
+        told = app.until(lambda told: told["wearer"] == "Ada")
+        assert "library handcal_unity is missing" in told["log"]
+        assert numbers(told["projection0"])[14] == -1.0
+
+
 def own_views(wider_m: float = 0.0) -> list[float]:
     """Return the rig's views in the head for OpenXR, perhaps farther apart: poses and angles."""
     found: list[float] = []

@@ -53,8 +53,12 @@ namespace Handcal.Tests
         /// <summary>Hooks the views into the runtime of resources/openxr/test, as Unity's plug-in does.</summary>
         static void Hook(bool movesViews)
         {
-            MethodInfo get = typeof(HandcalViews).GetMethod("HookGetInstanceProcAddr", BindingFlags.Instance | BindingFlags.NonPublic);
-            hook = (IntPtr)get.Invoke(new HandcalViews { movesViews = movesViews }, new object[] { dlsym(dlopen("libunity_runtime.so", 2), "test_get") });
+            var views = new HandcalViews { movesViews = movesViews };
+            const BindingFlags Own = BindingFlags.Instance | BindingFlags.NonPublic;
+            IntPtr runtime = dlopen("libunity_runtime.so", 2);
+            object[] get = { runtime == IntPtr.Zero ? IntPtr.Zero : dlsym(runtime, "test_get") };
+            hook = (IntPtr)typeof(HandcalViews).GetMethod("HookGetInstanceProcAddr", Own).Invoke(views, get);
+            typeof(HandcalViews).GetMethod("OnSessionCreate", Own).Invoke(views, new object[] { 1ul });
         }
 
         [DllImport("libc.so.6")]

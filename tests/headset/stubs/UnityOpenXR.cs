@@ -12,5 +12,7 @@ namespace UnityEngine.XR.OpenXR.Features
     {
         /// <summary>Protected and internal in another assembly, which looks the same from here.</summary>
         protected virtual IntPtr HookGetInstanceProcAddr(IntPtr func) { return func; }
+        protected virtual void OnSessionCreate(ulong xrSession) { }
+        protected virtual void OnSessionDestroy(ulong xrSession) { }
     }
 }

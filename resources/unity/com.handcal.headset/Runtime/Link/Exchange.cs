@@ -103,7 +103,8 @@ namespace Handcal.Link
                         byte[] asked = cookie;
                         socket.Send(Request(name));
                         double resendS = clock.Elapsed.TotalSeconds + 0.001 * ResendMs;  // whatever else arrives
-                        while (asked == cookie && clock.Elapsed.TotalSeconds < resendS && socket.Poll(1000 * ResendMs, SelectMode.SelectRead))
+                        while (asked == cookie && clock.Elapsed.TotalSeconds < resendS
+                            && socket.Poll(1000 * ResendMs, SelectMode.SelectRead))
                         {
                             int size = socket.Receive(answer);
                             if (TryRead(answer, size, out byte[] key, out problem)) return key;

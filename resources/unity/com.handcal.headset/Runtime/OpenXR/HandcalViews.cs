@@ -34,7 +34,7 @@ namespace Handcal
 
         HeadsetState calibrated;
         int shownState;
-        bool isExpressed = true;
+        bool isHooked, isExpressed = true;
 
         public string Refusal { get; private set; } = "";
 
@@ -43,16 +43,27 @@ namespace Handcal
             try
             {
                 IntPtr hook = handcal_unity_hook(func);
-                HandcalHeadset.Native = this;
-                HandcalHeadset.PredictedTimeNs = handcal_unity_display_time_ns;
+                isHooked = true;
                 return hook;
             }
-            catch (DllNotFoundException error)
+            catch (Exception error) when (error is TypeLoadException || error is BadImageFormatException)
             {
-                Debug.LogWarning("handcal: the calibration is not drawn with, since the library " + Library
-                    + " is missing: build it for this platform as the package's manual says. " + error.Message);
+                Debug.LogWarning("handcal: the library " + Library + " is missing or of another platform: "
+                    + "build it as the package's manual says. " + error.Message);
                 return func;
             }
+        }
+
+        protected override void OnSessionCreate(ulong xrSession)
+        {
+            if (!isHooked) return;
+            HandcalHeadset.Native = this;
+            HandcalHeadset.PredictedTimeNs = () => HandcalHeadset.Native == null ? 0 : handcal_unity_display_time_ns();
+        }
+
+        protected override void OnSessionDestroy(ulong xrSession)
+        {
+            HandcalHeadset.Native = null;
         }
 
         public void Calibrate(HeadsetState state)
