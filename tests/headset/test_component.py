@@ -55,7 +55,7 @@ def library(player: Path) -> None:
     if shutil.which("gcc") is None or not all(path.exists() for path in needed):
         pytest.skip("needs gcc, libopenxr-dev and the views of the layer for OpenXR")
     for name, sources in (
-        ("handcal_unity", ("views.c", "unity.c")),
+        ("handcal_openxr", ("views.c", "unity.c")),
         ("unity_runtime", ("test/unity_runtime.c",)),
     ):
         paths = [str(ROOT / "resources/openxr" / source) for source in sources]
@@ -547,7 +547,7 @@ def test_without_the_library_the_cameras_are_set_and_it_is_said(
         app.until(is_connected)
         send_projections(server)
         told = app.until(lambda told: told["wearer"] == "Ada")
-        assert "library handcal_unity is missing" in told["log"]
+        assert "library handcal_openxr is missing" in told["log"]
         assert numbers(told["projection0"])[14] == -1.0
 
 

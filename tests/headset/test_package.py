@@ -21,11 +21,12 @@ WINDOWS = (
     "UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"
 )
 ANDROID = "UNITY_ANDROID"
+EDITOR = "UNITY_EDITOR;UNITY_2020_2_OR_NEWER"
 _GUID = re.compile(r"^guid: ([0-9a-f]{32})$", re.MULTILINE)
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("defines", [WINDOWS, ANDROID])
+@pytest.mark.parametrize("defines", [WINDOWS, ANDROID, EDITOR])
 def test_components_and_samples_compile_against_unity(
     compiled: Callable[..., Path], tmp_path: Path, defines: str
 ) -> None:

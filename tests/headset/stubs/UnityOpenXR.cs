@@ -16,3 +16,17 @@ namespace UnityEngine.XR.OpenXR.Features
         protected virtual void OnSessionDestroy(ulong xrSession) { }
     }
 }
+
+namespace UnityEditor
+{
+    public enum BuildTargetGroup { Standalone = 1, Android = 7, WSA = 14 }
+}
+
+namespace UnityEditor.XR.OpenXR.Features
+{
+    public class OpenXRFeatureAttribute : Attribute
+    {
+        public string UiName, Company, Version, FeatureId, Desc, OpenxrExtensionStrings;
+        public BuildTargetGroup[] BuildTargetGroups;
+    }
+}

@@ -26,7 +26,7 @@ namespace Handcal
     public sealed class HandcalViews : OpenXRFeature, INativeViews
     {
         public const string Id = "com.handcal.headset.views";
-        const string Library = "handcal_unity";
+        const string Library = "handcal_openxr";
         const int OwnNumbers = 11;
 
         [Tooltip("The runtime moves its views with the wearer's eyes, as HoloLens 2 and Magic Leap 2 do.")]
