@@ -259,14 +259,14 @@ namespace Handcal.Link
                 rejection = Rejection.Corrupt;
             }
             Interlocked.Increment(ref rejected[(int)rejection]);
+            if (rejection == Rejection.WrongVersion)
+                lock (gate) problem = "The PC speaks protocol " + received[2] + ", this app protocol " + Datagram.Version
+                    + ": update the older one";
         }
 
         Rejection Sort(int size)
         {
             Rejection rejection = Datagram.Read(received, size, out Packet packet);
-            if (rejection == Rejection.WrongVersion)
-                lock (gate) problem = "The PC speaks protocol " + received[2] + ", this app protocol " + Datagram.Version
-                    + ": update the older one";
             if (rejection != Rejection.None) return rejection;
             if (packet.Session == 0)
             {
