@@ -16,7 +16,7 @@ Slicer    x right, y forward (anterior), z up       column vectors, mm
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,10 +65,10 @@ class EyeCamera:
     """One eye as a camera of OpenGL or Unity; column vectors, clip space's z from -1 to +1."""
 
     projection: Float64
-    """(4, 4); clip space from V, in OpenGL's axes. It holds the whole of P, so its frustum is not
-    symmetric and its eye not at V's origin."""
+    """(4, 4); clip space from V for OpenGL, from the eye for Unity, in OpenGL's axes of V. Its
+    frustum is not symmetric."""
     view_from_head: Float64
-    """(4, 4); V, in OpenGL's axes, from the headset rig H, in the axes of the system."""
+    """(4, 4); V or the eye from the headset rig H, in the axes of the system."""
 
     def __post_init__(self) -> None:
         freeze(self, "projection", np.float64, 4, 4)
@@ -112,10 +112,7 @@ def to_unity(
     ((4, 4), (4, 4))
     """
     return {
-        eye: EyeCamera(
-            opengl_projection(projection, near_m, far_m),
-            unity_world_to_camera(rig.eyes[eye].T_V_H),
-        )
+        eye: unity_camera(projection, rig.eyes[eye].T_V_H, near_m, far_m)
         for eye, projection in _rendered(rig, results).items()
     }
 
@@ -126,7 +123,8 @@ def to_opengl(
     """Return both eyes as OpenGL cameras: x right, y up, z back.
 
     The model-view matrix of a point in H is `EyeCamera.view_from_head`, from the headset rig in
-    OpenGL's axes. Parameters and errors as `to_unity`; the projections are the same.
+    OpenGL's axes. `EyeCamera.projection` holds the eye's translation as well. Parameters and errors
+    as `to_unity`.
 
     Examples
     --------
@@ -197,6 +195,19 @@ def unity_world_to_camera(T_V_W: Float64) -> Float64:
     return _OPENGL_FROM_OPENCV @ T_V_W @ _UNITY_FROM_OPENCV
 
 
+def unity_camera(projection: Projection, T_V_H: Float64, near_m: float, far_m: float) -> EyeCamera:
+    """Return one eye as Unity's stereo camera, with the eye, P's centre, at the view's origin.
+
+    The last number of its projection is 0: Unity's shaders take any other for an orthographic
+    camera. Raises ValueError unless ``0 < near_m < far_m``.
+    """
+    P = projection.P
+    eye_V_m = -np.linalg.solve(P[:, :3], P[:, 3])
+    from_eye = replace(projection, P=np.column_stack([P[:, :3], np.zeros(3)]))
+    view = unity_world_to_camera(rigid(translation_m=-eye_V_m) @ T_V_H)
+    return EyeCamera(opengl_projection(from_eye, near_m, far_m), view)
+
+
 def slicer_transform(T: Float64) -> Float64:
     """Convert a rigid (4, 4) transform to 3D Slicer's: mm, axes right, anterior, superior.
 
@@ -215,7 +226,7 @@ def slicer_points_mm(points_m: ArrayLike) -> Float64:
 
 
 def opengl_projection(projection: Projection, near_m: float, far_m: float) -> Float64:
-    """Return the OpenGL projection matrix, which Unity's stereo cameras take as well.
+    """Return the OpenGL projection matrix; for Unity see `unity_camera`.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from handcal.core.conventions import (
     opengl_projection,
     opengl_transform,
     openxr_view,
-    unity_world_to_camera,
+    unity_camera,
 )
 from handcal.core.types import EYES, Eye, Projection
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
@@ -105,7 +105,6 @@ def _eye(outcome: SessionOutcome, eye: Eye, near_m: float, far_m: float) -> dict
             "T_V_H": display.T_V_H.tolist(),
         },
         "opengl": {"view_from_head": opengl_transform(display.T_V_H).tolist()},
-        "unity": {"view_from_head": unity_world_to_camera(display.T_V_H).tolist()},
         "calibrations": {
             origin: _solution(outcome, eye, origin, near_m, far_m)
             for origin in outcome.shifts_m[eye]
@@ -118,6 +117,7 @@ def _solution(
 ) -> dict[str, Any]:
     projection = outcome.projection(eye, origin)
     clip = opengl_projection(projection, near_m, far_m).tolist()
+    unity = unity_camera(projection, outcome.record.rig.eyes[eye].T_V_H, near_m, far_m)
     found: dict[str, Any] = {
         "is_applied": outcome.is_applied(eye, origin),
         "shift_m": outcome.shifts_m[eye][origin].tolist(),
@@ -133,7 +133,10 @@ def _solution(
     return found | {
         "opencv": {"P": projection.P.tolist()},
         "opengl": {"projection": clip},
-        "unity": {"projection": clip},
+        "unity": {
+            "projection": unity.projection.tolist(),
+            "view_from_head": unity.view_from_head.tolist(),
+        },
         **_openxr(projection),
     }
 

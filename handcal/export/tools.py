@@ -11,13 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from handcal.core.conventions import (
-    opengl_projection,
     opengl_transform,
     openxr_view,
     pose,
     slicer_points_mm,
     slicer_transform,
-    unity_world_to_camera,
+    unity_camera,
 )
 from handcal.core.errors import FileError
 from handcal.core.geometry import invert, rigid
@@ -41,11 +40,11 @@ def write_unity(path: Path, outcome: SessionOutcome, near_m: float, far_m: float
         "farM": far_m,
     }
     for eye in EYES:
-        clip = opengl_projection(outcome.projection(eye, outcome.final(eye)), near_m, far_m)
-        view = unity_world_to_camera(outcome.record.rig.eyes[eye].T_V_H)
+        projection = outcome.projection(eye, outcome.final(eye))
+        camera = unity_camera(projection, outcome.record.rig.eyes[eye].T_V_H, near_m, far_m)
         values[eye] = {
-            "projection": clip.ravel("F").tolist(),
-            "viewFromHead": view.ravel("F").tolist(),
+            "projection": camera.projection.ravel("F").tolist(),
+            "viewFromHead": camera.view_from_head.ravel("F").tolist(),
             "focusDistanceM": outcome.record.rig.eyes[eye].z_C0_S_m,
         }
     write_json(path, values)

@@ -10,8 +10,8 @@ from handcal.core.conventions import (
     opengl_transform,
     openxr_view,
     pose,
+    unity_camera,
     unity_transform,
-    unity_world_to_camera,
 )
 from handcal.core.display import projection_matrix, update_matrix
 from handcal.core.geometry import invert, project, rigid, transform
@@ -164,7 +164,9 @@ def test_unity_draws_every_point_on_the_pixel_of_p(
 ) -> None:
     projection = example_projection(eye, shift_m)
     points_unity = transform(invert(T_V_W), POINTS_V_M) * [1, -1, 1]
-    M = opengl_projection(projection, 0.1, 10.0) @ unity_world_to_camera(T_V_W)
+    camera = unity_camera(projection, T_V_W, 0.1, 10.0)
+    assert camera.projection[3].tolist() == [0.0, 0.0, -1.0, 0.0]  # as of any perspective camera
+    M = camera.projection @ camera.view_from_head
     pixels = pixels_from_clip(homogeneous(points_unity) @ M.T, projection)
     np.testing.assert_allclose(pixels, project(projection.P, POINTS_V_M), atol=1e-8)
 

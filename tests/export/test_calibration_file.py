@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.core.conventions import opengl_projection, openxr_view, unity_world_to_camera
+from handcal.core.conventions import opengl_projection, openxr_view, unity_camera
 from handcal.core.types import EYES, Eye, Rig
 from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
@@ -70,10 +70,8 @@ def test_json_holds_every_origin_in_every_convention(
     assert outcome.results is not None
     assert data["solved_eye_distance_m"] == outcome.results.eye_distance_m
     for eye in EYES:
-        found, display = data["eyes"][eye], outcome.record.rig.eyes[eye]
+        found = data["eyes"][eye]
         assert found["final"] == outcome.final(eye)
-        view = unity_world_to_camera(display.T_V_H)
-        assert found["unity"]["view_from_head"] == view.tolist()
         assert list(found["calibrations"]) == list(outcome.shifts_m[eye])
         for origin, each in found["calibrations"].items():
             projection = outcome.projection(eye, origin)
@@ -81,7 +79,10 @@ def test_json_holds_every_origin_in_every_convention(
             clip = opengl_projection(projection, 0.2, 50.0)
             assert each["shift_m"] == outcome.shifts_m[eye][origin].tolist()
             assert each["opencv"]["P"] == projection.P.tolist()
-            assert each["opengl"]["projection"] == each["unity"]["projection"] == clip.tolist()
+            assert each["opengl"]["projection"] == clip.tolist()
+            unity = unity_camera(projection, outcome.record.rig.eyes[eye].T_V_H, 0.2, 50.0)
+            assert each["unity"]["projection"] == unity.projection.tolist()
+            assert each["unity"]["view_from_head"] == unity.view_from_head.tolist()
             assert each["openxr"]["position_m"] == pose.position_m.tolist()
             assert each["openxr"]["left_rad"] == fov.left_rad
             assert ("verdict" in each) == (origin == "solved")

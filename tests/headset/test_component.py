@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -10,21 +13,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.core.conventions import unity_transform
-from handcal.core.display import projection_matrix
-from handcal.core.geometry import project, rigid, transform
+from handcal.core.conventions import opengl_transform, pose, unity_transform
+from handcal.core.display import projection_matrix, target_corners_m
+from handcal.core.errors import PoseError
+from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.types import EYES, Eye, Float64, Projection
-from handcal.link.nudges import VerifyRequest
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairings
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
-from handcal.link.shapes import Shape
+from handcal.link.shapes import Shape, Target
 from handcal.rig.example import example_rig
 from tests.headset.conftest import PACKAGE
 from tests.headset.unity_player import PATIENCE_S, UnityPlayer, numbers
 from tests.helpers import ROOT, eventually
 
 pytestmark = pytest.mark.process
-DEFINES = "UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"
+DEFINES = "HANDCAL_OPENXR_TIME;UNITY_WSA;ENABLE_LEGACY_INPUT_MANAGER;UNITY_2020_2_OR_NEWER"
 SHIFT_M = (0.003, 0.001, 0.005)
 SQUARE_M = np.array(
     [[x, y, 0.5] for x, y in ((-0.04, -0.03), (0.04, -0.03), (0.04, 0.05), (-0.04, 0.05))]
@@ -36,9 +40,29 @@ Start = Callable[..., UnityPlayer]
 @pytest.fixture(scope="session")
 def player(compiled: Callable[..., Path]) -> Path:
     folders = ("tests/headset/stubs", "tests/headset/player")
-    package = ("Runtime", "Runtime/Link", "Samples~/Calibration")
+    package = (
+        *map("Runtime/{}".format, ("", "Link", "MixedReality", "OpenXR")),
+        "Samples~/Calibration",
+    )
     sources = [*(ROOT / one for one in folders), *(PACKAGE / one for one in package)]
     return compiled("player.exe", *sources, defines=DEFINES)
+
+
+@pytest.fixture(scope="session")
+def library(player: Path) -> None:
+    """Build the library of the native views, and a runtime, where the player finds them."""
+    needed = Path("/usr/include/openxr/openxr.h"), ROOT / "resources/openxr/views.c"
+    if shutil.which("gcc") is None or not all(path.exists() for path in needed):
+        pytest.skip("needs gcc, libopenxr-dev and the views of the layer for OpenXR")
+    for name, sources in (
+        ("handcal_openxr", ("views.c", "unity.c")),
+        ("unity_runtime", ("test/unity_runtime.c",)),
+    ):
+        paths = [str(ROOT / "resources/openxr" / source) for source in sources]
+        command = ["gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", *paths, "-lm"]
+        command += ["-o", str(player.parent / f"lib{name}.so")]
+        run = subprocess.run(command, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
 
 
 @pytest.fixture
@@ -160,7 +184,14 @@ def test_points_are_drawn_where_the_eye_needs_them(
         P = projection_matrix(display, SHIFT_M)
         expected_px = project(P, transform(display.T_V_H, SQUARE_M))
         clip = numbers(told[f"projection{number}"]).reshape(4, 4)
+        assert clip[3].tolist() == [0, 0, -1, 0]  # else shaders take it for orthographic
         clip = clip @ numbers(told[f"view{number}"]).reshape(4, 4)
+        # All that an eye sees is in the frustum of culling, which is not much wider.
+        corners = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1], [1]), -1).reshape(-1, 4)
+        seen = corners @ np.linalg.inv(clip).T
+        culled = seen @ numbers(told["culling"]).reshape(4, 4).T
+        reach = np.abs(culled[:, :3] / culled[:, 3:]).max(axis=0)
+        assert ((reach > [0.9, 0.7, 0.9]) & (reach < 1)).all()
         for what, most_px in (("shape", 0.01), ("cursor", 0.3)):  # float32; quanta of 0.1 mm
             world = numbers(told[what]).reshape(-1, 3)
             found = np.column_stack([world, np.ones(4)]) @ clip.T
@@ -175,9 +206,45 @@ def test_points_are_drawn_where_the_eye_needs_them(
     distance_m = display.z_C0_S_m - display.t_C0_V_m[2]
     clip = numbers(told["view0"]).reshape(4, 4)
     in_V = (clip @ [*numbers(told["focus"]), 1.0])[:3]
-    in_H = display.T_V_H[:3, :3].T @ (in_V * [1, -1, -1] - display.T_V_H[:3, 3])
+    P = projection_matrix(display, SHIFT_M)
+    in_V = in_V * [1, -1, -1] - np.linalg.solve(P[:, :3], P[:, 3])
+    in_H = display.T_V_H[:3, :3].T @ (in_V - display.T_V_H[:3, 3])
     np.testing.assert_allclose(in_H, [0, 0, distance_m], atol=1e-3)
+    # HoloLens 2 takes it under OpenXR by another call in each frame, of each pipeline.
+    mode, *plane = told["reprojection"].split()
+    assert mode == "PlanarManual"
+    np.testing.assert_array_equal(numbers(" ".join(plane[:3])), numbers(told["focus"]))
+    assert np.linalg.norm(numbers(" ".join(plane[3:]))) == pytest.approx(1, abs=1e-6)
+    app.do("pipeline")
+    assert app.state()["reprojection"] == told["reprojection"]
     assert faults(told) == []
+    app.do("set setsFocusPlane=false")
+    assert "PlanarManual" not in app.state()["reprojection"]
+
+
+def test_the_target_is_drawn_where_the_eye_needs_it(start: Start, server: HeadsetServer) -> None:
+    """It is fixed in V, while the view that is drawn with has the eye at its origin."""
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    corners_V_m = target_corners_m(0.5)
+    server.send_target(Target("right", corners_V_m))
+    display = example_rig().eyes["right"]
+    size = display.width_px, display.height_px
+    for shift_m in (SHIFT_M, (-0.002, 0.004, -0.003)):
+        P = projection_matrix(display, shift_m)
+        server.send_projection(Projection("right", P, *size, display.T_V_H, P, "Ada", "rig A"))
+        expected_px = project(P, corners_V_m)
+
+        def is_there(told: Mapping[str, str], expected_px: Float64 = expected_px) -> bool:
+            in_view = numbers(told["target"]).reshape(-1, 3)
+            if len(in_view) != 4:
+                return False
+            clip = np.column_stack([in_view, np.ones(4)])
+            clip = clip @ numbers(told["projection1"]).reshape(4, 4).T
+            ndc = clip[:, :2] / clip[:, 3:] * [1, -1]
+            return bool(np.abs(0.5 * (1 + ndc) * size - 0.5 - expected_px).max() < 0.01)
+
+        app.until(is_there)
 
 
 def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
@@ -218,6 +285,39 @@ def test_a_calibration_by_keys(start: Start, server: HeadsetServer) -> None:
     assert (last.moved.down_arcmin, last.moved.size) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    "gesture",
+    ["TriggerButton", "left PrimaryButton", "right PointerActivated", "right PinchTouched"],
+)
+def test_a_hand_confirms_and_never_nudges(
+    start: Start, server: HeadsetServer, gesture: str
+) -> None:
+    """An air tap of HoloLens 2 is its hand's primary button, which enlarges on a controller."""
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+    server.send_cursor(SQUARE_M, 7)
+    app.until(lambda told: told["cursor"])
+    app.do("hold left GripButton", "hold right SecondaryButton", f"hold {gesture}", "frames 5")
+    confirmations: list[Confirmation] = []
+
+    def is_confirmed(_: object) -> bool:
+        confirmations.extend(server.confirmations())
+        return bool(confirmations)
+
+    app.until(is_confirmed)
+    server.send_verify(VerifyRequest(3, "right", 1.0, 0.002))
+    nudges: list[Nudge] = []
+
+    def is_nudged(_: object) -> bool:
+        app.do(f"release {gesture}", "frames 2", f"hold {gesture}")
+        nudges.extend(server.nudges())
+        return bool(nudges)
+
+    app.until(is_nudged)
+    assert all(nudge.fits and nudge.moved == NudgeSum() for nudge in nudges)
+    assert len(confirmations) == 1
+
+
 def test_the_calibration_is_kept_when_the_app_and_the_pc_are_gone(
     start: Start, pairings: Pairings
 ) -> None:
@@ -252,8 +352,44 @@ def test_settings_that_make_a_calibration_worthless_are_said_in_view(
     assert len(faults(app.state(3))) == 1  # said once
 
 
+def test_a_pose_is_stamped_with_the_time_that_the_runtime_predicts(
+    start: Start, server: HeadsetServer
+) -> None:
+    app = start(invitation=invitation(server))
+    app.until(is_connected)
+
+    app.state(30)
+    assert not is_ahead(server)
+    app.do("ahead 40")
+    app.until(lambda _: is_ahead(server))
+
+
+def test_the_runtime_s_views_are_told_as_they_are_now(start: Start, server: HeadsetServer) -> None:
+    app = start(invitation=invitation(server))
+    app.place("eyes", [0.0630])
+    app.until(is_connected)
+    app.state(70)  # more than a second of identities
+    assert server.device is not None
+    assert not server.device.views
+    send_projections(server)
+    app.until(lambda told: told["wearer"] == "Ada")
+    for right, up in ((0.4, 0.3), (0.5, 0.35)):
+        app.place("edges", [right, up])
+
+        def is_reported(_: object, right: float = right, up: float = up) -> bool:
+            edges = [-right, right, -up, up]
+            views = () if server.device is None else server.device.views.values()
+            found = [
+                (view.width_px, np.allclose(view.tangents, edges, atol=1e-6)) for view in views
+            ]
+            return found == [(1440, True)] * 2
+
+        app.until(is_reported)
+
+
 def test_a_view_that_moves_is_said_once(start: Start) -> None:
     app = start()
+    app.place("edges", [0.4, 0.3])
     app.place("eyes", [0.0630])
     app.state(2)
     app.place("eyes", [0.0650])
@@ -305,7 +441,8 @@ def test_a_disabled_component_leaves_nothing_and_comes_back(
     told = app.state()
     assert (told["connected"], told["text"]) == ("False", "")
     assert "cursor" not in told
-    assert numbers(told["projection0"])[0] == 2.0  # the runtime's own
+    assert numbers(told["projection0"])[0] == 1.0  # the runtime's own
+    assert not numbers(told["culling"]).any()
     eventually(lambda: not server.connected, PATIENCE_S)
     app.do("enable")
     app.until(is_connected)
@@ -341,3 +478,100 @@ def test_an_app_that_cannot_write_says_so_and_is_paired(
     (tmp_path / "app/handcal-pairing.txt.part").mkdir(parents=True)
     told = start(invitation=invitation(server)).until(is_connected)
     assert "Cannot write" in told["warning"]
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize(("native", "wider_m"), [("stays", 0.0), ("moves", 0.004)])
+def test_the_openxr_plug_in_draws_with_the_calibration_in_every_pipeline(
+    start: Start, server: HeadsetServer, native: str, wider_m: float
+) -> None:
+    """Unity gets the calibrated views, and the runtime its own, whatever the head does."""
+    app = start(invitation=invitation(server), native=native)
+    own_H = np.reshape(own_views(wider_m), (2, 11))
+    app.place("own", own_H.ravel())
+    app.do("pipeline", "single")
+    app.until(is_connected)
+    send_projections(server)
+    app.until(lambda told: told["wearer"] == "Ada")
+    for _ in range(20):
+        told = app.state()
+        given, received, own = numbers(told["native"]).reshape(3, 2, 11)
+        np.testing.assert_array_equal(received, own)
+        for number, eye in enumerate(EYES):
+            display = example_rig().eyes[eye]
+            T_W_H = at(own[number]) @ invert(at(own_H[number]))
+            T_W_V = T_W_H @ opengl_transform(invert(display.T_V_H))
+            seen_m = transform(invert(at(given[number])) @ T_W_V, SQUARE_M * [1, -1, -1])
+            left, right, up, down = np.tan(given[number, 7:])
+            share = (seen_m[:, :2] / -seen_m[:, 2:] - [left, up]) / [right - left, down - up]
+            pixels = share * [display.width_px, display.height_px] - 0.5
+            P = projection_matrix(display, SHIFT_M)
+            np.testing.assert_allclose(pixels, project(P, SQUARE_M), atol=0.01)
+    assert told["layer"] == "1"  # switched off: it would correct as well
+    assert numbers(told["projection0"])[0] == 0.0  # the camera is left alone
+    assert told["warning"] == ""
+    app.until(lambda _: server.device is not None and len(server.device.views) == 2)
+    assert server.device is not None
+    for eye, view in server.device.views.items():
+        T_H_V = opengl_transform(at(own_H[EYES.index(eye)]))
+        np.testing.assert_allclose(view.T_V_H, invert(T_H_V), atol=1e-6)
+        np.testing.assert_allclose(view.tangents, [-0.4, 0.5, -0.3, 0.2], atol=1e-6)
+    app.until(lambda _: is_ahead(server))
+    assert faults(told) == []
+    app.do("disable")
+    given, _, own = numbers(app.state(2)["native"]).reshape(3, 2, 11)
+    np.testing.assert_array_equal(given, own)
+
+
+@pytest.mark.usefixtures("library")
+def test_views_that_are_not_the_rig_s_are_refused_in_view(
+    start: Start, server: HeadsetServer
+) -> None:
+    app = start(invitation=invitation(server), native="stays")
+    app.place("own", own_views(wider_m=0.004))
+    app.until(is_connected)
+    send_projections(server)
+    told = app.until(lambda told: "4.0 mm" in told["text"].replace("/", " "))
+    given, _, own = numbers(told["native"]).reshape(3, 2, 11)
+    np.testing.assert_array_equal(given, own)
+    app.place("own", own_views())
+    told = app.until(lambda told: "mm" not in told["text"])
+    assert (told["warning"], len(faults(told))) == ("", 1)
+
+
+def test_without_the_library_the_cameras_are_set_and_it_is_said(
+    player: Path, server: HeadsetServer, tmp_path: Path
+) -> None:
+    alone = Path(shutil.copy(player, tmp_path))  # libraries are looked for beside it
+    with UnityPlayer(alone, tmp_path / "app", invitation=invitation(server), native="stays") as app:
+        app.until(is_connected)
+        send_projections(server)
+        told = app.until(lambda told: told["wearer"] == "Ada")
+        assert "library handcal_openxr is missing" in told["log"]
+        assert numbers(told["projection0"])[14] == -1.0
+
+
+def own_views(wider_m: float = 0.0) -> list[float]:
+    """Return the rig's views in the head for OpenXR, perhaps farther apart: poses and angles."""
+    found: list[float] = []
+    for eye in EYES:
+        T_H_V = opengl_transform(invert(example_rig().eyes[eye].T_V_H))
+        one = pose(T_H_V)
+        apart_m = [wider_m * (eye == "right"), 0.0, 0.0]
+        fov_rad = np.arctan([-0.4, 0.5, 0.3, -0.2])
+        found += [*one.quaternion_xyzw, *(one.position_m + apart_m), *fov_rad]
+    return found
+
+
+def at(view: Float64) -> Float64:
+    """Return the transform of a view's pose, from the view to its space."""
+    return rigid(Rotation.from_quat(view[:4]).as_rotvec(), view[4:7])
+
+
+def is_ahead(server: HeadsetServer) -> bool:
+    """Return whether the PC knows a pose for a time that is still to come."""
+    try:
+        server.pose_at_host_ns(time.monotonic_ns() + 20_000_000)
+    except PoseError:
+        return False
+    return True

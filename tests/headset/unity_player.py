@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -25,7 +26,7 @@ class UnityPlayer(Closable):
     folder : path
         The app's folder, which outlives it.
     fields : str
-        Fields of the component, by their names.
+        Fields of the component, by their names; "native" hooks the native views.
     """
 
     def __init__(self, program: Path, folder: Path, **fields: str) -> None:
@@ -36,6 +37,7 @@ class UnityPlayer(Closable):
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
+            env={**os.environ, "LD_LIBRARY_PATH": str(program.parent)},
         )
 
     def do(self, *orders: str) -> None:

@@ -3,6 +3,7 @@ using System.Collections.Generic;
 using System.Globalization;
 using System.Linq;
 using System.Reflection;
+using System.Runtime.InteropServices;
 using System.Text;
 using System.Threading;
 using UnityEngine;
@@ -21,6 +22,8 @@ namespace Handcal.Tests
         static readonly List<MonoBehaviour> Behaviours = new List<MonoBehaviour>();
         static readonly Matrix4x4[] Projections = new Matrix4x4[2], Views = new Matrix4x4[2];
         static readonly string[] Hidden = { "", "" };
+        static readonly float[] NativeViews = new float[66];
+        static IntPtr hook;
         static Camera camera;
         static HandcalHeadset headset;
 
@@ -29,18 +32,49 @@ namespace Handcal.Tests
         {
             CultureInfo.CurrentCulture = new CultureInfo("de-DE");  // a decimal comma changes nothing
             Application.persistentDataPath = arguments[0];
+            const BindingFlags Static = BindingFlags.Static | BindingFlags.NonPublic;
+            foreach (MethodInfo one in typeof(HandcalHeadset).Assembly.GetTypes().SelectMany(type => type.GetMethods(Static)))
+                if (one.GetCustomAttributes(typeof(RuntimeInitializeOnLoadMethodAttribute), false).Any()) one.Invoke(null, null);
             var holder = new GameObject("Main Camera");
             camera = holder.AddComponent<Camera>();
             headset = Add<HandcalHeadset>(holder);
             Add<FollowHead>(holder);
             Add<PairByTyping>(holder).headset = headset;
-            foreach (string field in arguments.Skip(1)) Set(field);
+            foreach (string field in arguments.Skip(1).Where(one => !one.StartsWith("native="))) Set(field);
             Head(new float[] { 0, 0, 0, 0, 0, 0, 1 });
+            string native = arguments.FirstOrDefault(one => one.StartsWith("native="));
+            if (native != null) Hook(native == "native=moves");
             foreach (MonoBehaviour one in Behaviours) Call(one, "OnEnable");
             string line;
             while ((line = Console.ReadLine()) != null) Obey(line.Split(new[] { ' ' }, 2));
             foreach (MonoBehaviour one in Behaviours) Call(one, "OnDisable");
         }
+
+        /// <summary>Hooks the views into the runtime of resources/openxr/test, as Unity's plug-in does.</summary>
+        static void Hook(bool movesViews)
+        {
+            var views = new HandcalViews { movesViews = movesViews };
+            const BindingFlags Own = BindingFlags.Instance | BindingFlags.NonPublic;
+            IntPtr runtime = dlopen("libunity_runtime.so", 2);
+            object[] get = { runtime == IntPtr.Zero ? IntPtr.Zero : dlsym(runtime, "test_get") };
+            hook = (IntPtr)typeof(HandcalViews).GetMethod("HookGetInstanceProcAddr", Own).Invoke(views, get);
+            typeof(HandcalViews).GetMethod("OnSessionCreate", Own).Invoke(views, new object[] { 1ul });
+        }
+
+        [DllImport("libc.so.6")]
+        static extern IntPtr getenv(string name);
+
+        [DllImport("libdl.so.2")]
+        static extern IntPtr dlopen(string name, int flags);
+
+        [DllImport("libdl.so.2")]
+        static extern IntPtr dlsym(IntPtr library, string name);
+
+        [DllImport("unity_runtime")]
+        static extern void test_views(float[] numbers);
+
+        [DllImport("unity_runtime")]
+        static extern void test_frame(IntPtr get, float[] to);
 
         static T Add<T>(GameObject holder) where T : MonoBehaviour
         {
@@ -58,7 +92,12 @@ namespace Handcal.Tests
                 case "head": Head(Numbers(rest)); break;
                 case "eyes": Eyes(Numbers(rest)[0]); break;
                 case "parent": Parent(Numbers(rest)); break;
+                case "edges": Edges(Numbers(rest)); break;
+                case "ahead": Microsoft.MixedReality.OpenXR.OpenXRTime.StubAheadNs = (long)(1e6 * Numbers(rest)[0]); break;
+                case "own": test_views(Numbers(rest)); break;
                 case "press": Input.StubPressed.Add((KeyCode)Enum.Parse(typeof(KeyCode), rest)); break;
+                case "hold": InputDevice.StubFeatures[rest] = true; break;
+                case "release": InputDevice.StubFeatures[rest] = false; break;
                 case "type":
                     TouchScreenKeyboard.StubOpen.text = rest;
                     TouchScreenKeyboard.StubOpen.status = TouchScreenKeyboard.Status.Done;
@@ -66,7 +105,7 @@ namespace Handcal.Tests
                 case "set": Set(rest); break;
                 case "kept": headset.ShowKept(rest); break;
                 case "mono": camera.stereoEnabled = false; break;
-                case "single": XRSettings.stereoRenderingMode = XRSettings.StereoRenderingMode.SinglePassInstanced; break;
+                case "single": XRDisplaySubsystem.StubOnly.StubIsSinglePass = true; break;
                 case "pipeline": UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline = new UnityEngine.Rendering.StubPipeline(); break;
                 case "disable": Call(headset, "OnDisable"); headset.enabled = false; break;
                 case "enable": headset.enabled = true; Call(headset, "OnEnable"); break;
@@ -84,10 +123,13 @@ namespace Handcal.Tests
             }
             foreach (MonoBehaviour one in Behaviours.Where(one => one.enabled).ToList()) Call(one, "Update");
             Input.StubPressed.Clear();
+            if (hook != IntPtr.Zero) test_frame(hook, NativeViews);
             Application.StubBeforeRender();
+            Microsoft.MixedReality.OpenXR.ViewConfiguration.StubSettings = new Microsoft.MixedReality.OpenXR.ReprojectionSettings();
             // A scriptable pipeline renders without these calls.
             bool isBuiltIn = UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline == null;
             for (int eye = 0; eye < (camera.stereoEnabled ? 2 : 1) && isBuiltIn; eye++) Render(eye);
+            if (!isBuiltIn) UnityEngine.Rendering.RenderPipelineManager.StubEnd(camera);
             Time.realtimeSinceStartup += 1f / 60;  // whatever a frame takes here
             Thread.Sleep(4);
         }
@@ -101,13 +143,14 @@ namespace Handcal.Tests
             var side = (Camera.StereoscopicEye)eye;
             Projections[eye] = camera.stereoEnabled ? camera.GetStereoProjectionMatrix(side) : camera.projectionMatrix;
             Views[eye] = camera.stereoEnabled ? camera.GetStereoViewMatrix(side) : camera.worldToCameraMatrix;
+            Camera.onPostRender?.Invoke(camera);
             Hidden[eye] = string.Join(",", Drawn().Where(IsHidden).Select(one => one.name.Substring(8)));
         }
 
         static bool IsHidden(GameObject one)
         {
-            one.StubComponents.OfType<MeshRenderer>().Single().sharedMaterial.StubFloats.TryGetValue("_IsHidden", out float hidden);
-            return hidden > 0.5f;
+            var floats = one.StubComponents.OfType<MeshRenderer>().Single().sharedMaterial.StubFloats;
+            return floats["_Eyes"] != 3 && floats["_Eyes"] != floats["_Eye"];
         }
 
         static IEnumerable<GameObject> Drawn()
@@ -135,8 +178,14 @@ namespace Handcal.Tests
                 Say("view" + eye, Matrix(Views[eye]));
                 Say("hidden" + eye, Hidden[eye]);
             }
+            Say("layer", Marshal.PtrToStringAnsi(getenv("HANDCAL_OPENXR_OFF")));
+            Say("native", Write(NativeViews));
+            Say("culling", Matrix(camera.cullingMatrix));
             Vector3 focus = XRDisplaySubsystem.StubOnly.StubFocus;
             Say("focus", Write(focus.x, focus.y, focus.z));
+            var plane = Microsoft.MixedReality.OpenXR.ViewConfiguration.StubSettings;
+            Vector3 at = plane.ReprojectionPlaneOverridePosition ?? Vector3.zero, normal = plane.ReprojectionPlaneOverrideNormal ?? Vector3.zero;
+            Say("reprojection", plane.ReprojectionMode + " " + Write(at.x, at.y, at.z, normal.x, normal.y, normal.z));
             Console.WriteLine();
         }
 
@@ -184,6 +233,15 @@ namespace Handcal.Tests
                 InputDevice.StubFeatures[side + "EyePosition"] = new Vector3(x, 0, 0);
                 InputDevice.StubFeatures[side + "EyeRotation"] = Quaternion.identity;
             }
+        }
+
+        /// <summary>The runtime's projection, by the tangents of its right and its upper edge.</summary>
+        static void Edges(float[] n)
+        {
+            var projection = Matrix4x4.TRS(Vector3.zero, Quaternion.identity, new Vector3(1 / n[0], 1 / n[1], -1));
+            projection[3, 2] = -1;
+            projection[3, 3] = 0;
+            Camera.StubRuntimeProjection = projection;
         }
 
         /// <summary>Gives the camera a parent: position, quaternion and scale.</summary>

@@ -27,6 +27,12 @@ namespace Handcal.Link.Tests
                 case "hostile": Lines(Hostile); break;
                 case "run": new Remote(arguments).Run(); break;
                 case "time": Timing.Run(arguments); break;
+                case "made":
+                    using (var random = RandomNumberGenerator.Create()) Console.WriteLine(random.GetType());
+                    using (var hash = SHA256.Create()) Console.WriteLine(hash.GetType());
+                    using (var hash = HashAlgorithm.Create(new HMACSHA256().HashName)) Console.WriteLine(hash.GetType());
+                    break;
+                case "frames": Timing.Frames(int.Parse(arguments[1])); break;
                 default: return 2;
             }
             return 0;
@@ -91,7 +97,7 @@ namespace Handcal.Link.Tests
             double[] all = Read(line);
             double[] P = Part(all, 0, 12), view = Part(all, 12, 12);
             double[] clip = Link.Matrices.UnityProjection(P, (int)all[24], (int)all[25], all[26], all[27]);
-            return Write(clip) + " " + Write(Link.Matrices.UnityViewFromHead(view));
+            return Write(clip) + " " + Write(Link.Matrices.UnityViewFromHead(view, P));
         }
 
         /// <summary>The pose, then its inverse, then their product.</summary>
@@ -332,6 +338,34 @@ namespace Handcal.Link.Tests
                     if (waitS > 0) Thread.Sleep(TimeSpan.FromSeconds(waitS));
                 }
                 Console.WriteLine(frames + " " + (long)(Cpu(process) - cpuMs) + " " + points);
+            }
+        }
+
+        /// <summary>
+        /// Draws 90 frames a second with the PC at this port of the machine. Prints for each line of
+        /// the input, a time in seconds, the milliseconds of its slowest frame and the strangers' datagrams.
+        /// </summary>
+        public static void Frames(int port)
+        {
+            var TWH = new double[] { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0 };
+            var clock = Stopwatch.StartNew();
+            using (var link = new HeadsetLink("127.0.0.1", port, new byte[16], 7, new Device(), new Kept(), () => 0))
+            {
+                string line;
+                while ((line = Console.ReadLine()) != null)
+                {
+                    double endS = clock.Elapsed.TotalSeconds + double.Parse(line, CultureInfo.InvariantCulture), worstMs = 0;
+                    long before = link.Rejected(Rejection.Unpaired);
+                    while (clock.Elapsed.TotalSeconds < endS)
+                    {
+                        double startMs = clock.Elapsed.TotalMilliseconds;
+                        link.State();
+                        link.SendPose(TWH, 1);
+                        worstMs = Math.Max(worstMs, clock.Elapsed.TotalMilliseconds - startMs);
+                        Thread.Sleep(11);
+                    }
+                    Console.WriteLine((long)Math.Ceiling(worstMs) + " " + (link.Rejected(Rejection.Unpaired) - before));
+                }
             }
         }
 

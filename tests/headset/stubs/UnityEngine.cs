@@ -104,6 +104,14 @@ namespace UnityEngine
         public BeforeRenderOrderAttribute(int order) { this.order = order; }
     }
 
+    public enum RuntimeInitializeLoadType { AfterSceneLoad, BeforeSceneLoad, SubsystemRegistration }
+
+    [AttributeUsage(AttributeTargets.Method)]
+    public class RuntimeInitializeOnLoadMethodAttribute : Attribute
+    {
+        public RuntimeInitializeOnLoadMethodAttribute(RuntimeInitializeLoadType loadType) { }
+    }
+
     public delegate void UnityAction();
 
     public class Application
@@ -155,8 +163,12 @@ namespace UnityEngine
         public enum StereoscopicEye { Left, Right }
         public enum MonoOrStereoscopicEye { Left, Right, Mono }
 
-        static readonly Matrix4x4 RuntimeProjection = Matrix4x4.TRS(Vector3.zero, Quaternion.identity, new Vector3(2, 3, 1));
-        readonly Matrix4x4[] projections = { RuntimeProjection, RuntimeProjection };
+        public delegate void CameraCallback(Camera cam);
+        public static CameraCallback onPostRender;
+
+        /// <summary>At first the identity, as Unity's documentation says of the first frames.</summary>
+        public static Matrix4x4 StubRuntimeProjection = Matrix4x4.identity;
+        readonly Matrix4x4[] projections = { StubRuntimeProjection, StubRuntimeProjection };
         readonly Matrix4x4[] views = { Matrix4x4.identity, Matrix4x4.identity };
         public bool stereoEnabled { get; set; } = true;
         public MonoOrStereoscopicEye stereoActiveEye { get; set; }
@@ -168,10 +180,18 @@ namespace UnityEngine
         public Matrix4x4 GetStereoViewMatrix(StereoscopicEye eye) { return views[(int)eye]; }
         public void SetStereoProjectionMatrix(StereoscopicEye eye, Matrix4x4 matrix) { projections[(int)eye] = matrix; }
         public void SetStereoViewMatrix(StereoscopicEye eye, Matrix4x4 matrix) { views[(int)eye] = matrix; }
-        public void ResetStereoProjectionMatrices() { projections[0] = projections[1] = RuntimeProjection; }
+        public void ResetStereoProjectionMatrices() { projections[0] = projections[1] = StubRuntimeProjection; }
         public void ResetStereoViewMatrices() { views[0] = views[1] = Matrix4x4.identity; }
         public void ResetProjectionMatrix() { projectionMatrix = new Matrix4x4(); }
         public void ResetWorldToCameraMatrix() { worldToCameraMatrix = new Matrix4x4(); }
+        public Matrix4x4 cullingMatrix { get; set; }
+        public void ResetCullingMatrix() { cullingMatrix = new Matrix4x4(); }
+    }
+
+    public struct RenderTextureDescriptor
+    {
+        public int width { get; set; }
+        public int height { get; set; }
     }
 
     public enum MeshTopology { Triangles, Quads = 2, Lines, LineStrip, Points }

@@ -41,6 +41,13 @@ namespace UnityEngine
         }
     }
 
+    public struct Mathf
+    {
+        public static float Abs(float f) { return Math.Abs(f); }
+        public static float Min(float a, float b) { return Math.Min(a, b); }
+        public static float Max(float a, float b) { return Math.Max(a, b); }
+    }
+
     public struct Color
     {
         public float r, g, b, a;
@@ -91,6 +98,11 @@ namespace UnityEngine
         public Vector3 MultiplyPoint3x4(Vector3 p)
         {
             return new Vector3(Row(0, p), Row(1, p), Row(2, p));
+        }
+
+        public Vector3 MultiplyPoint(Vector3 p)
+        {
+            return 1 / Row(3, p) * MultiplyPoint3x4(p);
         }
 
         /// <summary>The inverse, by Gauss and Jordan.</summary>

@@ -10,6 +10,14 @@ namespace UnityEngine.Rendering
     public abstract class RenderPipelineAsset : Object { }
     public sealed class StubPipeline : RenderPipelineAsset { }
 
+    public struct ScriptableRenderContext { }
+
+    public static class RenderPipelineManager
+    {
+        public static event Action<ScriptableRenderContext, Camera> endCameraRendering;
+        public static void StubEnd(Camera camera) { endCameraRendering?.Invoke(new ScriptableRenderContext(), camera); }
+    }
+
     public sealed class GraphicsSettings : Object
     {
         public static RenderPipelineAsset currentRenderPipeline { get; set; }
@@ -41,18 +49,25 @@ namespace UnityEngine.XR
         public static InputFeatureUsage<Quaternion> centerEyeRotation = new InputFeatureUsage<Quaternion>("CenterEyeRotation");
     }
 
+    [Flags]
+    public enum InputDeviceCharacteristics : uint { None = 0, HeadMounted = 1, HeldInHand = 4, HandTracking = 8, Controller = 64 }
+
     public struct InputDevice
     {
-        /// <summary>The head, the eyes and a controller's buttons, by the names of the features.</summary>
+        /// <summary>The head, the eyes, a controller's and the hands' buttons, by the names of the features.</summary>
         public static readonly Dictionary<string, object> StubFeatures = new Dictionary<string, object>();
+        public InputDeviceCharacteristics characteristics { get; set; }
         public bool TryGetFeatureValue(InputFeatureUsage<bool> usage, out bool value) { return Get(usage.name, out value); }
         public bool TryGetFeatureValue(InputFeatureUsage<Vector2> usage, out Vector2 value) { return Get(usage.name, out value); }
         public bool TryGetFeatureValue(InputFeatureUsage<Vector3> usage, out Vector3 value) { return Get(usage.name, out value); }
         public bool TryGetFeatureValue(InputFeatureUsage<Quaternion> usage, out Quaternion value) { return Get(usage.name, out value); }
 
-        static bool Get<T>(string name, out T value)
+        /// <summary>Features of a hand begin with its place among the devices.</summary>
+        public string StubPrefix;
+
+        bool Get<T>(string name, out T value)
         {
-            bool isKnown = StubFeatures.TryGetValue(name, out object found);
+            bool isKnown = StubFeatures.TryGetValue(StubPrefix + name, out object found);
             value = isKnown ? (T)found : default(T);
             return isKnown;
         }
@@ -62,28 +77,56 @@ namespace UnityEngine.XR
     {
         public static void GetDevices(List<InputDevice> devices)
         {
+            GetDevicesAtXRNode(XRNode.Head, devices);
+            foreach (string hand in new[] { "left ", "right " })
+                devices.Add(new InputDevice { characteristics = InputDeviceCharacteristics.HandTracking, StubPrefix = hand });
+        }
+
+        public static void GetDevicesAtXRNode(XRNode node, List<InputDevice> devices)
+        {
             devices.Clear();
             devices.Add(new InputDevice());
         }
-
-        public static void GetDevicesAtXRNode(XRNode node, List<InputDevice> devices) { GetDevices(devices); }
     }
 
-    public static class XRSettings
+    public class XRDisplaySubsystemDescriptor
     {
-        public enum StereoRenderingMode { MultiPass, SinglePass, SinglePassInstanced, SinglePassMultiview }
-        public static StereoRenderingMode stereoRenderingMode { get; set; }
-        public static int eyeTextureWidth { get { return 1440; } }
-        public static int eyeTextureHeight { get { return 936; } }
-        public static string loadedDeviceName { get { return "stub"; } }
+        public string id { get { return "stub"; } }
     }
 
     public class XRDisplaySubsystem
     {
+        public struct XRRenderParameter
+        {
+            public Matrix4x4 view, projection;
+        }
+
+        public struct XRRenderPass
+        {
+            public RenderTextureDescriptor renderTargetDesc;
+            public int StubEyes;
+            public int GetRenderParameterCount() { return StubEyes; }
+
+            public void GetRenderParameter(Camera camera, int renderParameterIndex, out XRRenderParameter renderParameter)
+            {
+                renderParameter = new XRRenderParameter { projection = Camera.StubRuntimeProjection };
+            }
+        }
+
         public static readonly XRDisplaySubsystem StubOnly = new XRDisplaySubsystem();
         public Vector3 StubFocus;
+        public bool StubIsSinglePass;
+        public XRDisplaySubsystemDescriptor subsystemDescriptor { get { return new XRDisplaySubsystemDescriptor(); } }
+        public XRDisplaySubsystemDescriptor SubsystemDescriptor { get { return subsystemDescriptor; } }
         public bool running { get { return true; } }
         public void SetFocusPlane(Vector3 point, Vector3 normal, Vector3 velocity) { StubFocus = point; }
+        public int GetRenderPassCount() { return StubIsSinglePass ? 1 : 2; }
+
+        public void GetRenderPass(int renderPassIndex, out XRRenderPass renderPass)
+        {
+            renderPass.StubEyes = StubIsSinglePass ? 2 : 1;
+            renderPass.renderTargetDesc = new RenderTextureDescriptor { width = 1440, height = 936 };
+        }
     }
 }
 

@@ -24,7 +24,7 @@ namespace Handcal
         Cursor shownCursor;
         LiveHand shownLive;
         Shape shownShape;
-        Target shownTarget;
+        HeadsetState shownState;
         int shownVersion;
 
         public Drawing(Transform head)
@@ -52,7 +52,7 @@ namespace Handcal
             ShowCursor(state.Cursor);
             ShowLive(state.Live);
             if (shownShape != state.Shape) ShowShape(state.Shape);
-            if (shownTarget != state.Target) ShowTarget(state.Target);
+            if (shownState != state) ShowTarget(state);
         }
 
         /// <summary>Draws only what belongs to the eye that is rendered next.</summary>
@@ -130,11 +130,17 @@ namespace Handcal
             ShowEdges(shape, shown == null ? new double[0] : shown.CornersWM, 1);
         }
 
-        void ShowTarget(Target shown)
+        /// <summary>Draws the target from where its eye is, at which the calibrated view has its origin.</summary>
+        void ShowTarget(HeadsetState state)
         {
-            shownTarget = shown;
+            shownState = state;
+            Target shown = state.Target;
+            double[] corners = shown == null ? new double[0] : (double[])shown.CornersVM.Clone();
+            Projection one = shown == null ? null : state.ProjectionOf(shown.Eye);
+            double[] eye = one == null ? new double[3] : Matrices.EyeInV(one.Drawn(state.IsOffline));
+            for (int i = 0; i < corners.Length; i++) corners[i] -= eye[i % 3];
             if (shown != null) target.Eyes = shown.Eye;
-            ShowEdges(target, shown == null ? new double[0] : shown.CornersVM, -1);
+            ShowEdges(target, corners, -1);
         }
 
         /// <summary>Draws a quadrilateral or a cube. Of OpenGL's camera axes, z turns as well.</summary>

@@ -11,8 +11,9 @@ namespace Handcal
     /// </summary>
     sealed class EyeCameras
     {
+        const float BehindM = 0.5f;
+        static readonly List<XRDisplaySubsystem> Displays = new List<XRDisplaySubsystem>();
         readonly Camera camera;
-        readonly List<XRDisplaySubsystem> displays = new List<XRDisplaySubsystem>();
         bool isSet;
 
         public EyeCameras(Camera camera)
@@ -26,6 +27,17 @@ namespace Handcal
             get { return camera.stereoActiveEye == Camera.MonoOrStereoscopicEye.Right ? Eyes.Right : Eyes.Left; }
         }
 
+        /// <summary>The display that runs; null if there is none.</summary>
+        public static XRDisplaySubsystem Display()
+        {
+#if UNITY_2020_2_OR_NEWER
+            SubsystemManager.GetSubsystems(Displays);
+#else
+            SubsystemManager.GetInstances(Displays);
+#endif
+            return Displays.Find(one => one.running);
+        }
+
         public void Apply(HeadsetState state)
         {
             Matrix4x4 headFromWorld = WorldFromHead().inverse;
@@ -33,12 +45,13 @@ namespace Handcal
             {
                 if (state.Left == null) return;
                 camera.projectionMatrix = Projection(state.Left, state.IsOffline);
-                camera.worldToCameraMatrix = View(state.Left) * headFromWorld;
+                camera.worldToCameraMatrix = View(state.Left, state.IsOffline) * headFromWorld;
             }
             else
             {
                 Set(Camera.StereoscopicEye.Left, state.Left, state.IsOffline, headFromWorld);
                 Set(Camera.StereoscopicEye.Right, state.Right, state.IsOffline, headFromWorld);
+                if (state.Left != null && state.Right != null) camera.cullingMatrix = Culling() * headFromWorld;
             }
             isSet = true;
         }
@@ -52,25 +65,18 @@ namespace Handcal
             camera.ResetStereoViewMatrices();
             camera.ResetProjectionMatrix();
             camera.ResetWorldToCameraMatrix();
+            camera.ResetCullingMatrix();
         }
 
         /// <summary>
-        /// Puts the plane at which the compositor stabilises the picture to the virtual image, where
-        /// the calibrated and the submitted view have the same pixels.
+        /// The plane for the compositor to stabilise the picture at, in the world: that of the virtual
+        /// image, where the calibrated and the submitted view have the same pixels.
         /// </summary>
-        public void SetFocusPlane(float distanceM)
+        public void FocusPlane(float distanceM, out Vector3 point, out Vector3 normal)
         {
             Matrix4x4 worldFromHead = WorldFromHead();
-            Vector3 head = worldFromHead.MultiplyPoint3x4(Vector3.zero);
-            Vector3 point = worldFromHead.MultiplyPoint3x4(new Vector3(0, 0, distanceM));
-#if UNITY_2020_2_OR_NEWER
-            SubsystemManager.GetSubsystems(displays);
-#else
-            SubsystemManager.GetInstances(displays);
-#endif
-            foreach (XRDisplaySubsystem display in displays)
-                if (display.running)
-                    display.SetFocusPlane(point, Vector3.Normalize(head - point), Vector3.zero);
+            point = worldFromHead.MultiplyPoint3x4(new Vector3(0, 0, distanceM));
+            normal = Vector3.Normalize(worldFromHead.MultiplyPoint3x4(Vector3.zero) - point);
         }
 
         /// <summary>
@@ -88,7 +94,7 @@ namespace Handcal
         {
             if (one == null) return;
             camera.SetStereoProjectionMatrix(eye, Projection(one, isOffline));
-            camera.SetStereoViewMatrix(eye, View(one) * headFromWorld);
+            camera.SetStereoViewMatrix(eye, View(one, isOffline) * headFromWorld);
         }
 
         Matrix4x4 Projection(Projection one, bool isOffline)
@@ -97,9 +103,43 @@ namespace Handcal
                 one.Drawn(isOffline), one.WidthPx, one.HeightPx, camera.nearClipPlane, camera.farClipPlane));
         }
 
-        static Matrix4x4 View(Projection one)
+        static Matrix4x4 View(Projection one, bool isOffline)
         {
-            return ToMatrix(Matrices.UnityViewFromHead(one.TVH));
+            return ToMatrix(Matrices.UnityViewFromHead(one.TVH, one.Drawn(isOffline)));
+        }
+
+        /// <summary>
+        /// From the head's metres to the clip space of one frustum around both eyes', from a point
+        /// behind them. Unity would cull by the runtime's views, from which these differ.
+        /// </summary>
+        Matrix4x4 Culling()
+        {
+            float x = 0, y = 0, nearM = float.MaxValue, farM = 0;
+            foreach (Camera.StereoscopicEye eye in new[] { Camera.StereoscopicEye.Left, Camera.StereoscopicEye.Right })
+            {
+                Matrix4x4 clipFromHead = camera.GetStereoProjectionMatrix(eye)
+                    * camera.GetStereoViewMatrix(eye) * WorldFromHead();
+                for (int corner = 0; corner < 8; corner++)
+                {
+                    Vector3 at = clipFromHead.inverse.MultiplyPoint(
+                        new Vector3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1));
+                    float depthM = at.z + BehindM;
+                    x = Mathf.Max(x, Mathf.Abs(at.x) / depthM);
+                    y = Mathf.Max(y, Mathf.Abs(at.y) / depthM);
+                    nearM = Mathf.Min(nearM, depthM);
+                    farM = Mathf.Max(farM, depthM);
+                }
+            }
+            const float Margin = 0.99f;  // for float32's rounding
+            float zScale = (farM + nearM) / (farM - nearM), zOffset = -2 * farM * nearM / (farM - nearM);
+            var frustum = new Matrix4x4();
+            frustum[0, 0] = Margin / x;
+            frustum[1, 1] = Margin / y;
+            frustum[2, 2] = Margin * zScale;
+            frustum[2, 3] = Margin * (zScale * BehindM + zOffset);
+            frustum[3, 2] = 1;
+            frustum[3, 3] = BehindM;
+            return frustum;
         }
 
         internal static Matrix4x4 ToMatrix(double[] rows)

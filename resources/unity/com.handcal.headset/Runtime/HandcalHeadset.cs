@@ -11,7 +11,7 @@ namespace Handcal
     /// <summary>
     /// Makes the headset's camera one that handcal calibrates: it connects to the PC, sends poses,
     /// draws each eye with its calibrated projection and the rig's view, shows what the PC asks
-    /// for, and confirms. Built-in render pipeline, multi-pass.
+    /// for, and confirms. In the built-in render pipeline and multi-pass; with HandcalViews in all.
     /// </summary>
     [RequireComponent(typeof(Camera))]
     [DisallowMultipleComponent]
@@ -25,7 +25,7 @@ namespace Handcal
         [Tooltip("Name by which the PC calls this headset. Empty: the device's own.")]
         public string deviceName = "";
 
-        [Tooltip("Time from the camera's pose to its display, ms, if the app sets no PoseTimeNs.")]
+        [Tooltip("Time from the camera's pose to its display, ms, if neither the runtime nor the app tells the time of display.")]
         public float poseDelayMs;
 
         [Tooltip("Stabilise the picture at the virtual image, where reprojection does not reduce the correction.")]
@@ -45,9 +45,15 @@ namespace Handcal
 
         /// <summary>
         /// The time that the camera's present pose is for, ns on <see cref="NowNs"/>'s clock: the
-        /// predicted time of display where the runtime tells it. Null: now + poseDelayMs.
+        /// predicted time of display. Null: as the runtime predicts it, else now + poseDelayMs.
         /// </summary>
         public Func<long> PoseTimeNs;
+
+        /// <summary>The same of the runtime, set by the package's part for a plug-in; 0: not known.</summary>
+        public static Func<long> PredictedTimeNs = () => 0;
+
+        /// <summary>The part that draws with the calibration below Unity; null: the camera's matrices are set.</summary>
+        public static INativeViews Native;
 
         const string HowToPair = "On the PC, run handcal pair. Then scan its QR code, or type its address "
             + "and the 8 digits, as 192.168.1.20 12345678";
@@ -63,7 +69,7 @@ namespace Handcal
         RuntimeViews views;
         NudgeSum moved;
         uint movedId;
-        string pairingProblem = "", warning = "";
+        string pairingProblem = "", warning = "", fault = "";
         int pairings;  // that go on
         float connectedS = float.NegativeInfinity;
         bool wasConnected;
@@ -117,6 +123,15 @@ namespace Handcal
                     ? 0 : Matrices.FocusDistanceM(one.P, one.POffline, one.WidthPx, one.HeightPx);
                 return foundM > 0.1 ? (float)foundM : focusDistanceM;
             }
+        }
+
+        /// <summary>
+        /// The plane of the virtual image, in the world: where the compositor should stabilise the
+        /// picture. The component sets it where XRDisplaySubsystem.SetFocusPlane does.
+        /// </summary>
+        public void FocusPlane(out Vector3 point, out Vector3 normal)
+        {
+            cameras.FocusPlane(FocusDistanceM, out point, out normal);
         }
 
         /// <summary>The headset's clock, ns.</summary>
@@ -199,6 +214,13 @@ namespace Handcal
             return link != null && link.ShowKept(wearer);
         }
 
+        // handcal's layer would correct a second time; before Unity loads OpenXR, with which it would come.
+        [RuntimeInitializeOnLoadMethod(RuntimeInitializeLoadType.SubsystemRegistration)]
+        static void SwitchLayerOff()
+        {
+            Environment.SetEnvironmentVariable("HANDCAL_OPENXR_OFF", "1");
+        }
+
         void OnEnable()
         {
             var eyes = GetComponent<Camera>();
@@ -221,6 +243,7 @@ namespace Handcal
             drawing.Dispose();
             drawing = null;
             cameras.Reset();
+            Native?.Calibrate(null);
         }
 
         void OnTransformParentChanged()
@@ -231,8 +254,14 @@ namespace Handcal
         void Update()
         {
             while (agreed.TryDequeue(out Action connect)) connect();
+            if (Native != null) views.Read();
             views.CheckProject();
-            if (views.ProjectFault.Length > 0 && warning != views.ProjectFault) Warn(views.ProjectFault);
+            if (views.ProjectFault != fault)
+            {
+                fault = views.ProjectFault;
+                if (fault.Length > 0) Warn(fault);
+                else warning = "";
+            }
             if (views.Movement.Length > 0 && warning.Length == 0) Warn(views.Movement);
             if (IsConnected && !wasConnected) connectedS = Time.realtimeSinceStartup;
             wasConnected = IsConnected;
@@ -248,6 +277,7 @@ namespace Handcal
                 if (presses.IsConfirmed) Confirm();
             }
             drawn = link.State();
+            Native?.Calibrate(drawn);
             byte[] kept = link.TakeKept();
             if (kept != null && !pairing.StoreKept(kept)) Warn(pairing.Problem);
             if (views.HasChanged()) link.SetDevice(Introduction());
@@ -262,21 +292,27 @@ namespace Handcal
             // In the space of the camera's parent, in which everything is drawn as well.
             Vector3 p = transform.localPosition;
             Quaternion q = transform.localRotation;
-            long timeNs = PoseTimeNs != null ? PoseTimeNs() : NowNs() + (long)(1e6 * poseDelayMs);
+            long timeNs = (PoseTimeNs ?? PredictedTimeNs)();
+            if (timeNs == 0) timeNs = NowNs() + (long)(1e6 * poseDelayMs);
             link.SendPose(Matrices.FromUnity(p.x, p.y, p.z, q.x, q.y, q.z, q.w), timeNs);
         }
 
         void OnPreCull()
         {
-            cameras.Reset();
-            views.Read();
-            cameras.Apply(drawn);
-            if (setsFocusPlane) cameras.SetFocusPlane(FocusDistanceM);
+            if (Native == null)
+            {
+                cameras.Reset();
+                views.Read();
+                cameras.Apply(drawn);
+            }
+            if (!setsFocusPlane) return;
+            FocusPlane(out Vector3 point, out Vector3 normal);
+            EyeCameras.Display()?.SetFocusPlane(point, normal, Vector3.zero);
         }
 
         void OnPreRender()
         {
-            drawing.BeginEye(cameras.ActiveEye);
+            if (Native == null) drawing.BeginEye(cameras.ActiveEye);
         }
 
         void ConfirmAt(long timeNs)

@@ -9,16 +9,26 @@ using UnityEngine.Windows.Speech;
 namespace Handcal
 {
     /// <summary>
-    /// The wearer's presses. To confirm: a controller's trigger, an air tap (of the other hand, so
-    /// that the aligned one keeps still), Enter or space, or a spoken word. To nudge: a
-    /// controller's stick and its two buttons, or arrow keys, plus and minus.
+    /// The wearer's presses. To confirm: a controller's trigger, an air tap or a pinch (of the other
+    /// hand, so that the aligned one keeps still), Enter or space, or a spoken word. To nudge: a
+    /// controller's stick and its two buttons, or arrow keys, plus and minus. A hand only confirms.
     /// </summary>
     sealed class Presses : IDisposable
     {
         const float StickPressed = 0.6f;
+
+        /// <summary>
+        /// A hand's own gesture: the primary button of OpenXR's Microsoft profile, the pointer and
+        /// the pinch of its Hand Interaction Profile.
+        /// </summary>
+        static readonly InputFeatureUsage<bool>[] Gestures =
+        {
+            CommonUsages.triggerButton, CommonUsages.primaryButton,
+            new InputFeatureUsage<bool>("PointerActivated"), new InputFeatureUsage<bool>("PinchTouched"),
+        };
+
         readonly List<InputDevice> devices = new List<InputDevice>();
-        bool wasTrigger;
-        int wasRight, wasDown, wasLarger;
+        int wasConfirming, wasRight, wasDown, wasLarger;
 #if UNITY_WSA || UNITY_STANDALONE_WIN || UNITY_EDITOR_WIN
         readonly KeywordRecognizer recognizer;
 #endif
@@ -52,12 +62,17 @@ namespace Handcal
         /// <summary>Reads the devices; true if anything was pressed since the last call.</summary>
         public bool Read()
         {
-            bool isTrigger = false;
-            int right = 0, down = 0, larger = 0;
+            int confirming = 0, right = 0, down = 0, larger = 0;  // devices; of one, the other may be held
             InputDevices.GetDevices(devices);
             foreach (InputDevice device in devices)
             {
-                isTrigger |= device.TryGetFeatureValue(CommonUsages.triggerButton, out bool trigger) && trigger;
+                if ((device.characteristics & InputDeviceCharacteristics.HandTracking) != 0)
+                {
+                    if (Array.Exists(Gestures, one => device.TryGetFeatureValue(one, out bool made) && made))
+                        confirming++;
+                    continue;
+                }
+                if (device.TryGetFeatureValue(CommonUsages.triggerButton, out bool trigger) && trigger) confirming++;
                 if (device.TryGetFeatureValue(CommonUsages.primary2DAxis, out Vector2 stick))
                 {
                     right += Sign(stick.x);
@@ -69,11 +84,11 @@ namespace Handcal
             right = Math.Sign(right);
             down = Math.Sign(down);
             larger = Math.Sign(larger);
-            IsConfirmed = isTrigger && !wasTrigger;
+            IsConfirmed = confirming > wasConfirming;
             Right = right == wasRight ? 0 : right;
             Down = down == wasDown ? 0 : down;
             Larger = larger == wasLarger ? 0 : larger;
-            wasTrigger = isTrigger;
+            wasConfirming = confirming;
             wasRight = right;
             wasDown = down;
             wasLarger = larger;

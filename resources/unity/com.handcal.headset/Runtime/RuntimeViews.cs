@@ -12,10 +12,9 @@ namespace Handcal
     /// </summary>
     sealed class RuntimeViews
     {
-        const double ReportedMoveM = 1e-4, WarnedMoveM = 5e-4, PeriodS = 1;
+        const double ReportedMoveM = 1e-4, ReportedTangent = 1e-4, WarnedMoveM = 5e-4, PeriodS = 1;
         readonly Camera camera;
         readonly List<InputDevice> devices = new List<InputDevice>();
-        readonly Dictionary<Eyes, double[]> tangents = new Dictionary<Eyes, double[]>();
         List<View> views = new List<View>(), reported = new List<View>(), first;
         double nextS;
 
@@ -24,7 +23,7 @@ namespace Handcal
             this.camera = camera;
         }
 
-        /// <summary>The setting of the project that keeps calibrations from being drawn; empty if there is none.</summary>
+        /// <summary>The setting of the project, or another reason, that keeps calibrations from being drawn; empty if there is none.</summary>
         public string ProjectFault { get; private set; } = "";
 
         /// <summary>Says that the runtime moves its view; empty if it does not.</summary>
@@ -33,7 +32,19 @@ namespace Handcal
         /// <summary>Checks the project. Scriptable pipelines call neither OnPreCull nor OnPreRender: do it in Update.</summary>
         public void CheckProject()
         {
-            if (camera.stereoEnabled && XRSettings.stereoRenderingMode != XRSettings.StereoRenderingMode.MultiPass)
+            if (HandcalHeadset.Native != null)
+            {
+                ProjectFault = HandcalHeadset.Native.Refusal;
+                return;
+            }
+            XRDisplaySubsystem display = EyeCameras.Display();
+            bool isSinglePass = false;
+            for (int i = 0; display != null && i < display.GetRenderPassCount(); i++)
+            {
+                display.GetRenderPass(i, out XRDisplaySubsystem.XRRenderPass pass);
+                isSinglePass |= pass.GetRenderParameterCount() > 1;
+            }
+            if (isSinglePass)
                 ProjectFault = "The project renders in a single pass, which ignores calibrated projections: "
                     + "set XR Plug-in Management > Render Mode to Multi Pass.";
             if (UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline != null)
@@ -46,9 +57,30 @@ namespace Handcal
         {
             if (!camera.stereoEnabled || Time.realtimeSinceStartup < nextS) return;
             nextS = Time.realtimeSinceStartup + PeriodS;
-            var found = new List<View>();
-            AddView(found, Eyes.Left, Camera.StereoscopicEye.Left, CommonUsages.leftEyePosition, CommonUsages.leftEyeRotation);
-            AddView(found, Eyes.Right, Camera.StereoscopicEye.Right, CommonUsages.rightEyePosition, CommonUsages.rightEyeRotation);
+            List<View> found = HandcalHeadset.Native == null ? new List<View>() : HandcalHeadset.Native.Own();
+            XRDisplaySubsystem display = EyeCameras.Display();
+            int eyes = 0;
+            for (int i = 0; display != null && i < display.GetRenderPassCount(); i++)
+            {
+                display.GetRenderPass(i, out XRDisplaySubsystem.XRRenderPass pass);
+                for (int k = 0; k < pass.GetRenderParameterCount() && eyes < 2; k++)
+                {
+                    // Not the camera's: that may return what was set, and at first the identity.
+                    pass.GetRenderParameter(camera, k, out XRDisplaySubsystem.XRRenderParameter eye);
+                    RenderTextureDescriptor size = pass.renderTargetDesc;
+                    if (HandcalHeadset.Native != null)
+                    {
+                        if (eyes < found.Count) found[eyes].WidthPx = size.width;
+                        if (eyes < found.Count) found[eyes].HeightPx = size.height;
+                        eyes++;
+                    }
+                    else if (eyes++ == 0)
+                        AddView(found, Eyes.Left, eye.projection, size, CommonUsages.leftEyePosition, CommonUsages.leftEyeRotation);
+                    else
+                        AddView(found, Eyes.Right, eye.projection, size, CommonUsages.rightEyePosition, CommonUsages.rightEyeRotation);
+                }
+            }
+            if (eyes == 0) found.Clear();
             views = found;
             if (found.Count < 2) return;
             first = first ?? found;
@@ -62,20 +94,34 @@ namespace Handcal
         /// <summary>True if the views have changed since the last introduction.</summary>
         public bool HasChanged()
         {
-            return views.Count != reported.Count || Moved(reported, views) > ReportedMoveM;
+            bool isOther = views.Count != reported.Count || Moved(reported, views) > ReportedMoveM;
+            for (int i = 0; !isOther && i < views.Count; i++)
+                for (int edge = 0; edge < 4; edge++)
+                    isOther |= Math.Abs(views[i].Tangents[edge] - reported[i].Tangents[edge]) > ReportedTangent;
+            return isOther;
         }
 
         public Device Introduction(string name, double eyeDistanceM)
         {
             reported = views;
+            XRDisplaySubsystem display = EyeCameras.Display();
             return new Device
             {
                 Name = name.Length > 0 ? name : DeviceName(),
-                Runtime = XRSettings.loadedDeviceName + " " + SystemInfo.operatingSystem,
+                Runtime = (display == null ? "no headset" : Id(display)) + " " + SystemInfo.operatingSystem,
                 App = Application.productName + " " + Application.version,
                 Views = views,
                 EyeDistanceM = eyeDistanceM,
             };
+        }
+
+        static string Id(XRDisplaySubsystem display)
+        {
+#if UNITY_2020_2_OR_NEWER
+            return display.subsystemDescriptor.id;
+#else
+            return display.SubsystemDescriptor.id;
+#endif
         }
 
         /// <summary>The device's own name, or on Android, which may not tell it, its model.</summary>
@@ -86,7 +132,7 @@ namespace Handcal
         }
 
         void AddView(
-            List<View> into, Eyes eye, Camera.StereoscopicEye unityEye,
+            List<View> into, Eyes eye, Matrix4x4 projection, RenderTextureDescriptor size,
             InputFeatureUsage<Vector3> position, InputFeatureUsage<Quaternion> rotation)
         {
             devices.Clear();
@@ -97,17 +143,16 @@ namespace Handcal
                     & head.TryGetFeatureValue(rotation, out Quaternion eyeTurn)
                     & head.TryGetFeatureValue(CommonUsages.centerEyePosition, out Vector3 headAt)
                     & head.TryGetFeatureValue(CommonUsages.centerEyeRotation, out Quaternion headTurn);
-                Matrix4x4 projection = camera.GetStereoProjectionMatrix(unityEye);
-                if (!isKnown || projection[0, 0] == 0 || projection[1, 1] == 0) continue;
-                if (!tangents.ContainsKey(eye)) tangents[eye] = Tangents(projection);
+                bool isPerspective = projection[3, 2] != 0 && projection[0, 0] != 0 && projection[1, 1] != 0;
+                if (!isKnown || !isPerspective) continue;
                 double[] TVW = Matrices.Invert(Pose(eyeAt, eyeTurn));
                 into.Add(new View
                 {
                     Eye = eye,
                     TVH = Matrices.Multiply(TVW, Pose(headAt, headTurn)),
-                    Tangents = tangents[eye],
-                    WidthPx = Math.Max(1, XRSettings.eyeTextureWidth),
-                    HeightPx = Math.Max(1, XRSettings.eyeTextureHeight),
+                    Tangents = Tangents(projection),
+                    WidthPx = Math.Max(1, size.width),
+                    HeightPx = Math.Max(1, size.height),
                 });
                 return;
             }

@@ -39,12 +39,12 @@ namespace Handcal
         public Color Color { set { material.SetColor("_Color", value); } }
 
         /// <summary>The eyes that draw the strokes.</summary>
-        public Eyes Eyes { get; set; }
+        public Eyes Eyes { set { material.SetFloat("_Eyes", (int)value); } }
 
-        /// <summary>Draws, or not, in the eye that is rendered next.</summary>
+        /// <summary>Says which eye is rendered next; else the shader asks Unity.</summary>
         public void BeginEye(Eyes eye)
         {
-            material.SetFloat("_IsHidden", (Eyes & eye) == 0 ? 1 : 0);
+            material.SetFloat("_Eye", (int)eye);
         }
 
         /// <summary>Draws in the space of this parent.</summary>

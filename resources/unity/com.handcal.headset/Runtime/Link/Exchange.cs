@@ -92,7 +92,7 @@ namespace Handcal.Link
 
         byte[] Ask(string host, int port, string name, double timeoutS, out string problem)
         {
-            var answer = new byte[2048];
+            var answer = new byte[HeadsetLink.MostUdpBytes];
             var clock = System.Diagnostics.Stopwatch.StartNew();
             using (Socket socket = HeadsetLink.Open(host, port))
             {
@@ -102,7 +102,9 @@ namespace Handcal.Link
                     {
                         byte[] asked = cookie;
                         socket.Send(Request(name));
-                        while (asked == cookie && socket.Poll(1000 * ResendMs, SelectMode.SelectRead))
+                        double resendS = clock.Elapsed.TotalSeconds + 0.001 * ResendMs;  // whatever else arrives
+                        while (asked == cookie && clock.Elapsed.TotalSeconds < resendS
+                            && socket.Poll(1000 * ResendMs, SelectMode.SelectRead))
                         {
                             int size = socket.Receive(answer);
                             if (TryRead(answer, size, out byte[] key, out problem)) return key;

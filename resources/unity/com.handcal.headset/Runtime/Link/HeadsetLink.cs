@@ -14,7 +14,9 @@ namespace Handcal.Link
     public sealed class HeadsetLink : IDisposable
     {
         const double HelloPeriodS = 0.1, RefusedPeriodS = 1.0, SilenceS = 2.0, ReopenPeriodS = 1.0;
-        const int IdleWaitUs = 20000, ReceiveBufferBytes = 4 << 20, PosesPerDatagram = 3, Byes = 3, EndMs = 1000;
+        const int IdleWaitUs = 20000, ReceiveBufferBytes = 4 << 20, PosesPerDatagram = 3, Byes = 3;
+        const int BatchDatagrams = 256;
+        internal const int MostUdpBytes = 1 << 16;  // Windows has an error for what is longer than the buffer
         static readonly Stopwatch Clock = Stopwatch.StartNew();
 
         readonly object gate = new object();
@@ -22,7 +24,7 @@ namespace Handcal.Link
         readonly int port;
         readonly Func<long> clockNs;
         readonly Thread thread;
-        readonly byte[] received = new byte[2048], sent = new byte[Datagram.MaxBytes];
+        readonly byte[] received = new byte[MostUdpBytes], sent = new byte[Datagram.MaxBytes];
         readonly Handshake handshake;
         readonly Outbox outbox = new Outbox();
         readonly Queue<ProtoWriter> poses = new Queue<ProtoWriter>();
@@ -79,7 +81,7 @@ namespace Handcal.Link
         /// <summary>Number of datagrams dropped for a reason.</summary>
         public long Rejected(Rejection reason)
         {
-            lock (gate) return rejected[(int)reason];
+            return Interlocked.Read(ref rejected[(int)reason]);
         }
 
         /// <summary>
@@ -165,7 +167,7 @@ namespace Handcal.Link
             }
         }
 
-        /// <summary>Says good-bye and ends the thread.</summary>
+        /// <summary>Says good-bye and lets the thread end, which may take a name server's time.</summary>
         public void Dispose()
         {
             if (isClosing) return;
@@ -174,7 +176,6 @@ namespace Handcal.Link
                 for (int i = 0; i < Byes; i++) Send(Envelope.Bye());
                 isClosing = true;
             }
-            if (thread.IsAlive) thread.Join(EndMs);  // it may wait for a name server
         }
 
         void Run()
@@ -185,15 +186,13 @@ namespace Handcal.Link
                 {
                     if (socket == null) socket = Open(host, port);
                     bool hasArrived = socket.Poll(IdleWaitUs, SelectMode.SelectRead);
-                    lock (gate)
+                    for (int i = 0; i < BatchDatagrams && hasArrived && !isClosing; i++)
                     {
-                        while (hasArrived && !isClosing)
-                        {
-                            Take(socket.Receive(received));
-                            hasArrived = socket.Available > 0;
-                        }
-                        if (!isClosing) Work(Now);
+                        Take(socket.Receive(received));
+                        hasArrived = socket.Available > 0;
                     }
+                    lock (gate)
+                        if (!isClosing) Work(Now);
                 }
                 catch (SocketException error)
                 {
@@ -244,6 +243,10 @@ namespace Handcal.Link
             for (double endS = Now + ReopenPeriodS; Now < endS && !isClosing;) Thread.Sleep(IdleWaitUs / 1000);
         }
 
+        /// <summary>
+        /// Takes a datagram. The lock, which drawing needs, is held only for those of the PC: of
+        /// strangers' there may be more than this thread can check.
+        /// </summary>
         void Take(int size)
         {
             Rejection rejection;
@@ -255,15 +258,15 @@ namespace Handcal.Link
             {
                 rejection = Rejection.Corrupt;
             }
-            rejected[(int)rejection]++;
+            Interlocked.Increment(ref rejected[(int)rejection]);
+            if (rejection == Rejection.WrongVersion)
+                lock (gate) problem = "The PC speaks protocol " + received[2] + ", this app protocol " + Datagram.Version
+                    + ": update the older one";
         }
 
         Rejection Sort(int size)
         {
             Rejection rejection = Datagram.Read(received, size, out Packet packet);
-            if (rejection == Rejection.WrongVersion)
-                problem = "The PC speaks protocol " + received[2] + ", this app protocol " + Datagram.Version
-                    + ": update the older one";
             if (rejection != Rejection.None) return rejection;
             if (packet.Session == 0)
             {
@@ -273,12 +276,15 @@ namespace Handcal.Link
             if (session == null || packet.Session != session.Number) return Rejection.WrongSession;
             if (!Datagram.IsAuthentic(session.ReceiveMac, received, size)) return Rejection.Unpaired;
             if (!session.Window.Accept(packet.Sequence)) return Rejection.Replayed;
-            session.HeardS = Now;
-            if (packet.Slot == Slot.Unreliable) Handle(new ProtoReader(received, packet.Start, packet.Count));
-            else
+            lock (gate)
             {
-                byte[] message = session.Inbox.Receive(packet);
-                if (message != null) Handle(new ProtoReader(message));
+                session.HeardS = Now;
+                if (packet.Slot == Slot.Unreliable) Handle(new ProtoReader(received, packet.Start, packet.Count));
+                else
+                {
+                    byte[] message = session.Inbox.Receive(packet);
+                    if (message != null) Handle(new ProtoReader(message));
+                }
             }
             return Rejection.None;
         }
@@ -287,6 +293,12 @@ namespace Handcal.Link
         {
             Rejection rejection = handshake.Take(packet, received, size, out Answer answer);
             if (rejection != Rejection.None) return rejection;
+            lock (gate) Follow(answer);
+            return Rejection.None;
+        }
+
+        void Follow(Answer answer)
+        {
             switch (answer)
             {
                 case Answer.SayHelloAgain:
@@ -306,7 +318,6 @@ namespace Handcal.Link
                     nextHelloS = Now + RefusedPeriodS;
                     break;
             }
-            return Rejection.None;
         }
 
         void Handle(ProtoReader envelope)

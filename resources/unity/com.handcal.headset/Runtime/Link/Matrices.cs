@@ -9,39 +9,84 @@ namespace Handcal.Link
     public static class Matrices
     {
         /// <summary>
-        /// The 4×4 for Camera.SetStereoProjectionMatrix: from OpenGL's axes in V (x right, y up,
-        /// z back) to clip space, the eye's translation included.
+        /// The 4×4 for Camera.SetStereoProjectionMatrix: from the eye, in OpenGL's axes of V (x right,
+        /// y up, z back), to clip space. The view holds the eye's place; here it would make the last
+        /// number other than 0, which shaders take for an orthographic camera.
         /// </summary>
         public static double[] UnityProjection(double[] P, int widthPx, int heightPx, double nearM, double farM)
         {
             double scale = 1 / Math.Sqrt(P[8] * P[8] + P[9] * P[9] + P[10] * P[10]);
             double zScale = (farM + nearM) / (farM - nearM), zOffset = -2 * farM * nearM / (farM - nearM);
             var clip = new double[16];
-            for (int i = 0; i < 4; i++)
+            for (int i = 0; i < 3; i++)
             {
                 double u = scale * P[i], v = scale * P[4 + i], depth = scale * P[8 + i];
-                double sign = i == 1 || i == 2 ? -1 : 1;  // from OpenGL's axes to OpenCV's
+                double sign = i == 0 ? 1 : -1;  // from OpenGL's axes to OpenCV's
                 clip[i] = sign * (2 * (u + 0.5 * depth) / widthPx - depth);
                 clip[4 + i] = sign * (depth - 2 * (v + 0.5 * depth) / heightPx);
-                clip[8 + i] = sign * (zScale * depth + (i == 3 ? zOffset : 0));
+                clip[8 + i] = sign * zScale * depth;
                 clip[12 + i] = sign * depth;
             }
+            clip[11] = zOffset;
             return clip;
         }
 
         /// <summary>
         /// The 4×4 for Camera.SetStereoViewMatrix, to be multiplied with the head's worldToLocal:
-        /// T_V_H from Unity's axes of the head to OpenGL's of the camera.
+        /// from Unity's axes of the head to the eye, in OpenGL's axes of V.
         /// </summary>
-        public static double[] UnityViewFromHead(double[] TVH)
+        public static double[] UnityViewFromHead(double[] TVH, double[] P)
         {
+            double[] eye = EyeInV(P);
             var view = new double[16];
             for (int row = 0; row < 3; row++)
                 for (int column = 0; column < 4; column++)
-                    view[4 * row + column] =
-                        (row == 0 ? 1 : -1) * (column == 1 ? -1 : 1) * TVH[4 * row + column];
+                    view[4 * row + column] = (row == 0 ? 1 : -1) * (column == 1 ? -1 : 1)
+                        * (TVH[4 * row + column] - (column == 3 ? eye[row] : 0));
             view[15] = 1;
             return view;
+        }
+
+        /// <summary>
+        /// One eye for OpenXR, in its axes (x right, y up, z back): its place in V, the tangents left,
+        /// right, up and down of its field of view, and the pose of V in the head, a quaternion and
+        /// metres. Null if P has skew or rotation, which OpenXR cannot express.
+        /// </summary>
+        public static double[] OpenXr(double[] P, double[] TVH, int widthPx, int heightPx)
+        {
+            double fx = P[0] / P[10], fy = P[5] / P[10], cx = P[2] / P[10], cy = P[6] / P[10];
+            double skew = Math.Abs(P[1] / P[0]) + Math.Abs(P[4] / P[5]) + Math.Abs(P[8] / P[10]) + Math.Abs(P[9] / P[10]);
+            if (!(skew < 1e-9)) return null;
+            double[] eye = EyeInV(P), m = Invert(TVH);
+            return new[]
+            {
+                eye[0], -eye[1], -eye[2],
+                (-0.5 - cx) / fx, (widthPx - 0.5 - cx) / fx, (cy + 0.5) / fy, (cy + 0.5 - heightPx) / fy,
+                Part(1 + m[0] - m[5] - m[10], m[9] - m[6]), Part(1 - m[0] + m[5] - m[10], m[8] - m[2]),
+                Part(1 - m[0] - m[5] + m[10], m[1] - m[4]), Part(1 + m[0] + m[5] + m[10], 1),
+                m[3], -m[7], -m[11],
+            };
+        }
+
+        /// <summary>A part of a quaternion, from four times its square and its sign.</summary>
+        static double Part(double square, double sign)
+        {
+            return (sign < 0 ? -0.5 : 0.5) * Math.Sqrt(Math.Max(0, square));
+        }
+
+        /// <summary>The eye, P's centre of projection, in V; by Cramer's rule.</summary>
+        public static double[] EyeInV(double[] P)
+        {
+            double det = Minor(P, 0, 1, 2);
+            return new[] { -Minor(P, 3, 1, 2) / det, -Minor(P, 0, 3, 2) / det, -Minor(P, 0, 1, 3) / det };
+        }
+
+        /// <summary>The determinant of three columns of P.</summary>
+        static double Minor(double[] P, int a, int b, int c)
+        {
+            return P[a] * (P[4 + b] * P[8 + c] - P[4 + c] * P[8 + b])
+                - P[b] * (P[4 + a] * P[8 + c] - P[4 + c] * P[8 + a])
+                + P[c] * (P[4 + a] * P[8 + b] - P[4 + b] * P[8 + a]);
         }
 
         /// <summary>
