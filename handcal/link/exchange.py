@@ -196,7 +196,7 @@ class _Tally:
     def allows(self, address: Address) -> bool:
         """Return whether one more attempt is answered, and count it."""
         host, port = address[0].partition("%")[0], address[1]
-        if ":" in host:  # whoever has one address of IPv6 has all of its network
+        if ":" in host:  # one address of IPv6 comes with the others of its network
             host = str(ip_network((host, 64), strict=False))
         limits = {f"{host} {port}": MAX_ATTEMPTS, host: _PER_HOST, "": _PER_CODE}
         if any(self.counts[who] >= most for who, most in limits.items()):

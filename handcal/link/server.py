@@ -185,7 +185,7 @@ class HeadsetServer(Sender):
 
     @property
     def pairing_attempts(self) -> PairingAttempts:
-        """What has come of the invitation so far."""
+        """The attempts to pair by the present invitation."""
         with self._changed:
             exchange = self._reception.exchange
             if exchange is None:

@@ -36,7 +36,7 @@ from handcal.sim.wearer_settings import WearerSettings
 
 _STEP_AFTER_NS, _STEP_NS = 4_000_000_000, 300_000_000
 _SUSPENDED_S = 2.0
-"""So long after its time, an image was late because the computer was suspended."""
+"""Delay of an image from which on the computer has been suspended."""
 _FORMER_SHIFT_M = (0.006, 0.0, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""How a printed board differs from the flat grid that was entered, solved with the cameras.
+"""The shape of a printed board, solved with the cameras.
 
 No board is as entered: paper bends, printers stretch, a row is printed beside its place. As mrcal
 does, the bundle adjustment solves for the board, too: first how it bends and is stretched as a
@@ -37,7 +37,7 @@ _NAMED_SHARE = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardShape:
-    """How a board differs from the grid entered."""
+    """The difference of a board from the grid entered."""
 
     words: str
     """Empty if it does not."""
