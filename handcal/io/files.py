@@ -140,9 +140,13 @@ def read_limited(path: Path, max_bytes: int) -> bytes:
     """
     try:
         with open(path, "rb", opener=_open_at_once) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            found = os.fstat(file.fileno())
+            if not stat.S_ISREG(found.st_mode):
                 raise FileError(f"cannot read {path}: it is a device or a pipe")
-            data = file.read(max_bytes + 1)
+            # The size at most is allocated, not the limit. A file that grows has no end yet.
+            data = file.read(min(found.st_size, max_bytes) + 1)
+            if found.st_size < len(data) <= max_bytes:
+                data += file.read(max_bytes + 1 - len(data))
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror or error}") from error
     if len(data) > max_bytes:
