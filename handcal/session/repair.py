@@ -11,10 +11,16 @@ from typing import Literal, TypeAlias
 
 from handcal.core.errors import FileError
 from handcal.core.types import Rig
-from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
+from handcal.io.files import make_folder, read_limited, sync_folder, write_atomic, write_json
 from handcal.rig.rig_file import write_rig
 from handcal.session.journal import JOURNAL, Damage, Event, happens_now, journal_line
-from handcal.session.record import SessionRecord, alignment_path, load_session, sha256
+from handcal.session.record import (
+    MAX_ALIGNMENT_BYTES,
+    SessionRecord,
+    alignment_path,
+    load_session,
+    sha256,
+)
 from handcal.session.state import SessionEvent, SessionState
 
 SessionHealth: TypeAlias = Literal["sound", "damaged", "none"]
@@ -64,9 +70,10 @@ def repair_session(path: Path, output: Path, rig: Rig | None = None) -> SessionR
     hidden = make_folder(output.absolute().parent) / f".{output.name}.repairing"
     try:
         shutil.rmtree(hidden, ignore_errors=True)
-        make_folder(hidden / "alignments")
+        hidden.mkdir(mode=0o700)
+        (hidden / "alignments").mkdir(mode=0o700)
         for number in (*record.alignments, *record.deleted_alignments):
-            data = alignment_path(path, number).read_bytes()
+            data = read_limited(alignment_path(path, number), MAX_ALIGNMENT_BYTES, path)
             write_atomic(alignment_path(hidden, number), data)
         write_rig(hidden / "rig.yaml", record.rig)
         write_json(hidden / "settings.json", record.settings)
