@@ -294,8 +294,8 @@ def _read_secret(path: Path, max_bytes: int) -> bytes:
     with suppress(OSError):
         if os.name == "posix" and path.stat().st_mode & 0o077:
             _LOG.warning(
-                "other users of this computer can open the pairing keys in %s: deny it (chmod 600), "
-                "and pair the headsets again if somebody may have read them",
+                "other users of this computer can open the keys in %s: chmod 600 forbids it; "
+                "pair the headsets again if somebody may have read them",
                 path,
             )
     return content
