@@ -261,6 +261,8 @@ class Alignment:
         freeze(self, "cursor_is_cut", np.bool_, len(self.cursor_m))
         freeze(self, "hand_is_cut", np.bool_, len(self.hand_m))
         freeze(self, "rotation_rad", np.float64, 3)
+        if not 0.0 <= self.time_sigma_m < np.inf:
+            raise ValueError(f"Alignment.time_sigma_m: {self.time_sigma_m} is no σ")
         if self.outline_sigma_px is not None and not 0.0 <= self.outline_sigma_px < np.inf:
             raise ValueError(f"Alignment.outline_sigma_px: {self.outline_sigma_px} is no σ")
         poses = {eye: readonly(T, np.float64, (4, 4)) for eye, T in self.T_E_W.items()}

@@ -175,8 +175,10 @@ def _open_at_once(path: str, flags: int) -> int:
 
 def open_no_link(path: str, flags: int) -> int:
     """Open a file as `_open_at_once`, but no link; a new one is as private as its folder."""
-    mode = 0o666 & os.stat(os.path.dirname(path) or ".").st_mode  # noqa: PTH116, PTH120
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0), mode)
+    flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+    if not flags & os.O_CREAT:
+        return os.open(path, flags)
+    return os.open(path, flags, 0o666 & os.stat(os.path.dirname(path) or ".").st_mode)  # noqa: PTH116, PTH120
 
 
 def refuse_links(path: Path, inside: Path) -> None:

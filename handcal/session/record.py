@@ -13,6 +13,7 @@ from typing import Any
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment, Eye, Float64, Rig
 from handcal.io.files import read_json, read_limited
+from handcal.register.solve import check_alignment
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.alignment_file import decode_alignment
 from handcal.session.facts import AlignmentFacts, SessionFacts
@@ -365,4 +366,6 @@ def _read_alignment(path: Path, file: Path, checksum: str) -> Alignment:
     data = read_limited(file, MAX_ALIGNMENT_BYTES, path)
     if sha256(data) != checksum:
         raise ValueError("its checksum is not the journal's")
-    return decode_alignment(data)
+    alignment = decode_alignment(data)
+    check_alignment(alignment)
+    return alignment
