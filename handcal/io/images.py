@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
@@ -59,14 +58,15 @@ def decode_image(data: bytes, name: object, flags: int) -> NDArray[Any]:
     FileError
         If it is damaged, too large or neither PNG nor JPEG.
     """
-    is_png = data.startswith(PNG_START) and len(data) > len(PNG_START) + 10
-    width, height = struct.unpack_from(">II", data, 16) if is_png else _jpeg_size(data, name)
+    width, height = _image_size(data, name)
     if width * height > _MAX_PIXELS or max(width, height) > MAX_SIDE_PX:
         raise FileError(f"{name} is {width}x{height} pixels, more than is allowed")
-    if is_png:
+    if data.startswith(PNG_START):
         chunks = _png_chunks(data, name)
         if len(data) > _HARMLESS_BYTES:
             _require_pixels_only(data, chunks, name, width, height)
+    if data.startswith(_JPEG) and data.count(_JPEG_SCAN) > _MOST_SCANS:
+        raise FileError(f"{name} has more than {_MOST_SCANS} scans; save it as a plain JPEG")
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:
@@ -129,18 +129,18 @@ def _require_pixels_only(
             packed = unpacker.unconsumed_tail
 
 
-def _jpeg_size(data: bytes, name: object) -> tuple[int, int]:
-    """Return the size in a JPEG's header, read as its decoder does: fill bytes are skipped."""
+def _image_size(data: bytes, name: object) -> tuple[int, int]:
+    """Return the size in an image's header, as its decoder finds it, without decoding it."""
+    if data.startswith(PNG_START) and len(data) > len(PNG_START) + 10:
+        return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
     if data.startswith(_JPEG):
-        if data.count(_JPEG_SCAN) > _MOST_SCANS:
-            raise FileError(f"{name} has more than {_MOST_SCANS} scans; save it as a plain JPEG")
         at = 2
         while at + 9 <= len(data) and data[at] == 0xFF:
             if data[at + 1] in _JPEG_FRAMES:
                 return int.from_bytes(data[at + 7 : at + 9]), int.from_bytes(data[at + 5 : at + 7])
             if data[at + 1] in _JPEG_SEGMENTS:
                 at += 1 + int.from_bytes(data[at + 2 : at + 4])
-            elif data[at + 1] != 0xFF:
+            elif data[at + 1] != 0xFF:  # which only fills
                 break
             at += 1
     raise FileError(f"{name} is neither a PNG nor a JPEG image")
