@@ -157,13 +157,13 @@ def read_limited(path: Path, max_bytes: int, inside: Path | None = None) -> byte
             found = os.fstat(file.fileno())
             if not stat.S_ISREG(found.st_mode):
                 raise FileError(f"cannot read {path}: it is a device or a pipe")
-            # The size at most is allocated, not the limit. A file that grows has no end yet.
-            data = file.read(min(found.st_size, max_bytes) + 1)
-            if found.st_size < len(data) <= max_bytes:
+            size = found.st_size  # which is allocated, not the limit
+            data = file.read(size + 1) if size <= max_bytes else b""
+            if size < len(data) <= max_bytes:  # it grows, or does not know its size
                 data += file.read(max_bytes + 1 - len(data))
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror or error}") from error
-    if len(data) > max_bytes:
+    if max(size, len(data)) > max_bytes:
         raise FileError(f"{path} is larger than the {max_bytes:,} bytes allowed for it")
     return data
 
@@ -187,13 +187,13 @@ def refuse_links(path: Path, inside: Path) -> None:
     A folder from somebody else may hold links to files of the user's: following one would read,
     change or delete those.
     """
-    part, end = os.fspath(path), os.fspath(inside)
-    while part and part != end:
+    part, below, end = os.fspath(path), "", os.fspath(inside)
+    while part not in ("", below, end):
         with suppress(OSError):  # nothing is there
             found = os.lstat(part)
             if stat.S_ISLNK(found.st_mode) or getattr(found, "st_reparse_tag", 0) == _JUNCTION:
                 raise FileError(f"{part} is a link, which is not followed here; remove it")
-        part = os.path.dirname(part)  # noqa: PTH120
+        part, below = os.path.dirname(part), part  # noqa: PTH120
 
 
 def modified_s(path: Path) -> float:

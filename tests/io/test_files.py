@@ -236,3 +236,22 @@ def test_no_more_than_the_limit_is_read(tmp_path: Path, size: int) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="there is no /proc")
 def test_a_file_that_does_not_know_its_size_is_read_to_its_end() -> None:
     assert len(read_limited(Path("/proc/self/status"), 2**20)) > 100
+
+
+@pytest.mark.skipif(os.name == "nt", reason="few may make links on Windows")
+@pytest.mark.parametrize("inside", ["", "a", "a/b"])
+@pytest.mark.parametrize("form", ["absolute", "relative", "other"])
+def test_only_links_within_a_folder_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: str, form: str
+) -> None:
+    (tmp_path / "elsewhere" / "b").mkdir(parents=True)
+    (tmp_path / "elsewhere" / "b" / "x").touch()
+    (tmp_path / "a").symlink_to("elsewhere")
+    monkeypatch.chdir(tmp_path)
+    root = Path() if form == "relative" else tmp_path
+    folder = Path("nowhere") if form == "other" else root / inside
+    if inside and form != "other":
+        assert read_limited(root / "a" / "b" / "x", 1, folder) == b""
+    else:
+        with pytest.raises(FileError, match="a is a link"):
+            read_limited(root / "a" / "b" / "x", 1, folder)
