@@ -42,9 +42,9 @@ def test_no_key_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
-@pytest.mark.parametrize(("mode", "is_told"), [(0o600, False), (0o640, True), (0o604, True)])
-def test_a_key_that_others_can_read_is_told(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, mode: int, is_told: bool
+@pytest.mark.parametrize(("mode", "is_warned"), [(0o600, False), (0o640, True), (0o604, True)])
+def test_a_key_that_others_can_read_causes_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, mode: int, is_warned: bool
 ) -> None:
     device, all_devices = tmp_path / "key", tmp_path / "pairing.key"
     device.write_text(new_pairing_key())
@@ -53,8 +53,8 @@ def test_a_key_that_others_can_read_is_told(
         path.chmod(mode)
     read_pairing_key(device)
     pairings = Pairings.read(all_devices)
-    told = [str(path) for path in (device, all_devices) if f"keys in {path}:" in caplog.text]
-    assert told == ([str(device), str(all_devices)] if is_told else [])
+    named = [str(path) for path in (device, all_devices) if f"keys in {path}:" in caplog.text]
+    assert named == ([str(device), str(all_devices)] if is_warned else [])
     pairings.renew()
     assert all_devices.stat().st_mode & 0o777 == 0o600
 
