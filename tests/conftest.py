@@ -173,13 +173,14 @@ def _second_tries(config: pytest.Config) -> list[pytest.TestReport]:
 
 @pytest.fixture(scope="session")
 def alignment() -> Alignment:
-    """Return an alignment of random numbers, each field unlike every other."""
+    """Return an alignment of random numbers, each field unlike every other; it can be solved."""
     rng = np.random.default_rng(1)
+    cloud_m = rng.normal(size=(150, 3)) * [0.05, 0.05, 0.005]
     return Alignment(
-        cursor_m=rng.normal(size=(40, 3)),
-        hand_m=rng.normal(size=(50, 3)),
-        cursor_is_cut=rng.random(40) < 0.1,
-        hand_is_cut=rng.random(50) < 0.1,
+        cursor_m=cloud_m[:140],
+        hand_m=cloud_m + rng.normal([0.01, 0.0, -0.01], 0.0005, (150, 3)),
+        cursor_is_cut=rng.random(140) < 0.1,
+        hand_is_cut=rng.random(150) < 0.1,
         T_E_W={
             "left": rigid(rng.normal(size=3), rng.normal(size=3)),
             "right": rigid(rng.normal(size=3), rng.normal(size=3)),
@@ -188,7 +189,7 @@ def alignment() -> Alignment:
         rotation_rad=rng.normal(size=3),
         t_a_ns=1_700_000_000_123_456_789,
         t_b_ns=1_700_000_003_123_456_789,
-        drawn_shift_m={"left": rng.normal(size=3), "right": rng.normal(size=3)},
+        drawn_shift_m={"left": 0.01 * rng.normal(size=3), "right": 0.01 * rng.normal(size=3)},
     )
 
 

@@ -47,7 +47,7 @@ from handcal.calibration.evidence import Contradiction, Evidence
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.hold import merge_hold
 from handcal.calibration.sight import Sight
-from handcal.calibration.solve_again import solve_contents
+from handcal.calibration.solve_again import solve_again, solve_contents
 from handcal.calibration.states import (
     MAX_HAND_SET_SHIFT_M,
     CalibrationSettings,
@@ -728,8 +728,8 @@ class Calibration:
         """Continue where the session is; a cursor or projections pending then are lost."""
         if record.is_solved:
             try:
-                self.results = solve_contents(record, self._settings.solve)
-            except ValueError as error:
+                self.results = solve_again(record, self._settings.solve)
+            except FileError as error:
                 raise ProcedureError(f"{record.path} cannot be resumed: {error}") from error
             self.state = State.APPLIED if record.is_applied else State.SOLVED
         elif record.is_solvable:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from handcal.calibration.states import CalibrationSettings
-from handcal.core.errors import FileError
+from handcal.core.errors import FileError, HandError
 from handcal.core.progress import Progress
 from handcal.core.types import METHODS, EyeDistance, Method
 from handcal.io.settings import read_settings
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.session.session import SessionRecord
+from handcal.session.journal import Damage
+from handcal.session.repair import SessionCheck, check_session, without_unsolvable
+from handcal.session.session import Session, SessionRecord
 
 
 def solve(
@@ -42,10 +45,8 @@ def solve(
     Raises
     ------
     FileError
-        If the session has no alignments, one of them cannot be solved, or its settings cannot be
-        read.
-    HandError
-        If nearly all points of an alignment lie beside cut edges.
+        If the session has no alignments, none of them can be solved, or its settings cannot be
+        read. Those that cannot be solved are left out.
     ValueError
         If the method is unknown.
 
@@ -66,7 +67,8 @@ def solve(
         settings = replace(settings, method=method)
     results = solve_again(session, settings, eye_distance=eye_distance)
     if results is None:
-        raise FileError(f"{session.path} holds no alignment to solve")
+        why = f"; {session.left_out}" if session.left_out else ""
+        raise FileError(f"{session.path} holds no alignment to solve{why}")
     return results
 
 
@@ -82,7 +84,17 @@ def solve_again(
     progress: Progress = Progress(),
     eye_distance: EyeDistance | None = None,
 ) -> Results | None:
-    """Return the results of a session's alignments; None if there are none to solve.
+    """Return the results of `solve_sound`, with its parameters and errors."""
+    return solve_sound(record, settings, progress, eye_distance)[1]
+
+
+def solve_sound(
+    record: SessionRecord,
+    settings: SolveSettings,
+    progress: Progress = Progress(),
+    eye_distance: EyeDistance | None = None,
+) -> tuple[SessionRecord, Results | None]:
+    """Solve the alignments of a session that can be solved.
 
     Parameters
     ----------
@@ -93,19 +105,42 @@ def solve_again(
     eye_distance : EyeDistance, optional
         The wearer's, in place of the session's own.
 
+    Returns
+    -------
+    SessionRecord
+        Without the alignments that cannot be solved, which its `damaged` names.
+    Results or None
+        None if there is nothing to solve.
+
     Raises
     ------
     FileError
-        If an alignment cannot be solved.
+        If none of the alignments can be solved.
     CancelledError
         If it was cancelled.
     """
     if not record.is_solvable:
-        return None
+        return record, None
     try:
-        return solve_contents(record, settings, progress, eye_distance)
-    except ValueError as error:
-        raise FileError(f"{record.path} cannot be solved: {error}") from error
+        return record, solve_contents(record, settings, progress, eye_distance)
+    except (ValueError, HandError) as error:
+        rest = without_unsolvable(record, settings, progress)
+        if rest is record or not rest.is_solvable:
+            raise FileError(f"{record.path} cannot be solved: {error}") from error
+        return solve_sound(rest, settings, progress, eye_distance)
+
+
+def check_solvable(path: Path) -> SessionCheck:
+    """Return whether a session is sound and can be solved, with all that is not."""
+    found = check_session(path)
+    if found.state == "none":
+        return found
+    record = Session.open(path)
+    try:
+        damaged = solve_sound(record, stored_solve_settings(record))[0].damaged
+    except FileError as error:
+        damaged = (*found.damaged, Damage("results.json", None, f"there can be none: {error}"))
+    return SessionCheck("damaged" if damaged else "sound", damaged)
 
 
 def solve_contents(

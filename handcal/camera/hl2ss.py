@@ -36,10 +36,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handcal.core.conventions import opengl_transform
-from handcal.core.errors import CameraError, CameraTimeoutError
+from handcal.core.errors import CameraError, CameraTimeoutError, FileError
 from handcal.core.geometry import invert, is_rigid
 from handcal.core.types import Float32, Float64, UInt16
 from handcal.io.closable import Closable
+from handcal.io.images import PNG_START, decode_image
 
 StreamName: TypeAlias = Literal["ahat", "longthrow"]
 
@@ -55,7 +56,6 @@ _RIG_M = 0.5
 _UNITS_PER_M = 100.0, 100_000.0
 _ALIAS_M = 0.3, 20.0
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
-_PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,10 +280,13 @@ def _ahat_images(stream: Stream, payload: bytes) -> tuple[UInt16, UInt16]:
 def _png_images(stream: Stream, payload: bytes) -> tuple[UInt16, UInt16]:
     size = struct.pack(">II", stream.width, stream.height)
     # The size is checked before the image is unpacked: a small file may hold a huge image.
-    if not payload.startswith(_PNG_START + size):
+    if not payload.startswith(PNG_START + size):
         raise foreign(stream, f"no PNG of {stream.width}x{stream.height}")
-    image = cv2.imdecode(np.frombuffer(payload, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None or image.dtype != np.uint8 or image.size != 4 * stream.pixels:
+    try:
+        image = decode_image(payload, "the image", cv2.IMREAD_UNCHANGED)
+    except FileError as error:
+        raise foreign(stream, "no PNG of 4 channels") from error
+    if image.dtype != np.uint8 or image.size != 4 * stream.pixels:
         raise foreign(stream, "no PNG of 4 channels")
     return _pair(stream, np.ascontiguousarray(image).reshape(-1).view("<u2"))
 

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from handcal.camera.images import DISTORTION_COUNTS
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
 from handcal.core.errors import CameraEndError, CameraError, FileError
-from handcal.core.geometry import invert, rigid
+from handcal.core.geometry import invert, is_rigid, rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, UInt8, UInt16
 from handcal.io.images import MAX_SIDE_PX, decode_image
 
@@ -255,7 +255,7 @@ class RosCamera(PlayedCamera):
                 if other not in found:
                     found[other] = T_other_frame @ found[frame]
                     reached.append(other)
-        if dst not in found or np.linalg.norm(found[dst][:3, 3]) > _REACH_M:
+        if dst not in found or not is_rigid(found[dst], _REACH_M):
             raise CameraError(
                 f"{self._folder} has no transform between {src!r} and {dst!r}, the frames of depth "
                 "and colour; record /tf_static as well"
@@ -346,7 +346,7 @@ def _kind(message: Any) -> str:
 def _unpacked(message: Any, flags: int, skip: int = 0) -> NDArray[Any]:
     """Decode a compressed image, beginning behind so many bytes."""
     try:
-        return decode_image(bytes(message.data[skip:]), Path(message.format), flags)
+        return decode_image(bytes(message.data[skip:]), message.format, flags)
     except FileError as error:
         raise CameraError(f"an image of the recording: {error}") from error
 

@@ -56,6 +56,8 @@ def solve(arguments: argparse.Namespace) -> None:
     record = Session.open(arguments.session)
     _say_what_is_left_out(record)
     results = solve_again.solve(record, method=arguments.method, eye_distance=eye_distance)
+    for left in sorted(record.alignments.keys() - results.alignments.keys()):
+        console.print(f"Left out: alignment {left}; handcal session check says why.")
     save(arguments.json, results_json(results))
     shown_table = table("eye", "φ, mm", "± σ, mm", "RMS, mm", "inliers", "verdict")
     for eye, shift in results.eyes.items():
@@ -123,10 +125,10 @@ def export(arguments: argparse.Namespace) -> None:
 
 @command(arg("session", type=Path, help="session folder"), json=True)
 def check(arguments: argparse.Namespace) -> None:
-    """Check every part of a session; exit code 1 if any is damaged, 2 if it is not a session."""
-    from handcal.session.repair import check_session
+    """Check all of a session, and solve it; exit code 1 if any is bad, 2 if it is not a session."""
+    from handcal.calibration.solve_again import check_solvable
 
-    found = check_session(arguments.session)
+    found = check_solvable(arguments.session)
     save(arguments.json, asdict(found))
     for damage in found.damaged:
         # The message that it is not a session names its folder itself.

@@ -31,7 +31,10 @@ Result = TypeVar("Result")
 
 _STUDY_OPTIONS: dict[str, Option] = {
     "--workers": value(
-        "--workers", number(int, 1, 1024), "N", "number of processes (default: one per core)"
+        "--workers",
+        number(int, 1, 1024),
+        "N",
+        "number of processes, at most one per core (default)",
     ),
     "--scheduler": arg(
         "--scheduler",

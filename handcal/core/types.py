@@ -261,6 +261,8 @@ class Alignment:
         freeze(self, "cursor_is_cut", np.bool_, len(self.cursor_m))
         freeze(self, "hand_is_cut", np.bool_, len(self.hand_m))
         freeze(self, "rotation_rad", np.float64, 3)
+        if not 0.0 <= self.time_sigma_m < np.inf:
+            raise ValueError(f"Alignment.time_sigma_m: {self.time_sigma_m} is no σ")
         if self.outline_sigma_px is not None and not 0.0 <= self.outline_sigma_px < np.inf:
             raise ValueError(f"Alignment.outline_sigma_px: {self.outline_sigma_px} is no σ")
         poses = {eye: readonly(T, np.float64, (4, 4)) for eye, T in self.T_E_W.items()}
@@ -357,6 +359,9 @@ class Verdict:
     reason: str
 
 
+_MOST_VERIFIED = 1e5  # arcmin, more than a whole turn; beyond, the fused numbers overflow
+
+
 @dataclass(frozen=True, slots=True)
 class Verification:
     """The verification of one eye by the wearer, who moves the drawing until it covers the hand."""
@@ -378,6 +383,14 @@ class Verification:
     """Of the outline as drawn; as in `Alignment`."""
     earlier: tuple[Verification, ...] = ()
     """Verifications of the same eye before this one, oldest first; each is fused as well."""
+
+    def __post_init__(self) -> None:
+        places = (*self.before_m, *self.after_m, *(self.hand_E_m or ()))
+        moves = *self.nudge_arcmin, *self.offset_arcmin, self.nudge_size, self.offset_size
+        if not all(abs(one) < _MOST_VERIFIED for one in (*places, *moves)):
+            raise ValueError("a verification's numbers are too large")
+        if self.outline_sigma_px is not None and not 0.0 <= self.outline_sigma_px < _MOST_VERIFIED:
+            raise ValueError(f"Verification.outline_sigma_px: {self.outline_sigma_px} is no σ")
 
     @property
     def was_moved(self) -> bool:

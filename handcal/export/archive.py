@@ -9,6 +9,7 @@ from pathlib import Path
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
+from handcal.io.files import open_no_link
 from handcal.session.journal import JOURNAL_END
 from handcal.session.session import SessionRecord
 
@@ -60,7 +61,10 @@ def write_archive(
                     if found.is_dir():
                         archive.writestr(_entry(f"{name}/"), b"")
                         continue
-                    with found.open("rb") as source, archive.open(_entry(name), "w") as target:
+                    with (
+                        open(found, "rb", opener=open_no_link) as source,
+                        archive.open(_entry(name), "w") as target,
+                    ):
                         while chunk := source.read(min(left_bytes, _CHUNK_BYTES)):
                             target.write(chunk)
                             left_bytes -= len(chunk)

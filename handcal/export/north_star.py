@@ -32,7 +32,7 @@ _REPLACED = frozenset(
     | {"left", "right", "baseline", "ipd", "IPD", "fov", "FOV", "handcal"}
     | {f"{eye}_uv_to_rect_{axis}" for eye in EYES for axis in "xy"}
 )
-"""Keys of the calibrations that the driver reads. Of several it takes the first kind that it finds."""
+"""Fields that the driver reads as a calibration; of several kinds it takes the first."""
 _TRACKERS = (
     ("leapTracker", "localPose"),
     ("leapTracker", "P_middleofeyes_to_trackingcenter_oxr"),

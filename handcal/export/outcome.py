@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from handcal.calibration.solve_again import solve_again, stored_solve_settings
+from handcal.calibration.solve_again import solve_sound, stored_solve_settings
 from handcal.core.display import projection_matrix
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, Float64, Projection
@@ -26,6 +26,7 @@ class SessionOutcome:
     """A session and its results, including residuals and histories, which are not stored."""
 
     record: SessionRecord
+    """Without alignments that cannot be solved."""
     settings: SolveSettings
     """The session's own."""
     results: Results | None
@@ -77,10 +78,10 @@ def load_outcome(record: SessionRecord, progress: Progress = Progress()) -> Sess
     Raises
     ------
     FileError
-        If its settings are unreadable or an alignment cannot be solved.
+        If its settings are unreadable or no alignment can be solved.
     """
     settings = stored_solve_settings(record)
-    results = solve_again(record, settings, progress)
+    record, results = solve_sound(record, settings, progress)
     return SessionOutcome(
         record, settings, results, {eye: _shifts_m(record, results, eye) for eye in EYES}
     )

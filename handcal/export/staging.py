@@ -7,13 +7,14 @@ The next export to the same target removes the remains of a killed program.
 from __future__ import annotations
 
 import contextlib
+import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
 from handcal.core.errors import FileError
 from handcal.io.closable import Closable
-from handcal.io.files import make_folder, sync_folder
+from handcal.io.files import make_folder, refuse_links, sync_folder
 from handcal.io.lock import FileLock
 
 
@@ -43,6 +44,7 @@ class Staging(Closable):
         if not home.is_dir():
             raise FileError(f"cannot write to {self._folder}: {home} is a file, not a folder")
         self._root = home / f".{self._folder.name}.handcal-export"
+        refuse_links(self._root, home)
         try:
             self._lock = FileLock(make_folder(self._root) / "lock")
         except FileError as error:  # it names a folder that nobody chose
@@ -70,7 +72,8 @@ class Staging(Closable):
         Raises
         ------
         FileError
-            If a file cannot be moved or replaced; the folder is then unchanged.
+            If a file cannot be moved or replaced, or a subfolder is a link; the folder is then
+            unchanged.
         """
         names = sorted(
             path.relative_to(self.path) for path in self.path.rglob("*") if path.is_file()
@@ -105,9 +108,10 @@ class Staging(Closable):
         } - set(names)
         affected = [*names, *stale]
         for name in affected:
-            if (self._folder / name).exists():
+            refuse_links((self._folder / name).parent, self._folder)
+            if os.path.lexists(self._folder / name):
                 make_folder((self._old / name).parent)
-                shutil.copy2(self._folder / name, self._old / name)
+                shutil.copy2(self._folder / name, self._old / name, follow_symlinks=False)
         try:
             for name in names:
                 make_folder((self._folder / name).parent)
@@ -124,7 +128,7 @@ class Staging(Closable):
             raise
 
     def _put_back(self, name: Path) -> None:
-        if (self._old / name).exists():
+        if os.path.lexists(self._old / name):
             (self._old / name).replace(self._folder / name)
         else:
             (self._folder / name).unlink(missing_ok=True)

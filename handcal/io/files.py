@@ -10,6 +10,7 @@ import secrets
 import shutil
 import stat
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from handcal.core.types import UInt8
 
 MAX_JSON_BYTES = 16 * 2**20
 _MOST_DIGITS = 20  # 64 bits and a sign: neither NumPy nor a float overflows
+_JUNCTION = 0xA0000003  # IO_REPARSE_TAG_MOUNT_POINT: a link to a folder on Windows
 _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}", re.DOTALL)
 _PLY_TYPES = {"f4": "float", "f8": "double", "u1": "uchar"}
 
@@ -43,7 +45,7 @@ def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
     path : Path
     data : bytes
     mode : int
-        Permissions, less the umask; 0o600 hides a secret from other users.
+        Permissions, less the umask and what its folder denies; 0o600 hides a secret from others.
 
     Raises
     ------
@@ -56,7 +58,8 @@ def write_atomic(path: Path, data: bytes, mode: int = 0o666) -> None:
             raise FileError(f"cannot write {path}: it is a folder, a device or a pipe")
         try:
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-            with os.fdopen(os.open(temporary, flags, mode), "wb") as file:
+            descriptor = os.open(temporary, flags, mode & path.parent.stat().st_mode)
+            with os.fdopen(descriptor, "wb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
@@ -81,7 +84,7 @@ def write_new(path: Path, data: bytes) -> None:
     """
     try:
         path.unlink(missing_ok=True)
-        with path.open("xb") as file:
+        with open(path, "xb", opener=open_no_link) as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
@@ -130,22 +133,37 @@ def require_suffix(path: Path, suffix: str) -> None:
         raise FileError(f"{path} must end in {suffix}, the format that is written")
 
 
-def read_limited(path: Path, max_bytes: int) -> bytes:
+def read_limited(path: Path, max_bytes: int, inside: Path | None = None) -> bytes:
     """Return the content of `path`.
+
+    Parameters
+    ----------
+    path : Path
+    max_bytes : int
+    inside : Path, optional
+        A folder above it that may come from somebody else: links in it are not followed.
 
     Raises
     ------
     FileError
-        If it cannot be read, is a device or a pipe, or holds more than `max_bytes`.
+        If it cannot be read, is a device or a pipe, holds more than `max_bytes`, or is a link or in
+        a linked folder `inside`.
     """
+    if inside is not None:
+        refuse_links(path, inside)
+    opener = _open_at_once if inside is None else open_no_link
     try:
-        with open(path, "rb", opener=_open_at_once) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        with open(path, "rb", opener=opener) as file:
+            found = os.fstat(file.fileno())
+            if not stat.S_ISREG(found.st_mode):
                 raise FileError(f"cannot read {path}: it is a device or a pipe")
-            data = file.read(max_bytes + 1)
+            size = found.st_size  # which is allocated, not the limit
+            data = file.read(size + 1) if size <= max_bytes else b""
+            if size < len(data) <= max_bytes:  # it grows, or does not know its size
+                data += file.read(max_bytes + 1 - len(data))
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror or error}") from error
-    if len(data) > max_bytes:
+    if max(size, len(data)) > max_bytes:
         raise FileError(f"{path} is larger than the {max_bytes:,} bytes allowed for it")
     return data
 
@@ -153,6 +171,29 @@ def read_limited(path: Path, max_bytes: int) -> bytes:
 def _open_at_once(path: str, flags: int) -> int:
     """Open a file; a pipe without waiting for its writer."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def open_no_link(path: str, flags: int) -> int:
+    """Open a file as `_open_at_once`, but no link; a new one is as private as its folder."""
+    flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+    if not flags & os.O_CREAT:
+        return os.open(path, flags)
+    return os.open(path, flags, 0o666 & os.stat(os.path.dirname(path) or ".").st_mode)  # noqa: PTH116, PTH120
+
+
+def refuse_links(path: Path, inside: Path) -> None:
+    """Raise FileError if `path` or a folder between it and `inside` is a link or a junction.
+
+    A folder from somebody else may hold links to files of the user's: following one would read,
+    change or delete those.
+    """
+    part, below, end = os.fspath(path), "", os.fspath(inside)
+    while part not in ("", below, end):
+        with suppress(OSError):  # nothing is there
+            found = os.lstat(part)
+            if stat.S_ISLNK(found.st_mode) or getattr(found, "st_reparse_tag", 0) == _JUNCTION:
+                raise FileError(f"{part} is a link, which is not followed here; remove it")
+        part, below = os.path.dirname(part), part  # noqa: PTH120
 
 
 def modified_s(path: Path) -> float:
@@ -163,14 +204,16 @@ def modified_s(path: Path) -> float:
         return 0.0
 
 
-def make_folder(path: Path) -> Path:
+def make_folder(path: Path, inside: Path | None = None) -> Path:
     """Create `path` with its parents if needed, on the disk, and return it.
 
     Raises
     ------
     FileError
-        If it cannot be created.
+        If it cannot be created, or is a link or in one; `inside` as for `read_limited`.
     """
+    if inside is not None:
+        refuse_links(path, inside)
     try:
         created = [folder for folder in (path, *path.parents) if not folder.exists()]
         path.mkdir(parents=True, exist_ok=True)
@@ -205,15 +248,15 @@ def write_json(path: Path, value: object) -> None:
     write_atomic(path, (json.dumps(value, indent=2, allow_nan=False) + "\n").encode())
 
 
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the JSON object in `path`.
+def read_json(path: Path, inside: Path | None = None) -> dict[str, Any]:
+    """Return the JSON object in `path`; `inside` as for `read_limited`.
 
     Raises
     ------
     FileError
         If it cannot be read, is too large, or is not a JSON object.
     """
-    data = read_limited(path, MAX_JSON_BYTES)
+    data = read_limited(path, MAX_JSON_BYTES, inside)
     try:
         value = json.loads(data, parse_int=whole_number)
     except UnicodeDecodeError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,10 @@ IMAGE_KINDS = "PNG, JPEG, TIFF, BMP or PGM"
 _MAX_FILE_BYTES = 64 * 2**20
 MAX_SIDE_PX = 8192
 _MAX_PIXELS = 16 * 2**20
-_PNG = b"\x89PNG\r\n\x1a\n"
+PNG_START = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 """Values of a pixel by the colour type in a PNG's header."""
+_MOST_CHUNKS = 65_536
 _PIECE_BYTES = 2**20
 _HARMLESS_BYTES = 2**20
 """A shorter PNG cannot unpack to more than 1 GB, in about two seconds."""
@@ -34,32 +36,50 @@ _TIFF_CHANNELS, _MOST_CHANNELS = 277, 4
 _PNM = re.compile(rb"P[1-6](?:\s+(?:#[^\n]*\n\s*)*)(\d{1,9})(?:\s+(?:#[^\n]*\n\s*)*)(\d{1,9})\s")
 # Start-of-frame segments, which hold a JPEG's size; C4, C8 and CC among them are something else.
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_JPEG_SEGMENTS = frozenset(range(0xC0, 0xFF)) - set(range(0xD0, 0xDA))
+"""Those that begin with their length."""
+_JPEG_SCAN = b"\xff\xda"
+_MOST_SCANS = 100
+"""Each takes time for all pixels, and as little as 60 bytes; usual are up to 12."""
 
 
 def read_image(path: Path, flags: int) -> NDArray[Any]:
-    """Read an image as `cv2.imdecode` with `flags` does, its size checked before decoding.
+    """Read an image; parameters and errors are those of `decode_image`."""
+    return decode_image(read_limited(path, _MAX_FILE_BYTES), path, flags)
+
+
+def decode_image(data: bytes, name: object, flags: int) -> NDArray[Any]:
+    """Decode an image as `cv2.imdecode` with `flags` does, its sizes checked before.
+
+    OpenCV allocates what the header of an image or of a chunk announces, whatever follows.
+
+    Parameters
+    ----------
+    data : bytes
+    name : object
+        The image in error messages, such as its path.
+    flags : int
 
     Raises
     ------
     FileError
-        If it is missing, damaged, too large or none of `IMAGE_KINDS`.
+        If it is damaged, too large or none of `IMAGE_KINDS`.
     """
-    return decode_image(read_limited(path, _MAX_FILE_BYTES), path, flags)
-
-
-def decode_image(data: bytes, path: Path, flags: int) -> NDArray[Any]:
-    """Decode a PNG or JPEG as `read_image` does; its messages name `path`."""
-    width, height = _image_size(data, path)
+    width, height = _image_size(data, name)
     if width * height > _MAX_PIXELS or max(width, height) > MAX_SIDE_PX:
-        raise FileError(f"{path} is {width}x{height} pixels, more than is allowed")
-    if data.startswith(_PNG) and len(data) > _HARMLESS_BYTES:
-        _require_pixels_only(data, path, width, height)
+        raise FileError(f"{name} is {width}x{height} pixels, more than is allowed")
+    if data.startswith(PNG_START):
+        chunks = _png_chunks(data, name)
+        if len(data) > _HARMLESS_BYTES:
+            _require_pixels_only(data, chunks, name, width, height)
+    if data.startswith(_JPEG) and data.count(_JPEG_SCAN) > _MOST_SCANS:
+        raise FileError(f"{name} has more than {_MOST_SCANS} scans; save it as a plain JPEG")
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:
-        raise FileError(f"{path} cannot be decoded: {error.err}") from error
+        raise FileError(f"{name} cannot be decoded: {error.err}") from error
     if image is None:
-        raise FileError(f"{path} is damaged")
+        raise FileError(f"{name} is damaged")
     return image
 
 
@@ -100,40 +120,55 @@ def png_bytes(image: UInt8) -> bytes:
     return cv2.imencode(".png", stored)[1].tobytes()
 
 
-def _require_pixels_only(data: bytes, path: Path, width: int, height: int) -> None:
+def _png_chunks(data: bytes, name: object) -> list[tuple[bytes, slice]]:
+    """Return type and place of a PNG's chunks; FileError if one announces more than follows."""
+    chunks: list[tuple[bytes, slice]] = []
+    at = len(PNG_START) - 8
+    while at + 12 <= len(data) and len(chunks) < _MOST_CHUNKS:
+        content = slice(at + 8, at + 8 + int.from_bytes(data[at : at + 4]))
+        chunks.append((data[at + 4 : at + 8], content))
+        at = content.stop + 4
+        if chunks[-1][0] == b"IEND" and at <= len(data):
+            return chunks
+    raise FileError(f"{name} is damaged: its parts are not as long or as many as it says")
+
+
+def _require_pixels_only(
+    data: bytes, chunks: Iterable[tuple[bytes, slice]], name: object, width: int, height: int
+) -> None:
     """Raise FileError if a PNG unpacks to more than the pixels that its header announces.
 
     The decoder would unpack all of it, for seconds, after the last pixel.
     """
-    values = _PNG_CHANNELS.get(data[25], 0) * data[24] if len(data) > 25 else 0
+    values = _PNG_CHANNELS.get(data[25], 0) * data[24]
     # Interlaced rows are shorter, but up to twice as many; each begins with a byte of its own.
     left_bytes = 2 * height * (1 + (width * values + 7) // 8) + width
     unpacker = zlib.decompressobj()
-    at = len(_PNG)
-    while at + 12 <= len(data) and not unpacker.eof:
-        end = at + 8 + int.from_bytes(data[at : at + 4])
-        packed = data[at + 8 : end] if data[at + 4 : at + 8] == b"IDAT" else b""
-        at = end + 4
+    for packed in (data[content] for kind, content in chunks if kind == b"IDAT"):
         while packed and not unpacker.eof:
             try:
                 left_bytes -= len(unpacker.decompress(packed, _PIECE_BYTES))
             except zlib.error:
                 return  # the decoder says what is wrong
             if left_bytes < 0:
-                raise FileError(f"{path} unpacks to more than its {width}x{height} pixels")
+                raise FileError(f"{name} unpacks to more than its {width}x{height} pixels")
             packed = unpacker.unconsumed_tail
 
 
-def _image_size(data: bytes, path: Path) -> tuple[int, int]:
-    """Return the size in an image's header, without decoding it."""
-    if data.startswith(_PNG) and len(data) >= 24:
+def _image_size(data: bytes, name: object) -> tuple[int, int]:
+    """Return the size in an image's header, as its decoder finds it, without decoding it."""
+    if data.startswith(PNG_START) and len(data) > len(PNG_START) + 10:
         return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
     if data.startswith(_JPEG):
         at = 2
         while at + 9 <= len(data) and data[at] == 0xFF:
             if data[at + 1] in _JPEG_FRAMES:
                 return int.from_bytes(data[at + 7 : at + 9]), int.from_bytes(data[at + 5 : at + 7])
-            at += 2 + int.from_bytes(data[at + 2 : at + 4])
+            if data[at + 1] in _JPEG_SEGMENTS:
+                at += 1 + int.from_bytes(data[at + 2 : at + 4])
+            elif data[at + 1] != 0xFF:  # which only fills
+                break
+            at += 1
     if data.startswith(b"BM") and len(data) >= 26:
         ends = (20, 22) if data[14] == 12 else (22, 26)  # OS/2's header is shorter
         width, height = (
@@ -144,11 +179,11 @@ def _image_size(data: bytes, path: Path) -> tuple[int, int]:
     if match := _PNM.match(data[:4096]):
         return int(match[1]), int(match[2])
     if data[:4] in _TIFF:
-        return _tiff_size(data, path)
-    raise FileError(f"{path} is not a {IMAGE_KINDS} image")
+        return _tiff_size(data, name)
+    raise FileError(f"{name} is not a {IMAGE_KINDS} image")
 
 
-def _tiff_size(data: bytes, path: Path) -> tuple[int, int]:
+def _tiff_size(data: bytes, name: object) -> tuple[int, int]:
     """Return the size of a TIFF's first image, or of its tiles if they are larger."""
 
     def number(at: int, size: int) -> int:
@@ -160,8 +195,8 @@ def _tiff_size(data: bytes, path: Path) -> tuple[int, int]:
         value = number(at + 8, 2 if number(at + 2, 2) == 3 else 4)
         tags[number(at, 2)] = max(tags.get(number(at, 2), 0), value)
     if tags.get(_TIFF_CHANNELS, 1) > _MOST_CHANNELS:
-        raise FileError(f"{path} has {tags[_TIFF_CHANNELS]} channels, more than is allowed")
+        raise FileError(f"{name} has {tags[_TIFF_CHANNELS]} channels, more than is allowed")
     width, height = (max(tags.get(tag, 0) for tag in side) for side in _TIFF_SIDES)
     if not width or not height:
-        raise FileError(f"{path} is damaged")
+        raise FileError(f"{name} is damaged")
     return width, height

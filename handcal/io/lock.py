@@ -13,6 +13,9 @@ from io import FileIO
 from pathlib import Path
 
 from handcal.core.errors import FileError, InUseError
+from handcal.io.files import open_no_link, refuse_links
+
+_MOST_BYTES = 64
 
 if sys.platform == "win32":
     import msvcrt
@@ -39,28 +42,34 @@ class FileLock:
     InUseError
         If this or another program holds it.
     FileError
-        If the file cannot be opened.
+        If the file cannot be opened, is a link, or is not one that a lock has written.
     """
 
     def __init__(self, path: Path) -> None:
+        refuse_links(path, path.parent)
         try:
-            file = path.open("a+b", buffering=0)
+            file = open(path, "a+b", buffering=0, opener=open_no_link)  # noqa: SIM115
+            file.seek(0)
+            holder = (file.read(_MOST_BYTES) or b"").strip(b"\0").decode(errors="replace")
         except OSError as error:
             is_gone = isinstance(error, FileNotFoundError)
             advice = "" if is_gone else "; make it writable, or use a copy of it elsewhere"
             why = error.strerror or error
             raise FileError(f"cannot lock {path.parent}: {why}{advice}") from error
+        if holder.strip("0123456789"):
+            file.close()
+            raise FileError(
+                f"{path} is no lock of handcal, as it holds something else; move it away"
+            )
         try:
             _try_lock(file)
         except OSError as error:
-            file.seek(0)
-            holder = (file.read(20) or b"").decode(errors="replace") or "unknown"
             file.close()
             is_here = holder == str(os.getpid())
             whose = "this program" if is_here else "another program"
             raise InUseError(
-                f"{path.parent} is in use by process {holder}, {whose}; close it there, then "
-                "try again",
+                f"{path.parent} is in use by process {holder or 'unknown'}, {whose}; "
+                "close it there, then try again",
                 is_here=is_here,
             ) from error
         with suppress(OSError):  # only for people to read: a full disk locks nobody out
@@ -72,7 +81,7 @@ class FileLock:
     def require_held(self) -> None:
         """Raise FileError if the folder or the lock's file was removed or replaced."""
         try:
-            is_same = os.path.samestat(self._path.stat(), os.fstat(self._file.fileno()))
+            is_same = os.path.samestat(self._path.lstat(), os.fstat(self._file.fileno()))
         except FileNotFoundError:
             is_same = False
         except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import secrets
@@ -18,6 +19,8 @@ from handcal.io.configuration import configuration_folder
 from handcal.io.files import make_folder, read_limited, write_atomic
 from handcal.io.lock import FileLock
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
+
+_LOG = logging.getLogger(__name__)
 
 KEY_VARIABLE = "HANDCAL_PAIRING_KEY"
 MAX_DEVICES = 16
@@ -70,7 +73,7 @@ def read_pairing_key(path: Path | None = None) -> bytes:
         If the file cannot be read.
     """
     if path is not None:
-        key = read_limited(path, _MAX_KEY_BYTES).strip()
+        key = _read_secret(path, _MAX_KEY_BYTES)
     else:
         key = os.fsencode(os.environ.get(KEY_VARIABLE, "")).strip()
     if not key:
@@ -290,10 +293,23 @@ class Pairings:
         return None
 
 
+def _read_secret(path: Path, max_bytes: int) -> bytes:
+    """Return the content of a file of keys, with a warning if other users can open it."""
+    content = read_limited(path, max_bytes).strip()
+    with suppress(OSError):
+        if os.name == "posix" and path.stat().st_mode & 0o077:
+            _LOG.warning(
+                "other users of this computer can open the keys in %s: chmod 600 forbids it; "
+                "pair the headsets again if somebody may have read them",
+                path,
+            )
+    return content
+
+
 def _read(path: Path) -> tuple[Pairing, ...]:
     if not os.path.exists(path):
         return ()
-    content = read_limited(path, _MAX_FILE_BYTES).strip()
+    content = _read_secret(path, _MAX_FILE_BYTES)
     try:
         devices = json.loads(content.decode())["devices"]
         if not isinstance(devices, list) or len(devices) > MAX_DEVICES:

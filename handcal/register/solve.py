@@ -25,6 +25,9 @@ MIN_POINTS = 100
 MAX_POINTS = 2_000_000
 _LEAST_WIDTH_M = 1e-4
 _FARTHEST_M = 1e6
+_WIDEST_M = 1.0  # root mean square distance from the middle: of a hand in millimetres it is 70
+_FARTHEST_SHIFT_M = 0.1
+_LARGEST_ROTATION_RAD = 2.0 * np.pi
 # Of a single solved eye: the eye box is about 2 cm wide (paper).
 _WIDE_EYE_BOX_M = 0.010
 
@@ -121,11 +124,7 @@ def solve_alignment(
     HandError
         If nearly all points lie beside cut edges.
     """
-    check_cloud("cursor_m", alignment.cursor_m)
-    check_cloud("hand_m", alignment.hand_m)
-    known = alignment.T_E_W.keys() & alignment.drawn_shift_m.keys()
-    if not alignment.eyes or not known.issuperset(alignment.eyes):
-        raise ValueError("the alignment names no eye, or one without pose or drawn shift")
+    check_alignment(alignment)
     if method == "consistent":
         match = match_hands(
             alignment.cursor_m, alignment.hand_m, alignment.cursor_is_cut, alignment.hand_is_cut
@@ -133,7 +132,7 @@ def solve_alignment(
     shifts: dict[Eye, EyeShift] = {}
     for eye in alignment.eyes:
         distance_m = rig.eyes[eye].z_C0_S_m
-        T_E = _check_pose(alignment.T_E_W[eye])
+        T_E = alignment.T_E_W[eye]
         T_drawn = cursor_displacement(alignment.drawn_shift_m[eye], distance_m)
         if method == "consistent":
             shifts[eye] = fit_match(match, T_E, distance_m, T_drawn)
@@ -142,6 +141,25 @@ def solve_alignment(
             hand = transform(T_E, alignment.hand_m)
             shifts[eye] = _solve_baseline(cursor, hand, distance_m, method, checkpoint)
     return shifts
+
+
+def check_alignment(alignment: Alignment) -> None:
+    """Raise ValueError, which names the fault, if an alignment cannot be solved with any rig.
+
+    Times are not compared: those of a recording start again with each loop.
+    """
+    check_cloud("cursor_m", alignment.cursor_m)
+    check_cloud("hand_m", alignment.hand_m)
+    for T_E_W in alignment.T_E_W.values():
+        _check_pose(T_E_W)
+    known = alignment.T_E_W.keys() & alignment.drawn_shift_m.keys()
+    if not alignment.eyes or not known.issuperset(alignment.eyes):
+        raise ValueError("the alignment names no eye, or one without pose or drawn shift")
+    shifts_m = list(alignment.drawn_shift_m.values())
+    if not (np.abs(shifts_m) < _FARTHEST_SHIFT_M).all():
+        raise ValueError("drawn_shift_m must be three numbers below 0.1 m")
+    if not (np.abs(alignment.rotation_rad) < _LARGEST_ROTATION_RAD).all():
+        raise ValueError("rotation_rad must be three numbers below one turn")
 
 
 def check_cloud(name: str, points_m: ArrayLike) -> Float64:
@@ -156,8 +174,11 @@ def check_cloud(name: str, points_m: ArrayLike) -> Float64:
     if not (cloud.max() < _FARTHEST_M and cloud.min() > -_FARTHEST_M):
         raise ValueError(f"{name} contains NaN or infinity, or points as far away")
     centred = cloud - mean_point(cloud)
-    if np.linalg.eigvalsh(centred.T @ centred / len(cloud))[1] < _LEAST_WIDTH_M**2:
+    scatter_m2 = centred.T @ centred / len(cloud)
+    if np.linalg.eigvalsh(scatter_m2)[1] < _LEAST_WIDTH_M**2:
         raise ValueError(f"{name} has all its points on one line; a hand's surface is needed")
+    if np.trace(scatter_m2) > _WIDEST_M**2:
+        raise ValueError(f"{name} is wider than any hand; metres are needed")
     return cloud
 
 

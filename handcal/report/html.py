@@ -54,7 +54,7 @@ def write_html(path: Path, report: Report, progress: Progress) -> None:
     )
     write_atomic(path, text.encode())
     for name, files in drawn.items():
-        folder = make_folder(path.parent / "figures")
+        folder = make_folder(path.parent / "figures", path.parent)
         write_atomic(folder / f"{name}.png", files.png)
         write_atomic(folder / f"{name}.csv", files.csv)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import tokenize
 import zipfile
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -113,12 +114,18 @@ def _decode_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[An
     if info.compress_type != zipfile.ZIP_STORED:
         raise ValueError(f"{info.filename} is compressed; alignments are stored uncompressed")
     data = archive.read(info)
-    stream = io.BytesIO(data)
-    if npy.read_magic(stream) != (1, 0):
-        raise ValueError(f"{info.filename} is not a version 1.0 array")
-    shape, fortran_order, dtype = npy.read_array_header_1_0(stream)
+    start = 10 + int.from_bytes(data[8:10], "little")
+    shape, fortran_order, dtype = _parse_header(data[:start])
     wanted = _DTYPES.get(info.filename.removesuffix(".npy"))
     if dtype.str != wanted or fortran_order:
         raise ValueError(f"{info.filename} holds {dtype.str}, not {wanted} in C order")
     # Creating a view fails if the header declares more bytes than there are.
-    return np.ndarray(shape, dtype, data, stream.tell()).copy()
+    return np.ndarray(shape, dtype, data, start).copy()
+
+
+@lru_cache(64)  # most are the same in all alignments, and NumPy takes its time
+def _parse_header(header: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    stream = io.BytesIO(header)
+    if npy.read_magic(stream) != (1, 0):
+        raise ValueError("is not a version 1.0 array")
+    return npy.read_array_header_1_0(stream)

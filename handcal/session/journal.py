@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from handcal.core.errors import FileError
-from handcal.io.files import read_limited, whole_number, write_atomic
+from handcal.io.files import open_no_link, read_limited, whole_number, write_atomic
 
 JOURNAL_VERSION = 3
 MAX_JOURNAL_BYTES = 64 * 2**20
@@ -100,7 +100,7 @@ def read_journal(path: Path) -> JournalContent:
     FileError
         If it cannot be read, is too large, of another version, or without any sound line.
     """
-    content = read_limited(path, MAX_JOURNAL_BYTES)
+    content = read_limited(path, MAX_JOURNAL_BYTES, path.parent)
     *lines, torn = content.split(b"\n")
     events: list[Event] = []
     damaged: list[Damage] = []
@@ -156,7 +156,7 @@ class JournalWriter:
         self.next_number = content.next_number
         self._bytes = content.complete_bytes
         self._torn_bytes = content.torn_bytes
-        found = path.stat()
+        found = path.lstat()
         self._file = found.st_dev, found.st_ino
 
     @property
@@ -176,7 +176,7 @@ class JournalWriter:
             raise FileError(f"the journal of {self._path.parent} is full; start another session")
         try:
             # Reopened each time, so that a folder that was moved or removed is noticed.
-            with self._path.open("r+b") as file:
+            with open(self._path, "r+b", opener=open_no_link) as file:
                 self._torn_bytes = max(self._torn_bytes, len(line))
                 file.seek(self._bytes)
                 file.truncate()  # a failed or killed write may have left part of a line
@@ -202,7 +202,7 @@ class JournalWriter:
     def require_unchanged(self) -> None:
         """Raise FileError unless the file is the one that was read, with what was added since."""
         try:
-            found = self._path.stat()
+            found = self._path.lstat()
         except OSError as error:
             raise FileError(f"cannot write {self._path}: {error.strerror or error}") from error
         is_known = self._bytes <= found.st_size <= self._bytes + self._torn_bytes
@@ -277,7 +277,7 @@ def _read_end(path: Path, damaged: list[Damage]) -> tuple[int, str | None]:
     if not path.exists():
         return 0, None
     try:
-        line = read_limited(path, _MAX_END_BYTES)
+        line = read_limited(path, _MAX_END_BYTES, path.parent)
         if not line.endswith(b"\n"):
             raise ValueError("is cut short")
         fields = _parse_sound(path, line[:-1])

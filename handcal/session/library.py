@@ -148,7 +148,8 @@ def delete_session(path: Path) -> Path:
     if not (path / JOURNAL).is_file():
         raise FileError(f"{path} is not a session; nothing was deleted")
     FileLock(path / "lock").release()  # only a test, or another program would lose its folder
-    bin_folder = make_folder(path.absolute().parent / DELETED)
+    folder = path.absolute().parent
+    bin_folder = make_folder(folder / DELETED, folder)
     names = (path.name, *(f"{path.name}-{number}" for number in range(2, 10_000)))
     return _move(path, next(bin_folder / one for one in names if not (bin_folder / one).exists()))
 
@@ -241,12 +242,12 @@ def _damaged_files(path: Path, state: SessionState) -> int:
     files = {alignment_path(path, number): one for number, one in checksums.items()}
     if state.rig_sha256:
         files[path / "rig.yaml"] = state.rig_sha256
-    return sum(not _is_sound(file, checksum) for file, checksum in files.items())
+    return sum(not _is_sound(path, file, checksum) for file, checksum in files.items())
 
 
-def _is_sound(file: Path, checksum: str) -> bool:
+def _is_sound(path: Path, file: Path, checksum: str) -> bool:
     try:
-        return sha256(read_limited(file, MAX_ALIGNMENT_BYTES)) == checksum
+        return sha256(read_limited(file, MAX_ALIGNMENT_BYTES, path)) == checksum
     except FileError:
         return False
 
@@ -261,7 +262,7 @@ def _lab_target_arcmin(settings: Mapping[str, Any] | None) -> float | None:
 
 def _rig_name(path: Path, state: SessionState) -> str:
     try:
-        content = state.rig.encode() or read_limited(path / "rig.yaml", MAX_RIG_BYTES)
+        content = state.rig.encode() or read_limited(path / "rig.yaml", MAX_RIG_BYTES, path)
         return parse_rig(content).name
     except (FileError, ValueError):
         return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment, Eye, Float64, Rig
 from handcal.io.files import read_json, read_limited
+from handcal.register.solve import check_alignment
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.alignment_file import decode_alignment
 from handcal.session.facts import AlignmentFacts, SessionFacts
@@ -272,7 +274,7 @@ def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
     """
     file = path / "rig.yaml"
     try:
-        data = read_limited(file, MAX_RIG_BYTES)
+        data = read_limited(file, MAX_RIG_BYTES, path)
         rig = parse_rig(data)
         if state.rig_sha256 not in (sha256(data), ""):
             raise ValueError("its checksum is not the journal's")
@@ -297,7 +299,7 @@ def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
 def _read_settings(file: Path, state: SessionState, damaged: list[Damage]) -> dict[str, Any]:
     """Return the settings of the journal, or of the file if the journal's first line is lost."""
     try:
-        settings = read_json(file)
+        settings = read_json(file, file.parent)
         if state.settings is not None and settings != state.settings:
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
@@ -310,7 +312,7 @@ def _read_settings(file: Path, state: SessionState, damaged: list[Damage]) -> di
 def _check_results(file: Path, state: SessionState, damaged: list[Damage]) -> None:
     """Compare the file of the results with the journal."""
     try:
-        results = read_json(file) if file.exists() else None
+        results = read_json(file, file.parent) if os.path.lexists(file) else None
         # A killed program may leave the file of earlier results.
         if results not in (None, state.results, *state.older_results):
             raise FileError(f"{file} is not what the journal holds")
@@ -333,13 +335,14 @@ def _read_notes(
     """Return the notes and their checksum: empty without notes, None if they are damaged."""
     data, found = b"", ""
     try:
-        if file.exists():
-            data = read_limited(file, 4 * MAX_NOTES_CHARACTERS)
+        if os.path.lexists(file):
+            data = read_limited(file, 4 * MAX_NOTES_CHARACTERS, file.parent)
             found = sha256(data)
         if checksums and found not in checksums:
             raise FileError("its checksum is not the journal's")
     except FileError as error:
-        damaged.append(Damage(file.name, None, f"{error}; it was read as it is"))
+        used = "it was read as it is" if found else "nothing was read"
+        damaged.append(Damage(file.name, None, f"{error}; {used}"))
         return data.decode(errors="replace"), None
     return data.decode(errors="replace"), found
 
@@ -352,15 +355,17 @@ def _read_alignments(
     for number, checksum in checksums.items():
         file = alignment_path(path, number)
         try:
-            alignments[number] = _read_alignment(file, checksum)
+            alignments[number] = _read_alignment(path, file, checksum)
         except (FileError, ValueError) as error:
             name = file.relative_to(path).as_posix()
             damaged.append(Damage(name, None, f"{error}; alignment {number} was left out"))
     return alignments
 
 
-def _read_alignment(file: Path, checksum: str) -> Alignment:
-    data = read_limited(file, MAX_ALIGNMENT_BYTES)
+def _read_alignment(path: Path, file: Path, checksum: str) -> Alignment:
+    data = read_limited(file, MAX_ALIGNMENT_BYTES, path)
     if sha256(data) != checksum:
         raise ValueError("its checksum is not the journal's")
-    return decode_alignment(data)
+    alignment = decode_alignment(data)
+    check_alignment(alignment)
+    return alignment

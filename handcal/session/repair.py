@@ -7,14 +7,25 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal, TypeAlias
 
-from handcal.core.errors import FileError
+from handcal.core.errors import FileError, HandError
+from handcal.core.progress import Progress
 from handcal.core.types import Rig
-from handcal.io.files import make_folder, sync_folder, write_atomic, write_json
+from handcal.io.files import make_folder, read_limited, sync_folder, write_atomic, write_json
+from handcal.register.fuse import fuse_alignments
+from handcal.register.results import SolveSettings
+from handcal.register.solve import solve_alignment
 from handcal.rig.rig_file import write_rig
 from handcal.session.journal import JOURNAL, Damage, Event, happens_now, journal_line
-from handcal.session.record import SessionRecord, alignment_path, load_session, sha256
+from handcal.session.record import (
+    MAX_ALIGNMENT_BYTES,
+    SessionRecord,
+    alignment_path,
+    load_session,
+    sha256,
+)
 from handcal.session.state import SessionEvent, SessionState
 
 SessionHealth: TypeAlias = Literal["sound", "damaged", "none"]
@@ -28,6 +39,27 @@ class SessionCheck:
     state: SessionHealth
     """``damaged`` if the rest can be read, ``none`` if nothing can."""
     damaged: tuple[Damage, ...]
+
+
+def without_unsolvable(
+    record: SessionRecord, settings: SolveSettings, progress: Progress = Progress()
+) -> SessionRecord:
+    """Return a session without the alignments that cannot be solved, which its `damaged` names.
+
+    It is the same object if all can be solved.
+    """
+    alignments, damaged = dict(record.alignments), list(record.damaged)
+    for number, alignment in record.alignments.items():
+        try:
+            shifts = solve_alignment(alignment, record.rig, settings.method, progress.check)
+            fuse_alignments([(alignment, shifts)], record.rig, settings.fuse)
+        except (ValueError, HandError) as error:
+            del alignments[number]
+            text = f"it cannot be solved: {error}; alignment {number} was left out"
+            damaged.append(Damage(f"alignments/{number}.npz", None, text))
+    if len(alignments) == len(record.alignments):
+        return record
+    return replace(record, alignments=MappingProxyType(alignments), damaged=tuple(damaged))
 
 
 def check_session(path: Path) -> SessionCheck:
@@ -58,15 +90,16 @@ def repair_session(path: Path, output: Path, rig: Rig | None = None) -> SessionR
     FileError
         If the session cannot be read, or the folder exists or cannot be written.
     """
-    record = load_session(path, rig).contents()
+    record = without_unsolvable(load_session(path, rig).contents(), SolveSettings())
     if output.exists():
         raise FileError(f"{output} exists; choose a new folder")
     hidden = make_folder(output.absolute().parent) / f".{output.name}.repairing"
     try:
         shutil.rmtree(hidden, ignore_errors=True)
-        make_folder(hidden / "alignments")
+        hidden.mkdir(mode=0o700)
+        (hidden / "alignments").mkdir(mode=0o700)
         for number in (*record.alignments, *record.deleted_alignments):
-            data = alignment_path(path, number).read_bytes()
+            data = read_limited(alignment_path(path, number), MAX_ALIGNMENT_BYTES, path)
             write_atomic(alignment_path(hidden, number), data)
         write_rig(hidden / "rig.yaml", record.rig)
         write_json(hidden / "settings.json", record.settings)

@@ -36,6 +36,7 @@ from handcal.io.closable import Closable
 from handcal.io.files import (
     make_folder,
     read_limited,
+    refuse_links,
     remove_leftovers,
     sync_folder,
     write_atomic,
@@ -86,6 +87,7 @@ class Session(Closable):
         self._lock = FileLock(path / "lock")
         try:
             self._loaded = load_session(path)
+            refuse_links(path / "alignments", path)
             for folder in (path, path / "alignments"):
                 if folder.is_dir():
                     remove_leftovers(folder)
@@ -135,8 +137,8 @@ class Session(Closable):
         wearer = clean_wearer(wearer)
         path = make_folder(parent) / (name or f"{datetime.now(UTC):session-%Y%m%d-%H%M%S-%f}")
         try:
-            path.mkdir()
-            (path / "alignments").mkdir()
+            path.mkdir(mode=0o700)  # and so no file in it, with names and hands, is for others
+            (path / "alignments").mkdir(mode=0o700)
             sync_folder(path.parent)
         except OSError as error:
             raise FileError(f"cannot create {path}: {error.strerror or error}") from error
@@ -418,6 +420,7 @@ class Session(Closable):
     def _require_own(self) -> JournalWriter:
         """Return the journal; FileError if another program may be writing to it."""
         journal = self._require_open()
+        refuse_links(self.path / "alignments", self.path)
         self._lock.require_held()
         journal.require_unchanged()
         return journal

@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QProgressDialog
 
-from handcal.calibration.solve_again import solve_again, stored_solve_settings
+from handcal.calibration.solve_again import solve_sound, stored_solve_settings
 from handcal.core.progress import Progress
 from handcal.core.types import Eye
 from handcal.register.results import Results, SolveSettings
@@ -74,7 +74,7 @@ class ReviewController(QObject):
         def work(progress: Progress) -> _Stored:
             record = Session.open(path)
             settings = stored_solve_settings(record)
-            results = solve_again(record, settings, progress)
+            record, results = solve_sound(record, settings, progress)
             return _Stored(record, settings, results)
 
         self._job = Job(work)

@@ -9,18 +9,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
+import cv2
 import numpy as np
 import pytest
 
 from handcal.camera.feed import CameraFeed, FeedSettings
 from handcal.camera.folder import FolderCamera, record_folder
-from handcal.camera.hl2ss import STREAMS, parse_calibration
+from handcal.camera.hl2ss import STREAMS, parse_calibration, parse_packet
 from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
 from handcal.camera.radial import is_not_wrapped, white_brightness
 from handcal.camera.settings import HoloLens2Settings
 from handcal.core.errors import CameraError, CameraTimeoutError
 from handcal.core.geometry import rigid
 from handcal.core.types import Float32, Float64, Frame, Intrinsics, UInt16
+from handcal.io.images import PNG_START
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World, render
@@ -303,6 +305,16 @@ def test_a_damaged_png_is_one_clear_error(serve: Serve, payload: bytes) -> None:
     settings = serve(packet_of(5, payload, T_W_H), calibration, stream="longthrow")
     with pytest.raises(CameraError, match="no PNG of"):
         view(settings)
+
+
+def test_opencv_does_not_see_a_png_that_announces_more_than_it_holds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    size = struct.pack(">II", 320, 288)
+    lying = PNG_START + size + b"\x08\x06\0\0\0" + bytes(4) + b"\xff\xff\xff\xf0IDAT" + bytes(64)
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    with pytest.raises(CameraError, match="no PNG of"):
+        parse_packet(STREAMS["longthrow"], packet_of(5, lying, T_W_H))
 
 
 @pytest.mark.parametrize(

@@ -243,6 +243,22 @@ def test_colour_without_a_transform_is_refused(tmp_path: Path, make_frames: Make
         play(tmp_path, messages)
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
+@pytest.mark.parametrize("field", ["translation.x", "translation.z", "rotation.w", "rotation.y"])
+def test_an_impossible_transform_is_refused(
+    tmp_path: Path, make_frames: MakeFrames, value: float, field: str
+) -> None:
+    messages = list(frame_messages(make_frames(2)))
+    part, axis = field.split(".")
+    for topic, _, message in messages:
+        if topic == "/tf_static":
+            moved = message.transforms[-1].transform
+            setattr(getattr(moved, part), axis, value)
+    with pytest.raises(CameraError) as caught:
+        play(tmp_path, messages)
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize("is_mcap", [True, False])
 def test_a_damaged_recording_is_one_error(
     tmp_path: Path, make_frames: MakeFrames, is_mcap: bool

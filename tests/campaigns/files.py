@@ -124,6 +124,7 @@ def _cases(seeds: Path) -> Iterable[tuple[str, Case]]:
         def make(work: Path, chance: random.Random) -> Words:
             path = work / Path(name).name
             path.write_bytes(mutated(data, kind, chance))
+            path.chmod(0o600)  # as keys must be
             return words(str(path))
 
         return make

@@ -1,4 +1,7 @@
-"""Mutations of files: bytes, text, JSON values, and PNG chunks with their checksums made right."""
+"""Mutations of files: bytes, text, JSON values, and PNG chunks with right checksums.
+
+The length of a chunk may be a lie, about one of any type, and up to 4 GB.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,8 @@ _VALUES: tuple[Any, ...] = (
     "é" * 40, "../../x", [], {}, [1, 2, 3], [[0] * 3] * 3, [[1, 2], [3]], {"a": 1}, {"": 1}, "1",
     [None] * 4, ["a"] * 3, [[float("nan")] * 4] * 4,
 )  # fmt: skip
+_LIES = 1, 2**30, 2**31 - 1, 2**32 - 16
+_CHUNKS = b"IDAT", b"tEXt", b"PLTE", b"fdAT", b"abCd"
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -135,9 +140,14 @@ def _png(data: bytes, chance: random.Random) -> bytes:
         size = int.from_bytes(data[at : at + 4])
         chunks.append((data[at + 4 : at + 8], data[at + 8 : at + 8 + size]))
         at += 12 + size
-    place = chance.randrange(min(3, len(chunks)))
+    place, lie = chance.randrange(min(3, len(chunks))), 0
+    if chance.random() < 0.5:
+        place, lie = chance.choice((1, 1, len(chunks))), chance.choice(_LIES)
+        chunks.insert(place, (chance.choice(_CHUNKS), b"abc"))
     name, content = chunks[place]
-    if name == b"IHDR":
+    if lie:
+        pass
+    elif name == b"IHDR":
         header = bytearray(content)
         header[chance.randrange(13)] = chance.choice((0, 1, 2, 3, 4, 6, 8, 16, 255))
         content = bytes(header)
@@ -147,9 +157,9 @@ def _png(data: bytes, chance: random.Random) -> bytes:
         content = _bytes(content, chance)
     chunks[place] = name, content
     return _PNG + b"".join(
-        struct.pack(">I", len(content))
+        struct.pack(">I", (len(content) + lie * (number == place)) % 2**32)
         + name
         + content
         + struct.pack(">I", zlib.crc32(name + content))
-        for name, content in chunks
+        for number, (name, content) in enumerate(chunks)
     )

@@ -10,9 +10,11 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from handcal.core.progress import Progress
@@ -168,11 +170,10 @@ def test_a_session_that_cannot_be_solved_says_why(
         return session.path
 
     assert "empty holds no alignment to solve" in fails("solve", stored("empty"))[1]
-    # The shared example has too few points.
-    assert (
-        "few cannot be solved: cursor_m has 40 points"
-        in fails("solve", stored("few", alignment))[1]
-    )
+    few = replace(alignment, cursor_m=alignment.cursor_m[:40], cursor_is_cut=np.zeros(40, bool))
+    said = fails("solve", stored("few", few))[1]
+    assert "few holds no alignment to solve; " in said
+    assert "alignments/1.npz: cursor_m has 40 points" in said
     odd = stored("odd", alignment, calibration={"solve": {"method": "guess"}})
     assert "calibration.solve.method must be one of paper, linear" in fails("solve", odd)[1]
 

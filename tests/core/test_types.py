@@ -1,11 +1,12 @@
 from dataclasses import FrozenInstanceError, replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from handcal.core.frozen import readonly
 from handcal.core.geometry import rigid
-from handcal.core.types import Alignment, Eye, Frame, Intrinsics, Projection, Rig
+from handcal.core.types import Alignment, Eye, Frame, Intrinsics, Projection, Rig, Verification
 from handcal.rig.example import example_rig
 
 INTRINSICS = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
@@ -80,3 +81,27 @@ def test_a_rig_needs_both_eyes() -> None:
     rig = example_rig()
     with pytest.raises(ValueError, match="both left and right"):
         Rig("one eye", {"left": rig.eyes["left"]}, rigid(), rig.depth_intrinsics)
+
+
+@pytest.mark.parametrize("sigma", [-1e-9, np.nan, np.inf])
+@pytest.mark.parametrize("name", ["time_sigma_m", "outline_sigma_px"])
+def test_what_is_no_standard_deviation_is_refused(
+    alignment: Alignment, name: str, sigma: float
+) -> None:
+    with pytest.raises(ValueError, match=f"{name}: .* is no σ"):
+        replace(alignment, **{name: sigma})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"after_m": (0.0, np.nan, 0.0)},
+        {"hand_E_m": (0.0, 0.0, 1e300)},
+        {"nudge_size": -np.inf},
+        {"outline_sigma_px": -1.0},
+    ],
+)
+def test_an_impossible_verification_is_refused(changed: dict[str, Any]) -> None:
+    verified = Verification((0.0, 0.0, 0.0), (1.0, 2.0), (0.001, 0.0, 0.0), hand_E_m=(0, 0, 0.5))
+    with pytest.raises(ValueError, match=r"too large|is no σ"):
+        replace(verified, **changed)

@@ -54,7 +54,7 @@ def test_the_offline_calibration_is_final_where_it_is_kept(
 ) -> None:
     assert outcome.results is not None
     kept = replace(outcome.results, verdicts=dict.fromkeys(EYES, Verdict("keep", "as told")))
-    monkeypatch.setattr("handcal.export.outcome.solve_again", lambda *_: kept)
+    monkeypatch.setattr("handcal.export.outcome.solve_sound", lambda *_: (outcome.record, kept))
     again = load_outcome(outcome.record)
     assert list(again.shifts_m["left"]) == ["fine_tuned", "offline", "solved"]
     assert list(again.shifts_m["right"]) == ["offline", "solved"]

@@ -125,3 +125,44 @@ def test_a_file_as_the_folder_is_refused_before_anything_is_written(
 def test_a_folder_that_cannot_be_created_is_named_as_it_was_chosen() -> None:
     with pytest.raises(FileError, match=r"^cannot create the folder /proc/a/b: No such file"):
         Staging(Path("/proc/a/b"))
+
+
+def replace_cloud(folder: Path) -> None:
+    with Staging(folder) as staging:
+        (staging.path / "clouds").mkdir()
+        (staging.path / "clouds" / "1.ply").write_text("new")
+        staging.publish(["clouds/*.ply"])
+
+
+@pytest.mark.parametrize("place", ["out/clouds", "out/.out.handcal-export"])
+def test_a_linked_folder_among_the_files_is_not_written_to(tmp_path: Path, place: str) -> None:
+    mine = tmp_path / "mine"
+    for name in ("1.ply", "2.ply", "new/x", "old/x"):
+        (mine / name).parent.mkdir(parents=True, exist_ok=True)
+        (mine / name).write_text("mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / place).symlink_to(mine)
+    before = tree(mine)
+    with pytest.raises(FileError, match="is a link"):
+        replace_cloud(tmp_path / "out")
+    assert tree(mine) == before
+
+
+def test_a_link_in_place_of_a_file_is_replaced_and_put_back_as_a_link(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mine, out = tmp_path / "mine", tmp_path / "out"
+    mine.write_text("mine")
+    out.mkdir()
+    (out / "x").symlink_to(mine)
+    monkeypatch.setattr("handcal.export.staging.sync_folder", Path.rmdir)
+    with Staging(out) as staging:
+        write(staging, x="new")
+        with pytest.raises(FileError, match="cannot write"):
+            staging.publish([])
+    assert (out / "x").readlink() == mine
+    monkeypatch.undo()
+    with Staging(out) as staging:
+        write(staging, x="new")
+        staging.publish([])
+    assert (tree(out), mine.read_text()) == ({"x": "new"}, "mine")

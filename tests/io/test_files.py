@@ -1,6 +1,7 @@
 import json
 import os
 import sys
+import tracemalloc
 from pathlib import Path
 
 import cv2
@@ -29,10 +30,16 @@ def test_write_replaces_the_whole_content_and_leaves_nothing_else(tmp_path: Path
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_others_may_read_what_they_may_read_of_any_file(tmp_path: Path) -> None:
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no modes")
+@pytest.mark.parametrize(("folder", "file"), [(0o755, 0o644), (0o750, 0o640), (0o700, 0o600)])
+def test_a_file_is_as_private_as_its_folder(tmp_path: Path, folder: int, file: int) -> None:
+    tmp_path.chmod(folder)
+    (tmp_path / "any").touch()
+    usual = (tmp_path / "any").stat().st_mode
     write_atomic(tmp_path / "a.bin", b"a")
-    (tmp_path / "b.bin").write_bytes(b"b")
-    assert (tmp_path / "a.bin").stat().st_mode == (tmp_path / "b.bin").stat().st_mode
+    write_new(tmp_path / "b.bin", b"b")
+    for name in ("a.bin", "b.bin"):
+        assert (tmp_path / name).stat().st_mode & 0o777 == usual & file
 
 
 def test_a_failed_write_keeps_the_old_content(
@@ -203,3 +210,48 @@ def test_ply_keeps_doubles_and_further_properties_to_the_last_bit(tmp_path: Path
     assert np.array_equal(read["xyz"], points_m)
     assert np.array_equal(read["residual_m"], residual_m, equal_nan=True)
     assert np.array_equal(read["cut"], is_cut)
+
+
+def test_reading_allocates_the_files_size_not_the_limit(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"a")
+    tracemalloc.start()
+    assert read_limited(path, 2**28) == b"a"
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2**20
+
+
+@pytest.mark.parametrize("size", [0, 1, 7, 8, 9])
+def test_no_more_than_the_limit_is_read(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(bytes(size))
+    if size <= 8:
+        assert read_limited(path, 8) == bytes(size)
+    else:
+        with pytest.raises(FileError, match="larger than the 8 bytes"):
+            read_limited(path, 8)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there is no /proc")
+def test_a_file_that_does_not_know_its_size_is_read_to_its_end() -> None:
+    assert len(read_limited(Path("/proc/self/status"), 2**20)) > 100
+
+
+@pytest.mark.skipif(os.name == "nt", reason="few may make links on Windows")
+@pytest.mark.parametrize("inside", ["", "a", "a/b"])
+@pytest.mark.parametrize("form", ["absolute", "relative", "other"])
+def test_only_links_within_a_folder_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: str, form: str
+) -> None:
+    (tmp_path / "elsewhere" / "b").mkdir(parents=True)
+    (tmp_path / "elsewhere" / "b" / "x").touch()
+    (tmp_path / "a").symlink_to("elsewhere")
+    monkeypatch.chdir(tmp_path)
+    root = Path() if form == "relative" else tmp_path
+    folder = Path("nowhere") if form == "other" else root / inside
+    if inside and form != "other":
+        assert read_limited(root / "a" / "b" / "x", 1, folder) == b""
+    else:
+        with pytest.raises(FileError, match="a is a link"):
+            read_limited(root / "a" / "b" / "x", 1, folder)

@@ -83,6 +83,6 @@ def test_a_folder_that_cannot_be_written_says_what_to_do(
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr("handcal.io.lock.open_no_link", refuse)
     with pytest.raises(FileError, match="Read-only file system; make it writable, or use a copy"):
         FileLock(tmp_path / "lock")

@@ -41,6 +41,24 @@ def test_no_key_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         read_pairing_key()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no modes")
+@pytest.mark.parametrize(("mode", "is_warned"), [(0o600, False), (0o640, True), (0o604, True)])
+def test_a_key_that_others_can_read_causes_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, mode: int, is_warned: bool
+) -> None:
+    device, all_devices = tmp_path / "key", tmp_path / "pairing.key"
+    device.write_text(new_pairing_key())
+    Pairings.read(all_devices).open_key()
+    for path in (device, all_devices):
+        path.chmod(mode)
+    read_pairing_key(device)
+    pairings = Pairings.read(all_devices)
+    named = [str(path) for path in (device, all_devices) if f"keys in {path}:" in caplog.text]
+    assert named == ([str(device), str(all_devices)] if is_warned else [])
+    pairings.renew()
+    assert all_devices.stat().st_mode & 0o777 == 0o600
+
+
 def test_any_bytes_are_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
     key = b"\xff\xfe" * 8
     monkeypatch.setenv(KEY_VARIABLE, os.fsdecode(key))

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from handcal.core.errors import CancelledError
+from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
 from handcal.report.document import Column, Report, Section, Table
 from handcal.report.html import write_html
@@ -131,3 +131,11 @@ def test_giving_up_leaves_no_file(tmp_path: Path, report: Report) -> None:
     write_html(
         tmp_path / "x.html", replace(report, sections=[]), Progress(give_up)
     )  # nothing to draw
+
+
+def test_a_link_in_place_of_the_figures_is_not_followed(tmp_path: Path, report: Report) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "figures").symlink_to(tmp_path / "mine")
+    with pytest.raises(FileError, match="is a link"):
+        write_html(tmp_path / "report.html", report, Progress())
+    assert not any((tmp_path / "mine").iterdir())

@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
 from handcal.export.tables import corner_rows
+from handcal.io.files import read_limited
 from handcal.report.statistics import (
     MeanInterval,
     Summary,
@@ -23,7 +24,7 @@ from handcal.report.statistics import (
     summarise,
     variance_components,
 )
-from handcal.session.journal import JOURNAL
+from handcal.session.journal import JOURNAL, MAX_JOURNAL_BYTES
 from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent
@@ -156,12 +157,12 @@ def _sessions(folder: Path) -> Iterator[Path]:
 
 def _holds_trials(path: Path) -> bool:
     try:
-        with (path / JOURNAL).open("rb") as lines:
-            # Long before all events are read and applied.
-            if not any(SessionEvent.TRIAL_SAVED.encode() in line for line in lines):
-                return False
+        # Long before all events are read and applied.
+        content = read_limited(path / JOURNAL, MAX_JOURNAL_BYTES, path)
+        if SessionEvent.TRIAL_SAVED.encode() not in content:
+            return False
         return bool(replay(path).state.trials.active)
-    except (FileError, OSError):
+    except FileError:
         return False
 
 

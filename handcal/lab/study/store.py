@@ -72,7 +72,7 @@ class StudyFolder:
         chunks: Sequence[Sequence[Mapping[str, Any]]],
     ) -> None:
         self._path = make_folder(path)
-        self._chunks = make_folder(path / "chunks")
+        self._chunks = make_folder(path / "chunks", path)
         file = path / _STUDY
         study = json.loads(
             json.dumps(
@@ -88,7 +88,7 @@ class StudyFolder:
         )
         if not file.exists():
             write_json(file, study)
-        elif others := _differences(read_json(file), study):
+        elif others := _differences(read_json(file, path), study):
             raise FileError(
                 f"{path} holds another study ({others}); choose another folder, or the same entries"
             )
@@ -101,7 +101,7 @@ class StudyFolder:
         """Return the rows of each case of a chunk; None if it is not there, or damaged."""
         file = self._file(number)
         try:
-            stored = read_json(file)
+            stored = read_json(file, self._path)
         except FileError:
             return None
         rows: list[list[StudyRow]] | None = stored.get("rows")

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 from handcal.core.progress import Progress
+from handcal.io.files import make_folder
 from handcal.lab.settings import (
     MethodComparisonSettings,
     NoiseStudySettings,
@@ -102,10 +103,12 @@ def run_procedure_study(settings: ProcedureStudySettings, progress: Progress) ->
                     variant,
                     settings.scales[0],
                 )
-                rows = run(others, folder / f"sittings-{variant}", progress=learning)
+                rows = run(
+                    others, make_folder(folder / f"sittings-{variant}", folder), progress=learning
+                )
                 sittings[variant] = learn_sittings(rows)
             study = replace(study, settings=replace(study.settings, sittings=sittings))
-        rows = run(study, folder / "procedures", progress=progress)
+        rows = run(study, make_folder(folder / "procedures", folder), progress=progress)
     return procedure_rows(rows)
 
 

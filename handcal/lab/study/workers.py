@@ -21,6 +21,8 @@ from multiprocessing.connection import Connection
 
 from handcal.core.errors import HandcalError
 
+OVERSUBSCRIBE = "HANDCAL_OVERSUBSCRIBE"
+"""Variable of the environment that allows more workers than cores."""
 _CONNECT_S = 30
 _MOST_ON_WINDOWS = 61  # processes that a ProcessPoolExecutor can wait for there
 _THREAD_LIMITS = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
@@ -34,16 +36,24 @@ def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executo
     ----------
     workers : int or None
         Processes on this machine, as many as cores if None, at most 61 on Windows; 1 means a
-        thread of this process.
+        thread of this process. More than cores, and more than two, only if the environment has
+        `OVERSUBSCRIBE`.
     scheduler : str or None
         Address of a Dask scheduler whose workers do the work instead.
 
     Raises
     ------
     HandcalError
-        If there is no such scheduler, Dask is not installed, or a worker dies.
+        If there is no such scheduler, Dask is not installed, a worker dies, or there would be too
+        many workers.
     """
-    workers = workers or os.cpu_count() or 1
+    cores = os.cpu_count() or 1
+    workers = workers or cores
+    if scheduler is None and workers > max(cores, 2) and not os.environ.get(OVERSUBSCRIBE):
+        raise HandcalError(
+            f"{workers} processes on the {cores} cores of this computer are slower than {cores}, "
+            f"and may fill its memory; choose fewer, or set {OVERSUBSCRIBE}=1 if you insist"
+        )
     if scheduler is not None:
         opened = _cluster(scheduler)
     elif workers == 1:

@@ -100,6 +100,13 @@ class StereoCalibration:
         freeze(self, "T_H_D", np.float64, 4, 4)
         freeze(self, "covariance", np.float64, 6, 6)
         object.__setattr__(self, "residuals_px", MappingProxyType(dict(self.residuals_px)))
+        errors = self.rms_px, self.spread_rad, self.spread_m, self.worst.rms_px
+        if min(*errors, *self.residuals_px.values()) < 0.0:
+            raise ValueError("rms_px, residuals_px, spread_rad and spread_m must not be negative")
+        if self.covariance is not None:
+            variances = np.linalg.eigvalsh(self.covariance)
+            if variances[0] < -1e-9 * abs(variances[-1]):  # but for rounding
+                raise ValueError("covariance must not hold negative variances")
 
 
 def calibrate_stereo(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from handcal.calibration.solve_again import check_solvable
 from handcal.core.errors import CancelledError, FileError, InUseError
 from handcal.core.progress import Progress
 from handcal.session.library import (
@@ -19,7 +20,7 @@ from handcal.session.library import (
     restore_session,
 )
 from handcal.session.record import replay
-from handcal.session.repair import check_session, repair_session
+from handcal.session.repair import repair_session
 from handcal_gui.translation import tr
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import with_advice
@@ -71,8 +72,8 @@ def check_sessions(paths: Sequence[Path], found_damaged: set[Path], progress: Pr
 
 
 def _require_sound(path: Path) -> None:
-    """Raise FileError, with what is damaged, unless a session is sound."""
-    found = check_session(path)
+    """Raise FileError, with what is damaged, unless a session is sound and can be solved."""
+    found = check_solvable(path)
     if found.state == "sound":
         return
     damaged = found.damaged[:_MOST_NAMED]
@@ -90,7 +91,7 @@ def _require_sound(path: Path) -> None:
 def repair_beside(path: Path, progress: Progress) -> str:
     """Copy what is sound of a damaged session to a new one beside it; return a message."""
     progress.at(0.0, tr("Repairing {}").format(path.name))
-    if check_session(path).state == "sound":
+    if check_solvable(path).state == "sound":
         return tr("{} is sound: there is nothing to repair.").format(_name_of(path))
     output = _free(path.with_name(f"{path.name}-repaired"))
     made = repair_session(path, output)

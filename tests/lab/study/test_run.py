@@ -304,3 +304,20 @@ def test_the_environment_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.Mon
     rows = run_study(study, tmp_path, workers=2)
     assert {row["OMP_NUM_THREADS"] for row in rows} == {"1"}
     assert dict(os.environ) == before
+
+
+def test_a_link_in_a_studys_folder_is_not_followed(tmp_path: Path) -> None:
+    mine, folder = tmp_path / "mine", tmp_path / "study"
+    mine.mkdir()
+    (mine / "0000.json").write_text("mine")
+    folder.mkdir()
+    (folder / "chunks").symlink_to(mine)
+    with pytest.raises(FileError, match="is a link"):
+        run_study(make_study(), folder, workers=1)
+    (folder / "chunks").unlink()
+    run_study(make_study(), folder, workers=1)
+    (folder / "study.json").rename(mine / "study.json")
+    (folder / "study.json").symlink_to(mine / "study.json")
+    with pytest.raises(FileError, match="is a link"):
+        run_study(make_study(), folder, workers=1)
+    assert (mine / "0000.json").read_text() == "mine"
