@@ -117,7 +117,7 @@ class Sight:
         try:
             cloud = self._finder.find(frame)
         except HandError as error:
-            return None, error
+            return None, type(error)(str(error))  # without the traceback, which holds the station
         return with_outline(cloud, frame, edges_of(self._rig, camera.model)), None
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:

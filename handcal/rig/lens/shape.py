@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView, square_m
@@ -209,7 +209,7 @@ def _bends(fit: Adjusted) -> bool:
     explained = schur[:-1, -1] @ np.linalg.lstsq(schur[:-1, :-1], schur[:-1, -1], rcond=1e-13)[0]
     rows = sum(len(one) for one in reduced)
     noise_px2 = (schur[-1, -1] - explained) / max(rows - 6 * len(reduced) - normal.shape[0], 1)
-    return bool(explained > noise_px2 * chi2.isf(_MOST_BY_CHANCE, _WHOLE))
+    return bool(explained > noise_px2 * chdtri(_WHOLE, _MOST_BY_CHANCE))
 
 
 def _repeats(fit: Adjusted, sightings: Sequence[Sighting], count: int) -> bool:
@@ -238,7 +238,7 @@ def _repeats(fit: Adjusted, sightings: Sequence[Sighting], count: int) -> bool:
     if rest <= 0 or not freedom:
         return False
     noise_px2 = (float(np.sum(off**2)) - explained) / rest
-    return bool(explained > noise_px2 * chi2.isf(_MOST_BY_CHANCE, freedom))
+    return bool(explained > noise_px2 * chdtri(freedom, _MOST_BY_CHANCE))
 
 
 def _simplest(fits: Sequence[Adjusted]) -> Adjusted:
