@@ -2,7 +2,7 @@
  * them down, and submits them. Arguments are NAME=VALUE:
  *   loader    library of the loader
  *   frames    number of frames (1)
- *   views     2 or 4
+ *   count     of views, 2 or 4
  *   sessions  1 or 2, each in threads of its own (1)
  *   submit    same, crop (the inner half of each view) or turn (views turned by the application)
  *   bench     calls of xrLocateViews and xrEndFrame to time, best of 7
@@ -87,7 +87,7 @@ static void *run(void *number) {
     const int which = *(int *)number, frames = atoi(option("frames", "1")),
               wait = atoi(option("pause_ms", "0"));
     const int bench = atoi(option("bench", "0"));
-    const uint32_t count = (uint32_t)atoi(option("views", "2"));
+    const uint32_t count = (uint32_t)atoi(option("count", "2"));
     const char *submit = option("submit", "same");
     const XrViewConfigurationType type = count == 4 ? XR_VIEW_CONFIGURATION_TYPE_PRIMARY_QUAD_VARJO
                                                     : XR_VIEW_CONFIGURATION_TYPE_PRIMARY_STEREO;

@@ -5,6 +5,7 @@
  *   TEST_SYSTEM    the headset's name
  *   TEST_EXTENSION one extension more
  *   TEST_RECORD    file for what xrEndFrame received */
+#include <locale.h>
 #include <math.h>
 #include <openxr/openxr.h>
 #include <stdbool.h>
@@ -112,6 +113,9 @@ static XrResult XRAPI_CALL CreateInstance(const XrInstanceCreateInfo *info, XrIn
         if (!is_known) return XR_ERROR_EXTENSION_NOT_PRESENT;
     }
     char *at = getenv("TEST_VIEWS");
+    char locale[100]; /* of the application, which does not concern strtod below */
+    snprintf(locale, sizeof locale, "%s", setlocale(LC_NUMERIC, NULL));
+    setlocale(LC_NUMERIC, "C");
     for (view_count = 0; at && view_count < 4; view_count++) {
         double n[11];
         char *end = at;
@@ -125,6 +129,7 @@ static XrResult XRAPI_CALL CreateInstance(const XrInstanceCreateInfo *info, XrIn
                                      {(float)n[7], (float)n[8], (float)n[9], (float)n[10]}};
     }
     if (getenv("TEST_TURNED_S")) turned_s = strtod(getenv("TEST_TURNED_S"), NULL);
+    setlocale(LC_NUMERIC, locale);
     if (getenv("TEST_RECORD") && !record) record = fopen(getenv("TEST_RECORD"), "w");
     *to = NEW(XrInstance);
     return XR_SUCCESS;
@@ -198,7 +203,7 @@ static XrResult XRAPI_CALL BeginFrame(XrSession s, const XrFrameBeginInfo *info)
 static XrResult XRAPI_CALL WaitFrame(XrSession s, const XrFrameWaitInfo *info, XrFrameState *to) {
     static XrTime time = 1000000000;
     (void)s, (void)info;
-    to->predictedDisplayTime = time += 11111111;
+    to->predictedDisplayTime = __atomic_add_fetch(&time, 11111111, __ATOMIC_RELAXED);
     to->predictedDisplayPeriod = 11111111;
     to->shouldRender = XR_TRUE;
     return XR_SUCCESS;
@@ -241,11 +246,20 @@ static XrResult XRAPI_CALL LocateViews(XrSession s, const XrViewLocateInfo *info
     return XR_SUCCESS;
 }
 
-static void write_view(const char *what, XrTime time, uint32_t i, XrPosef p, XrFovf f) {
-    fprintf(record, "%s %.9f %u %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", what,
-            1e-9 * (double)time, i, p.orientation.x, p.orientation.y, p.orientation.z,
-            p.orientation.w, p.position.x, p.position.y, p.position.z, f.angleLeft, f.angleRight,
-            f.angleUp, f.angleDown);
+/* The own and the received view in one line, whichever threads write. */
+static void write_views(XrTime time, uint32_t i, const XrView own, XrPosef pose, XrFovf fov) {
+    char text[2][300];
+    const XrPosef poses[2] = {own.pose, pose};
+    const XrFovf fovs[2] = {own.fov, fov};
+    for (int k = 0; k < 2; k++) {
+        const XrPosef p = poses[k];
+        const XrFovf f = fovs[k];
+        snprintf(text[k], sizeof text[k],
+                 "%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g", p.orientation.x,
+                 p.orientation.y, p.orientation.z, p.orientation.w, p.position.x, p.position.y,
+                 p.position.z, f.angleLeft, f.angleRight, f.angleUp, f.angleDown);
+    }
+    fprintf(record, "received %.9f %u %s %s\n", 1e-9 * (double)time, i, text[0], text[1]);
 }
 
 static XrResult XRAPI_CALL EndFrame(XrSession s, const XrFrameEndInfo *info) {
@@ -259,8 +273,7 @@ static XrResult XRAPI_CALL EndFrame(XrSession s, const XrFrameEndInfo *info) {
         }
         for (uint32_t i = 0; i < layer->viewCount; i++) {
             const XrView own = own_view(layer->space, info->displayTime, i);
-            write_view("own", info->displayTime, i, own.pose, own.fov);
-            write_view("got", info->displayTime, i, layer->views[i].pose, layer->views[i].fov);
+            write_views(info->displayTime, i, own, layer->views[i].pose, layer->views[i].fov);
         }
         for (const XrBaseInStructure *one = layer->next; one; one = one->next)
             if (one->type == XR_TYPE_COMPOSITION_LAYER_REPROJECTION_PLANE_OVERRIDE_MSFT) {
