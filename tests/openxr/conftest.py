@@ -16,6 +16,8 @@ import pytest
 from handcal.core.conventions import opengl_transform, pose
 from handcal.core.geometry import invert
 from handcal.core.types import EYES, Float64
+from handcal.export import openxr
+from handcal.export.openxr import install_layer
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.tools import openxr_values
 from handcal.io.files import read_json, write_json
@@ -25,7 +27,6 @@ from tests.helpers import ROOT
 
 SOURCES = ROOT / "resources/openxr"
 REQUIRE = "HANDCAL_REQUIRE_OPENXR"
-NAME = "XR_APILAYER_HANDCAL_calibrated_views"
 VALIDATION = "XR_APILAYER_LUNARG_core_validation"
 _NEEDS = {
     "/usr/include/openxr/openxr.h": "libopenxr-dev",
@@ -110,26 +111,22 @@ Run = Callable[..., Ran]
 
 
 @pytest.fixture
-def run(built: Path, tmp_path: Path, outcome: SessionOutcome, calibration: dict[str, Any]) -> Run:
+def run(
+    built: Path,
+    tmp_path: Path,
+    outcome: SessionOutcome,
+    calibration: dict[str, Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> Run:
     """Return a function that runs the application with the installed layer."""
-    user = {"XDG_CONFIG_HOME": tmp_path / "config", "XDG_DATA_HOME": tmp_path / "data"}
-    layer = {
-        "name": NAME,
-        "library_path": str(built / "libhandcal_openxr.so"),
-        "api_version": "1.0",
-        "implementation_version": "1",
-        "description": "test",
-        "disable_environment": "HANDCAL_OPENXR_OFF",
-    }
-    implicit = tmp_path / "data/openxr/1/api_layers/implicit.d"
-    for folder in (implicit, tmp_path / "explicit", tmp_path / "config/handcal"):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    monkeypatch.setattr(openxr, "_shipped_library", lambda: built / "libhandcal_openxr.so")
+    manifest = read_json(install_layer())
+    del manifest["api_layer"]["disable_environment"]
+    for folder in (tmp_path / "explicit", tmp_path / "config/handcal"):
         folder.mkdir(parents=True)
-    write_json(implicit / "handcal.json", {"file_format_version": "1.0.0", "api_layer": layer})
-    explicit = {**layer, "disable_environment": ""}
-    write_json(
-        tmp_path / "explicit/handcal.json",
-        {"file_format_version": "1.0.0", "api_layer": explicit},
-    )
+    write_json(tmp_path / "explicit/handcal.json", manifest)  # to choose its place among others
     runtime = {"library_path": str(built / "runtime.so"), "name": "test"}
     write_json(tmp_path / "runtime.json", {"file_format_version": "1.0.0", "runtime": runtime})
     file = tmp_path / "config/handcal/openxr.json"
@@ -149,7 +146,6 @@ def run(built: Path, tmp_path: Path, outcome: SessionOutcome, calibration: dict[
             old.unlink(missing_ok=True)
         shown = own_views(outcome) if views is None else views
         environment = os.environ | {
-            **{name: str(folder) for name, folder in user.items()},
             "XR_RUNTIME_JSON": str(tmp_path / "runtime.json"),
             "XR_API_LAYER_PATH": f"/usr/share/openxr/1/api_layers/explicit.d:{tmp_path}/explicit",
             "TEST_VIEWS": " ".join(map(repr, shown.ravel().tolist())),

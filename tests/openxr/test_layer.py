@@ -18,10 +18,10 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.geometry import transform
 from handcal.core.types import EYES, Float64
+from handcal.export.openxr import LAYER
 from handcal.export.outcome import SessionOutcome
 from handcal.io.files import write_json
 from tests.openxr.conftest import (
-    NAME,
     OWN_ANGLES,
     SOURCES,
     VALIDATION,
@@ -46,9 +46,9 @@ def drawn_px(outcome: SessionOutcome, view: Float64, head: Float64, moved_m: Flo
     seen = Rotation.from_quat(view[3:7]).inv().apply(points_W_m - view[7:10])
     left, right, up, down = np.tan(view[10:])
     x, y = seen[:, 0] / -seen[:, 2], seen[:, 1] / -seen[:, 2]
-    share = np.column_stack([(x - left) / (right - left), (up - y) / (up - down)])
-    pixels: Float64 = share * [display.width_px, display.height_px] - 0.5
-    return pixels
+    share: Float64 = np.column_stack([(x - left) / (right - left), (up - y) / (up - down)])
+    share *= [display.width_px, display.height_px]
+    return share - 0.5
 
 
 def wanted_px(outcome: SessionOutcome, view: Float64) -> Float64:
@@ -62,22 +62,18 @@ def wanted_px(outcome: SessionOutcome, view: Float64) -> Float64:
 
 
 def largest_px(outcome: SessionOutcome, seen: Float64, heads: Float64, moved_m: Float64) -> float:
+    """Return how far from handcal's pixels an application draws the points, at most."""
     head_at = {tuple(head[:2]): head for head in heads}
-    return max(
-        float(
-            np.abs(
-                drawn_px(outcome, view, head_at[tuple(view[:2])], moved_m)
-                - wanted_px(outcome, view)
-            ).max()
-        )
+    off_px = [
+        drawn_px(outcome, view, head_at[tuple(view[:2])], moved_m) - wanted_px(outcome, view)
         for view in seen
-    )
+    ]
+    return float(np.abs(off_px).max())
 
 
 def turn_rad(a: Float64, b: Float64) -> Float64:
     """Return the angles between two lists of quaternions; exact for small ones too."""
-    angles: Float64 = (Rotation.from_quat(a).inv() * Rotation.from_quat(b)).magnitude()
-    return angles
+    return np.asarray((Rotation.from_quat(a).inv() * Rotation.from_quat(b)).magnitude())
 
 
 @pytest.mark.parametrize("moved_m", [(0.0, 0.0, 0.0), (0.01, -0.041, 0.048)])
@@ -272,7 +268,7 @@ def test_the_plane_of_the_image_is_given_to_runtimes_that_reproject_by_it(run: R
     assert not {"plane", "focus"} & set(run().other)
 
 
-@pytest.mark.parametrize("order", [(VALIDATION, NAME), (NAME, VALIDATION)])
+@pytest.mark.parametrize("order", [(VALIDATION, LAYER), (LAYER, VALIDATION)])
 def test_core_validation_above_and_below_has_nothing_to_say(
     run: Run, tmp_path: Path, order: tuple[str, str]
 ) -> None:
