@@ -14,7 +14,8 @@ if ! command -v cc >/dev/null || [[ ! -e /usr/include/openxr/openxr.h ]]; then
 fi
 ln -s /usr/include/openxr "$headers"
 flags=(-std=gnu11 -O2 -s -Wall -Wextra -shared -fvisibility=hidden -I"$headers" resources/openxr/*.c)
-cc -fPIC -o "$folder/libhandcal_openxr.so" "${flags[@]}" -lm
+# By its name an application finds the library that the loader has loaded.
+cc -fPIC -Wl,-soname,libhandcal_openxr.so -o "$folder/libhandcal_openxr.so" "${flags[@]}" -lm
 if command -v x86_64-w64-mingw32-gcc >/dev/null; then
     x86_64-w64-mingw32-gcc -static-libgcc -o "$folder/handcal_openxr.dll" "${flags[@]}"
 fi

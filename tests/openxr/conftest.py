@@ -110,6 +110,19 @@ class Ran:
 Run = Callable[..., Ran]
 
 
+def ran(returncode: int, errors: str, text: str, status: Mapping[str, Any]) -> Ran:
+    """Read what application and runtime wrote; the application's locale may have decimal commas."""
+    lines: dict[str, list[list[float]]] = {}
+    for kind, *numbers in map(str.split, text.splitlines()):
+        lines.setdefault(kind, []).append([float(one.replace(",", ".")) for one in numbers])
+    seen, heads, received = (
+        np.array(lines.pop(kind, [])).reshape(-1, width)
+        for kind, width in (("view", 14), ("head", 9), ("received", 24))
+    )
+    own, got = received[:, :13], received[:, [0, 1, *range(13, 24)]]
+    return Ran(returncode, errors, seen, heads, own, got, lines, status)
+
+
 @pytest.fixture
 def run(
     built: Path,
@@ -160,16 +173,8 @@ def run(
             text=True,
             timeout=60,
         )
-        lines: dict[str, list[list[float]]] = {}
         text = done.stdout + (record.read_text() if record.exists() else "")
-        for kind, *numbers in map(str.split, text.splitlines()):
-            lines.setdefault(kind, []).append([float(one.replace(",", ".")) for one in numbers])
-        seen, heads, received = (
-            np.array(lines.pop(kind, [])).reshape(-1, width)
-            for kind, width in (("view", 14), ("head", 9), ("received", 24))
-        )
-        own, got = received[:, :13], received[:, [0, 1, *range(13, 24)]]
         told = read_json(status) if status.exists() else {}
-        return Ran(done.returncode, done.stderr, seen, heads, own, got, lines, told)
+        return ran(done.returncode, done.stderr, text, told)
 
     return run_app
