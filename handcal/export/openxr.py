@@ -24,7 +24,7 @@ LAYER = "XR_APILAYER_HANDCAL_calibrated_views"
 OFF = "HANDCAL_OPENXR_OFF"
 """The environment variable that keeps the layer out of a program."""
 IN_FORCE_S = 12.0 * 3600.0
-"""How long a calibration stays in force, unless the user keeps it."""
+"""The time that a calibration stays in force, unless the user keeps it."""
 _LIBRARY = "handcal_openxr.dll" if sys.platform == "win32" else "libhandcal_openxr.so"
 _REGISTRY = r"Software\Khronos\OpenXR\1\ApiLayers\Implicit"
 
@@ -60,7 +60,7 @@ class LastProgram:
 
 @dataclass(frozen=True, slots=True)
 class LayerStatus:
-    """What OpenXR programs of this user find."""
+    """The layer and the calibration that OpenXR programs of this user find."""
 
     is_installed: bool
     is_current: bool

@@ -91,7 +91,7 @@ def own_views(outcome: SessionOutcome, moved_m: tuple[float, float, float] = (0,
 
 @dataclass(frozen=True)
 class Ran:
-    """What an application saw, and what the runtime received; angles last in each row."""
+    """The views of an application, and those that the runtime received; angles last in each row."""
 
     returncode: int
     errors: str
@@ -104,7 +104,7 @@ class Ran:
     """(n, 13); time, view, the runtime's own pose and field of view, and those received."""
     other: dict[str, list[list[float]]]
     status: Mapping[str, Any]
-    """What the layer wrote for the program; empty if nothing."""
+    """As the layer wrote it for the program; empty if it wrote nothing."""
 
 
 Run = Callable[..., Ran]
