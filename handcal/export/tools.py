@@ -104,6 +104,7 @@ def openxr_values(outcome: SessionOutcome) -> dict[str, object]:
         "space": "pose and own.pose are in the rig's head, inView in the runtime's view of the eye",
         "imageDistanceM": float(np.mean([rig.eyes[eye].z_C0_S_m for eye in EYES])),
         "expiresUnixS": 0,
+        "movingEyes": int(rig.headset is not None and rig.headset.moves_views),
         "views": views,
     }
 

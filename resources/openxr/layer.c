@@ -462,11 +462,12 @@ static XrResult XRAPI_CALL LocateViews(XrSession handle, const XrViewLocateInfo 
     if (!session) return XR_ERROR_HANDLE_INVALID;
     const PFN_xrLocateViews locate = session->instance->locate_views;
     const XrResult result = locate(handle, info, state, capacity, count, views);
+    if (XR_FAILED(result)) return result; /* perhaps for want of a structure */
     const bool is_two =
         info->viewConfigurationType == XR_VIEW_CONFIGURATION_TYPE_PRIMARY_STEREO && *count == 2;
     const bool is_four =
         info->viewConfigurationType == XR_VIEW_CONFIGURATION_TYPE_PRIMARY_QUAD_VARJO && *count == 4;
-    if (XR_FAILED(result) || !views || capacity < *count || !(is_two || is_four)) return result;
+    if (!views || capacity < *count || !(is_two || is_four)) return result;
     XrView in_head[HANDCAL_VIEWS];
     bool has_head = false;
     if (needs_head && session->head != XR_NULL_HANDLE) {

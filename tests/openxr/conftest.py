@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import pytest
 
 from handcal.core.conventions import opengl_transform, pose
 from handcal.core.geometry import invert
-from handcal.core.types import EYES, Float64
+from handcal.core.types import EYES, Float64, HeadsetIdentity, HeadsetView
 from handcal.export import openxr
 from handcal.export.openxr import install_layer
 from handcal.export.outcome import SessionOutcome, load_outcome
@@ -67,17 +67,20 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def outcome() -> SessionOutcome:
-    return load_outcome(open_session(resource_path("example_session")))
+    """Return the example's outcome, of a rig that knows the headset's own field of view."""
+    record = open_session(resource_path("example_session"))
+    views = {}
+    for eye, display in record.rig.eyes.items():
+        left, right, up, down = np.tan(OWN_ANGLES[eye])
+        tangents = np.array([left, right, -up, -down])  # y down
+        views[eye] = HeadsetView(display.T_V_H, tangents, display.width_px, display.height_px)
+    rig = replace(record.rig, headset=HeadsetIdentity("0a", "Lab 2", views=views))
+    return load_outcome(replace(record, rig=rig))
 
 
 @pytest.fixture(scope="session")
 def calibration(outcome: SessionOutcome) -> dict[str, Any]:
-    """Return the example's calibration, of a rig that knows the runtime's own field of view."""
-    values: dict[str, Any] = openxr_values(outcome)
-    for view in values["views"]:
-        names = "angleLeft", "angleRight", "angleUp", "angleDown"
-        view["own"]["fov"] = dict(zip(names, OWN_ANGLES[view["eye"]], strict=True))
-    return values
+    return openxr_values(outcome)
 
 
 def own_views(outcome: SessionOutcome, moved_m: tuple[float, float, float] = (0, 0, 0)) -> Float64:

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from handcal.core.geometry import transform
 from handcal.core.types import EYES, Float64
 from handcal.export.openxr import LAYER
 from handcal.export.outcome import SessionOutcome
+from handcal.export.tools import openxr_values
 from handcal.io.files import write_json
 from tests.openxr.conftest import (
     OWN_ANGLES,
@@ -194,7 +196,11 @@ def test_with_moving_eyes_the_calibrated_eye_stays_on_the_head(
     """The runtime of an eye-tracked headset moves its views with the eyes."""
     moved = own_views(outcome)
     moved[:, 4:7] += [(0.001, 0.002, -0.001), (-0.002, 0.001, 0.003)]
-    ran = run(changed(calibration, movingEyes=1), moved, frames=50)
+    rig = outcome.record.rig
+    assert rig.headset is not None
+    tracked = replace(rig, headset=replace(rig.headset, moves_views=True))
+    values = openxr_values(replace(outcome, record=replace(outcome.record, rig=tracked)))
+    ran = run(values, moved, frames=50)
     assert largest_px(outcome, ran.seen, ran.heads, np.zeros(3)) <= 0.01
     np.testing.assert_array_equal(ran.got, ran.own)
     assert run(calibration, moved).status["state"] == "refused"
