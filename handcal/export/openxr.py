@@ -41,6 +41,18 @@ class InForce:
     left_s: float | None
     """Until it expires, negative afterwards; None if the user keeps it."""
 
+    def __str__(self) -> str:
+        if self.left_s is None:
+            end = "kept until it is replaced or the rig changes"
+        elif self.left_s > 0.0:
+            end = f"for {_duration(self.left_s)} more, or until a session begins"
+        else:
+            end = "expired; calibrate again"
+        return (
+            f"In force: {self.wearer or 'unnamed wearer'}, {self.headset}, session {self.session}, "
+            f"{_duration(self.age_s)} old, {end}."
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class LastProgram:
@@ -57,6 +69,12 @@ class LastProgram:
     age_s: float
     """Since this became so."""
 
+    def __str__(self) -> str:
+        return (
+            f"Last program: {self.application} on {self.system} ({self.runtime}), "
+            f"{_duration(self.age_s)} ago: {self.state}{self.reason and f', {self.reason}'}"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class LayerStatus:
@@ -67,6 +85,19 @@ class LayerStatus:
     """The installed layer is the one of this handcal."""
     in_force: InForce | None
     last_program: LastProgram | None
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The status for a person: layer, calibration and, if there was one, program."""
+        if not self.is_installed:
+            layer = "The layer is not installed; install it: handcal openxr install"
+        elif not self.is_current:
+            layer = "Installed, of another handcal; run handcal openxr install again."
+        else:
+            layer = "Installed: every OpenXR program of this user loads the layer."
+        none = "No calibration is in force; choose one: handcal openxr use SESSION"
+        program = (str(self.last_program),) if self.last_program else ()
+        return layer, str(self.in_force or none), *program
 
 
 def install_layer() -> Path:
@@ -133,7 +164,7 @@ def remove_layer() -> bool:
     return was_there
 
 
-def use_calibration(record: SessionRecord, *, keep: bool = False) -> InForce:
+def use_calibration(record: SessionRecord, *, keep: bool = False) -> None:
     """Put a session's final calibration in force, in place of any other.
 
     Parameters
@@ -154,9 +185,6 @@ def use_calibration(record: SessionRecord, *, keep: bool = False) -> InForce:
     values["rigSha256"] = rig_sha256(record.path)
     make_folder(in_force_path().parent)
     write_json(in_force_path(), values)
-    found = _in_force()
-    assert found is not None
-    return found
 
 
 def layer_status() -> LayerStatus:
@@ -194,6 +222,11 @@ def _in_force() -> InForce | None:
         age_s=_age_s(path),
         left_s=expires_s - time.time() if expires_s else None,
     )
+
+
+def _duration(time_s: float) -> str:
+    minutes = round(time_s / 60.0)
+    return f"{minutes} min" if minutes < 120 else f"{minutes / 60.0:.1f} h"
 
 
 def _text(data: dict[str, Any], key: str) -> str:
