@@ -158,7 +158,7 @@ static bool read_number(Reader *r, double *value) {
             number = 10.0 * number + (*r->at - '0'), digits++, scale -= is_fraction;
         else break;
     }
-    if (!digits || digits > 40) return false;
+    if (!digits) return false;
     if (r->at < r->end && (*r->at == 'e' || *r->at == 'E')) {
         if (++r->at < r->end && (*r->at == '-' || *r->at == '+'))
             power_sign = *r->at++ == '-' ? -1 : 1;

@@ -345,11 +345,12 @@ def test_damaged_files_crash_nothing(
         str(SOURCES / "views.c"),
     )
     data = json.dumps(calibration).encode()
-    files = [data, *mutants(data, count, seed)]
+    files = [data, *mutants(data, count, seed), b'{"":' * 16_000, b"[" * 60_000]
+    files += [data[:end] + tail for end in range(len(data)) for tail in (b"", b"1e5", b"-", b"\\")]
     stream = b"".join(len(one).to_bytes(4, "little") + one for one in files)
     done = subprocess.run([str(reader)], input=stream, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
-    assert len(done.stdout) == count + 1
+    assert len(done.stdout) == len(files)
     assert done.stdout[:1] == b"1"
     assert done.stdout.count(b"0") > count / 2
 
