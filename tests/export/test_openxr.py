@@ -7,10 +7,12 @@ import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
+from handcal.calibration.former import Former
 from handcal.core.errors import FileError
 from handcal.export import openxr
 from handcal.export.openxr import install_layer, layer_status, remove_layer, use_calibration
@@ -18,6 +20,8 @@ from handcal.io.resources import resource_path
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.session.in_force import end_at_begin, in_force_path
 from handcal.session.session import Session, open_session
+from handcal.station.opening import resume_or_create
+from handcal.station.settings import HeadsetKind, StationSettings
 
 EXAMPLE = resource_path("example_session")
 
@@ -94,6 +98,16 @@ def test_it_ends_as_its_session_is_closed_or_another_begins(session: Path, tmp_p
     use_calibration(open_session(session))
     end_at_begin(session)
     assert not in_force_path().exists()
+
+
+def test_the_next_wearers_session_ends_it(tmp_path: Path) -> None:
+    use_calibration(open_session(EXAMPLE))
+    for headset in get_args(HeadsetKind):
+        settings = StationSettings(sessions=str(tmp_path / headset), headset=headset)
+        with resume_or_create(settings, "next wearer", None, Former()):
+            # A simulated wearer wears nothing.
+            assert in_force_path().exists() == (headset == "virtual")
+            use_calibration(open_session(EXAMPLE))
 
 
 def test_what_the_layer_did_last_is_shown_as_plain_text(user: Path) -> None:
