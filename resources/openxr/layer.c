@@ -672,6 +672,10 @@ static XrResult XRAPI_CALL CreateInstance(const XrInstanceCreateInfo *info, cons
         result = create_with(extension, info, layer, handle);
     }
     if (XR_FAILED(result)) return result;
+    lock(&g.lock);
+    const bool is_below = find_instance(*handle); /* installed twice: once is enough */
+    unlock(&g.lock);
+    if (is_below) return result;
     get(*handle, "xrDestroyInstance", (PFN_xrVoidFunction *)&destroy);
     Instance *made = calloc(1, sizeof *made);
     if (!made) {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -147,7 +147,12 @@ def run(
     write_json(tmp_path / "runtime.json", {"file_format_version": "1.0.0", "runtime": runtime})
     file = tmp_path / "config/handcal/openxr.json"
 
-    def run_app(data: object = calibration, views: Float64 | None = None, **options: object) -> Ran:
+    def run_app(
+        data: object = calibration,
+        views: Float64 | None = None,
+        program: Sequence[str] = (),
+        **options: object,
+    ) -> Ran:
         """Run with a calibration file (None: none); options in capitals are the environment."""
         file.unlink(missing_ok=True)
         if isinstance(data, bytes):
@@ -170,7 +175,7 @@ def run(
         }
         arguments = [f"{name}={value}" for name, value in options.items() if name.islower()]
         done = subprocess.run(
-            [str(built / "app"), *arguments],
+            [*(program or [str(built / "app")]), *arguments],
             env=environment,
             capture_output=True,
             text=True,

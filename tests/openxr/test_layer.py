@@ -7,9 +7,11 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import threading
 import time
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +95,36 @@ def test_an_application_draws_by_p_and_the_runtime_receives_its_own_views(
     assert np.abs(ran.got[:, 9:] - ran.own[:, 9:]).max() * ARCMIN <= 1e-3
     assert np.abs(ran.seen[:, 7:10] - ran.own[:, 6:9]).max() > 1e-3  # m: it was corrected
     assert (ran.status["state"], ran.status["application"]) == ("active", "test application")
+
+
+_PYOPENXR = """
+import xr
+names = ["XR_MND_headless"]
+instance = xr.create_instance(xr.InstanceCreateInfo(enabled_extension_names=names))
+session = xr.create_session(instance, xr.SessionCreateInfo(0, xr.get_system(instance)))
+kind = xr.ReferenceSpaceCreateInfo(reference_space_type=xr.ReferenceSpaceType.VIEW)
+space = xr.create_reference_space(session, kind)
+stereo = xr.ViewConfigurationType.PRIMARY_STEREO
+state, views = xr.locate_views(session, xr.ViewLocateInfo(stereo, 10**9, space))
+for i, (pose, fov) in enumerate((view.pose, view.fov) for view in views):
+    angles = fov.angle_left, fov.angle_right, fov.angle_up, fov.angle_down
+    print("view 0 1", i, *pose.orientation, *pose.position, *angles)
+xr.destroy_session(session)
+xr.destroy_instance(instance)
+"""
+
+
+@pytest.mark.skipif(find_spec("xr") is None, reason="needs pip install pyopenxr")
+def test_a_program_in_python_gets_the_views_of_the_file(
+    run: Run, calibration: dict[str, Any]
+) -> None:
+    ran = run(program=(sys.executable, "-c", _PYOPENXR))
+    assert ran.returncode == 0, ran.errors
+    for row, view in zip(ran.seen, calibration["views"], strict=True):
+        pose = view["pose"]
+        wanted = [*pose["orientation"].values(), *pose["position"].values(), *view["fov"].values()]
+        np.testing.assert_allclose(row[3:], wanted, atol=1e-7)
+    assert ran.status["state"] == "active"
 
 
 def test_without_a_calibration_or_switched_off_all_passes_through(
@@ -226,6 +258,13 @@ def test_a_new_calibration_is_taken_while_an_application_runs(
     is_corrected = np.abs(ran.seen[:, 7:10] - ran.own[:, 6:9]).max(axis=1) > 1e-3
     assert not is_corrected[0]
     assert is_corrected[-1]
+    np.testing.assert_array_equal(ran.got, ran.own)
+
+
+def test_a_layer_that_is_loaded_twice_corrects_once(run: Run, outcome: SessionOutcome) -> None:
+    ran = run(XR_ENABLE_API_LAYERS=LAYER, frames=5)  # beside the implicit one
+    assert (ran.returncode, ran.errors) == (0, "")
+    assert largest_px(outcome, ran.seen, ran.heads, np.zeros(3)) <= 0.01
     np.testing.assert_array_equal(ran.got, ran.own)
 
 
