@@ -53,8 +53,6 @@ def _is_kept(data: Mapping[str, Any]) -> bool:
 def _end_unless(stays: Callable[[Mapping[str, Any]], bool]) -> None:
     """Remove the file; one that cannot be read is of no use to the layer either."""
     path = in_force_path()
-    if not path.exists():
-        return
     with suppress(FileError):
         if stays(read_json(path)):
             return

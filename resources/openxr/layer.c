@@ -231,6 +231,19 @@ static void plain(char *text) {
         if (*text < 32 || *text > 126 || *text == '"' || *text == '\\') *text = '?';
 }
 
+static const char *const REFUSALS[] = {
+    [HANDCAL_OTHER_DISTANCE] =
+        "the right view lies %.1f mm from where the rig has it, seen from the left: set the "
+        "headset's eye distance as it was at the calibration, or calibrate with this headset's rig",
+    [HANDCAL_OTHER_DIRECTION] =
+        "the views are turned against each other by %.1f mrad, compared with the rig: calibrate "
+        "with this headset's rig",
+    [HANDCAL_OTHER_FIELD] =
+        "an edge of the view lies %.1f / 1000 of the distance from where the rig has it: calibrate "
+        "with this headset's rig",
+    [HANDCAL_OTHER_VIEWS] =
+        "the inner views look from other places than the outer ones, which cannot be corrected"};
+
 /* Writes what became of the calibration, if that has changed. */
 static void write_status(void) {
     static char before[2048];
@@ -242,11 +255,10 @@ static void write_status(void) {
     for (const Session *one = session; one; one = one->next)
         if (one->is_other_system || one->views.state > HANDCAL_OFF)
             session = one; /* a refusal first */
-    if (!session) {
+    if (!session) { /* what the last one came to stays */
         unlock(&g.lock);
         return;
-    } /* what the last session came to stays */
-    const double measured = session->views.measured;
+    }
     if (g.owner[0]) {
         state = "refused";
         snprintf(reason, sizeof reason, "%s corrects already", g.owner);
@@ -258,29 +270,11 @@ static void write_status(void) {
         snprintf(reason, sizeof reason, "the calibration is for the headset %s",
                  g.calibration.system);
         plain(reason);
-    } else if (session->views.state != HANDCAL_WAITING) {
-        state = session->views.state == HANDCAL_ACTIVE ? "active"
-                : session->views.state == HANDCAL_OFF  ? "waiting"
-                                                       : "refused";
-        if (session->views.state == HANDCAL_OTHER_DISTANCE)
-            snprintf(reason, sizeof reason,
-                     "the right view lies %.1f mm from where the rig has it, seen from the "
-                     "left; is the knob for the eye distance as it was, and is this the headset of "
-                     "the rig?",
-                     measured);
-        if (session->views.state == HANDCAL_OTHER_DIRECTION)
-            snprintf(reason, sizeof reason,
-                     "the views are turned against each other by %.1f mrad, compared with the "
-                     "rig; is this the headset of the rig?",
-                     measured);
-        if (session->views.state == HANDCAL_OTHER_FIELD)
-            snprintf(reason, sizeof reason,
-                     "an edge of the view lies %.1f / 1000 of the distance from where the rig "
-                     "has it; is this the headset of the rig?",
-                     measured);
-        if (session->views.state == HANDCAL_OTHER_VIEWS)
-            snprintf(reason, sizeof reason,
-                     "the inner views look from other places than the outer ones");
+    } else if (session->views.state == HANDCAL_ACTIVE) {
+        state = "active";
+    } else if (session->views.state > HANDCAL_OFF) {
+        state = "refused";
+        snprintf(reason, sizeof reason, REFUSALS[session->views.state], session->views.measured);
     }
     char application[XR_MAX_APPLICATION_NAME_SIZE], runtime[XR_MAX_RUNTIME_NAME_SIZE],
         system[XR_MAX_SYSTEM_NAME_SIZE];
