@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import time
 from contextlib import suppress
@@ -15,7 +14,14 @@ from handcal.core.errors import FileError
 from handcal.export.outcome import load_outcome, printable
 from handcal.export.tools import openxr_values
 from handcal.io.configuration import configuration_folder
-from handcal.io.files import make_folder, modified_s, read_json, write_json
+from handcal.io.files import (
+    make_folder,
+    modified_s,
+    read_json,
+    read_limited,
+    write_atomic,
+    write_json,
+)
 from handcal.io.resources import resource_path
 from handcal.session.in_force import in_force_path, rig_sha256
 from handcal.session.session import SessionRecord
@@ -26,6 +32,7 @@ OFF = "HANDCAL_OPENXR_OFF"
 IN_FORCE_S = 12.0 * 3600.0
 """The time that a calibration stays in force, unless the user keeps it."""
 _LIBRARY = "handcal_openxr.dll" if sys.platform == "win32" else "libhandcal_openxr.so"
+_MAX_LIBRARY_BYTES = 2**24
 _REGISTRY = r"Software\Khronos\OpenXR\1\ApiLayers\Implicit"
 
 
@@ -108,13 +115,13 @@ def install_layer() -> Path:
     FileError
         If it cannot be written, has not been built, or there is none for this system.
     """
-    library = _library()
+    library, data = _library(), read_limited(_shipped_library(), _MAX_LIBRARY_BYTES)
     make_folder(library.parent)
-    try:
-        shutil.copyfile(_shipped_library(), library)
-    except OSError as error:
+    try:  # not copied over: running programs have the old one in their memory
+        write_atomic(library, data)
+    except FileError as error:
         raise FileError(
-            f"cannot write {library}: {error.strerror}; end all OpenXR programs and try again"
+            f"{error}; if OpenXR programs are running, end them and try again"
         ) from error
     manifest = _manifest()
     make_folder(manifest.parent)

@@ -53,7 +53,9 @@ def test_installing_and_removing_leave_nothing(user: Path) -> None:
     (user / "shipped.so").write_bytes(b"a newer layer")
     assert layer_status().is_installed
     assert not layer_status().is_current
-    install_layer()
+    with Path(layer["library_path"]).open("rb") as running:
+        install_layer()
+        assert running.read() == b"a layer"  # a program that runs keeps what it has loaded
     assert layer_status().is_current
     use_calibration(open_session(EXAMPLE))
     assert remove_layer()

@@ -35,7 +35,7 @@ def test_a_calibration_is_put_in_force_and_what_became_of_it_is_shown(
     says("The layer is not installed")
     use.click()
     assert not use.isEnabled()
-    says("cannot write")  # there is no layer to copy
+    says("shipped.so")  # is not there
     shipped.write_bytes(b"a layer")
     use.click()
     says("for 12.0 h more")
