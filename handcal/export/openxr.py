@@ -52,7 +52,8 @@ class InForce:
         if self.left_s is None:
             end = "kept until it is replaced or the rig changes"
         elif self.left_s > 0.0:
-            end = f"for {_duration(self.left_s)} more, or until a session begins"
+            left = _duration(self.left_s)
+            end = f"for {left} more, at most until its session is closed or another begins"
         else:
             end = "expired; calibrate again"
         return (

@@ -105,7 +105,7 @@ static const char *const EXTENSIONS[] = {XR_MSFT_COMPOSITION_LAYER_REPROJECTION_
 typedef struct Instance {
     struct Instance *next;
     XrInstance handle;
-    bool has_plane, has_focus; /* the layer has enabled the extension */
+    bool has_plane, has_focus; /* the extension is enabled */
     char application[XR_MAX_APPLICATION_NAME_SIZE], runtime[XR_MAX_RUNTIME_NAME_SIZE];
     PFN_xrGetInstanceProcAddr get;
     PFN_xrDestroyInstance destroy_instance;
@@ -628,10 +628,8 @@ static XrResult create_with(const char *extension, const XrInstanceCreateInfo *i
     return result;
 }
 
-/* The first of EXTENSIONS that the runtime has; NULL if none, or if the application uses it itself.
- */
-static const char *extension_to_add(XrInstance handle, PFN_xrGetInstanceProcAddr get,
-                                    const XrInstanceCreateInfo *info) {
+/* The first of EXTENSIONS that the runtime has; NULL if none. */
+static const char *extension_of(XrInstance handle, PFN_xrGetInstanceProcAddr get) {
     PFN_xrEnumerateInstanceExtensionProperties list = NULL;
     uint32_t count = 0;
     if (XR_FAILED(
@@ -647,8 +645,6 @@ static const char *extension_to_add(XrInstance handle, PFN_xrGetInstanceProcAddr
             for (uint32_t i = 0; i < count; i++)
                 if (!strcmp(all[i].extensionName, EXTENSIONS[k])) found = EXTENSIONS[k];
     free(all);
-    for (uint32_t i = 0; found && i < info->enabledExtensionCount; i++)
-        if (!strcmp(info->enabledExtensionNames[i], found)) found = NULL;
     return found;
 }
 
@@ -658,9 +654,12 @@ static XrResult XRAPI_CALL CreateInstance(const XrInstanceCreateInfo *info, cons
         return XR_ERROR_INITIALIZATION_FAILED;
     const PFN_xrGetInstanceProcAddr get = layer->next_info->get;
     XrResult result = create_with(NULL, info, layer, handle);
-    const char *extension = XR_SUCCEEDED(result) ? extension_to_add(*handle, get, info) : NULL;
+    const char *extension = XR_SUCCEEDED(result) ? extension_of(*handle, get) : NULL;
+    bool is_enabled = false;
+    for (uint32_t i = 0; extension && i < info->enabledExtensionCount; i++)
+        is_enabled |= !strcmp(info->enabledExtensionNames[i], extension);
     PFN_xrDestroyInstance destroy = NULL;
-    if (extension) { /* asked for only where it is: a failed attempt upsets other layers */
+    if (extension && !is_enabled) { /* asked for only where it is: a failed attempt upsets other layers */
         get(*handle, "xrDestroyInstance", (PFN_xrVoidFunction *)&destroy);
         destroy(*handle);
         result = create_with(extension, info, layer, handle);

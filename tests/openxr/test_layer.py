@@ -307,12 +307,14 @@ def test_the_visibility_mask_moves_with_the_edges(run: Run, calibration: dict[st
 
 
 def test_the_plane_of_the_image_is_given_to_runtimes_that_reproject_by_it(run: Run) -> None:
-    ran = run(TEST_EXTENSION="XR_MSFT_composition_layer_reprojection", frames=5)
+    name = "XR_MSFT_composition_layer_reprojection"
+    ran = run(TEST_EXTENSION=name, frames=5)
     between_m = ran.own[:, 6:9].reshape(-1, 2, 3).mean(axis=1)
     ahead = Rotation.from_quat(ran.own[::2, 2:6]).apply([0.0, 0.0, -1.0])
     planes = np.array(ran.other["plane"])
     np.testing.assert_allclose(planes[:, :3], between_m + 2.0 * ahead, atol=1e-5)
     np.testing.assert_allclose(planes[:, 3:], -ahead, atol=1e-6)
+    assert len(run(TEST_EXTENSION=name, extension=name).other["plane"]) == 1  # asks for it itself
     assert run(TEST_EXTENSION="XR_ML_frame_end_info").other["focus"] == [[2.0]]
     assert not {"plane", "focus"} & set(run().other)
 

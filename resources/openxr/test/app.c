@@ -12,6 +12,7 @@
  *   owner     announce this owner of the correction to the library of the layer
  *   layer     that library
  *   api       minor version of OpenXR that is asked for (0)
+ *   extension one extension more
  *   wrong     1: pass a structure of a wrong type, which a validation must report */
 #define _GNU_SOURCE
 #include <locale.h>
@@ -208,7 +209,8 @@ int main(int argc, char **argv) {
     }
     get = (PFN_xrGetInstanceProcAddr)symbol(loader, "xrGetInstanceProcAddr");
     const char *extensions[] = {"XR_MND_headless", XR_KHR_VISIBILITY_MASK_EXTENSION_NAME,
-                                "XR_VARJO_quad_views"};
+                                "XR_VARJO_quad_views",
+                                option("extension", "")};
     const uint64_t minor = (uint64_t)atoi(option("api", "0"));
     XrInstanceCreateInfo info = {XR_TYPE_INSTANCE_CREATE_INFO,
                                  NULL,
@@ -216,7 +218,7 @@ int main(int argc, char **argv) {
                                  {"test application", 1, "", 1, XR_MAKE_VERSION(1, minor, 0)},
                                  0,
                                  NULL,
-                                 3,
+                                 *option("extension", "") ? 4 : 3,
                                  extensions};
     CALL(CreateInstance, &info, &instance);
     XrSystemGetInfo form = {XR_TYPE_SYSTEM_GET_INFO, NULL, XR_FORM_FACTOR_HEAD_MOUNTED_DISPLAY};
