@@ -25,6 +25,7 @@ from handcal_gui.control.live import CalibrationController
 from handcal_gui.control.review import ReviewController
 from handcal_gui.dialogs.connect import ConnectDialog
 from handcal_gui.dialogs.export import Export, ExportDialog
+from handcal_gui.dialogs.openxr import OpenxrDialog
 from handcal_gui.dialogs.preferences import PreferencesDialog
 from handcal_gui.dialogs.support import SupportDialog
 from handcal_gui.evaluation_entries import EvaluationEntries
@@ -138,6 +139,19 @@ class SeparateWindows(QObject):
         name, wearer = record.path.absolute().name, record.wearer
         folder = folder or self._export_folder(record.path.parent)
         return self._open_export(name, folder, export, wearer, self._window)
+
+    def use_in_openxr(self) -> OpenxrDialog | None:
+        """Open the dialog that gives the session's calibration to OpenXR programs, as `export`."""
+        record = self.record
+        if record is None:
+            self.show_library()
+            return None
+        if why := self.why_no_export():
+            self._window.banner.show_message(tr("Nothing can be used: {}.").format(why))
+            return None
+        dialog = OpenxrDialog(record, self._window)
+        self._open(dialog, dialog.stop)
+        return dialog
 
     def show_library(self, folder: Path | None = None) -> LibraryWindow:
         """Show the sessions of a folder, by default of the session folder."""

@@ -6,8 +6,9 @@
 #   bash installer/build.sh windows    handcal-setup-VERSION.exe, for Windows 10 and 11, and
 #                                      handcal-open3d-VERSION-windows.zip, to unpack beside it
 #   bash installer/build.sh all
-# Runs on Debian 12 or newer with Python 3.11 to 3.13 (PYTHON names another than python3); deb
-# needs binutils and libpython3.X, windows needs nsis, zip and unzip. docs/platforms.md says what was measured.
+# Runs on Debian 12 or newer with Python 3.11 to 3.13 (PYTHON names another than python3). All need
+# gcc, gcc-mingw-w64-x86-64 and libopenxr-dev for the OpenXR layer; deb needs binutils and
+# libpython3.X, windows needs nsis, zip and unzip. docs/platforms.md says what was measured.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 work=$PWD/dist/work
@@ -23,7 +24,12 @@ require() {
 }
 
 # Each is asked for what its programs need before anything is built, which takes minutes.
-needs_wheel() { :; }
+needs_wheel() {
+    require cc gcc
+    require x86_64-w64-mingw32-gcc gcc-mingw-w64-x86-64
+    [[ -e /usr/include/openxr/openxr.h ]] ||
+        fail "OpenXR's headers are missing; run apt-get install libopenxr-dev"
+}
 
 needs_deb() {
     require objdump binutils
@@ -58,6 +64,7 @@ make_environment() {
 
 build_wheel() {
     rm -f dist/handcal-*.whl
+    bash installer/openxr.sh # into resources, which the wheel carries
     "$python" -m hatchling build -t wheel -d dist
     wheel=$(echo dist/handcal-*.whl)
     version=$("$python" -m hatchling version)

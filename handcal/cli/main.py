@@ -134,6 +134,18 @@ _SESSION: Mapping[str, Entry] = {
     "repair": Entry("Copy the sound parts of a damaged session into a new one.", "sessions"),
 }
 
+_OPENXR: Mapping[str, Entry] = {
+    "install": Entry(
+        "Have every OpenXR program of this user render with the calibration in force.", "openxr"
+    ),
+    "use": Entry("Put a session's final calibration in force for OpenXR programs.", "openxr"),
+    "status": Entry(
+        "Show whether the layer is installed, whose calibration is in force, and what it last did.",
+        "openxr",
+    ),
+    "remove": Entry("Remove the layer and end the calibration in force.", "openxr"),
+}
+
 COMMANDS: Mapping[str, Entry] = {
     "demo": Entry(
         "Calibrate a simulated wearer from start to end, and compare with the truth.", "simulate"
@@ -162,6 +174,7 @@ COMMANDS: Mapping[str, Entry] = {
         "Export a session: report, tables, calibration, clouds, and the session as one file.",
         "sessions",
     ),
+    "openxr": Entry("Give the calibrated eyes to every OpenXR program of this user.", _OPENXR),
     "session": Entry("Check and repair stored sessions.", _SESSION),
     "inspect": Entry(
         "Show a session's clouds, residuals, eyes and displays in a 3D window.", "sessions"

@@ -98,6 +98,8 @@ class HeadsetIdentity:
     views: Mapping[Eye, HeadsetView] = field(default_factory=dict)
     eye_distance_m: float | None = None
     """The wearer's eye distance as the headset measures it."""
+    moves_views: bool = False
+    """Its runtime moves V with the wearer's eyes; only a rig file says so."""
 
     __repr__ = brief
 

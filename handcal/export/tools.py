@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from handcal.core.conventions import (
+    Fov,
+    Pose,
     opengl_transform,
     openxr_view,
     pose,
@@ -51,35 +53,70 @@ def write_unity(path: Path, outcome: SessionOutcome, near_m: float, far_m: float
 
 
 def write_openxr(path: Path, outcome: SessionOutcome) -> None:
-    """Write both views with the fields of XrView, posed in the headset rig.
+    """Write what handcal's OpenXR layer reads; as it expires never, also for other programs."""
+    write_json(path, openxr_values(outcome))
+
+
+def openxr_values(outcome: SessionOutcome) -> dict[str, object]:
+    """Return both eyes with the fields of XrView, in the rig's head and in V.
+
+    The layer poses them in V, the runtime's own view, since the rig may have its head elsewhere
+    than the runtime its VIEW. By ``own``, V in the rig's head and its field of view if the rig
+    knows it, the layer recognises the rig's headset.
 
     Raises
     ------
     FileError
         If a projection has skew or rotation, which XrFovf cannot express.
     """
+    rig = outcome.record.rig
+    headset = rig.headset or outcome.record.facts.headset
     views = []
     for eye in EYES:
         try:
             in_view, fov = openxr_view(outcome.projection(eye, outcome.final(eye)))
         except ValueError as error:
             raise FileError(f"{error} ({eye} eye); export json instead") from error
-        T_H_V = opengl_transform(invert(outcome.record.rig.eyes[eye].T_V_H))
-        in_head = pose(T_H_V @ rigid(translation_m=in_view.position_m))
+        own_fov = None
+        if headset and eye in headset.views:
+            left, right, up, down = np.arctan(headset.views[eye].tangents)
+            own_fov = _fov_fields(Fov(left, right, -up, -down))
+        T_H_V = opengl_transform(invert(rig.eyes[eye].T_V_H))
         views.append(
             {
                 "eye": eye,
-                "pose": {
-                    "orientation": dict(zip("xyzw", in_head.quaternion_xyzw.tolist(), strict=True)),
-                    "position": dict(zip("xyz", in_head.position_m.tolist(), strict=True)),
-                },
-                "fov": {
-                    f"angle{name.removesuffix('_rad').capitalize()}": angle_rad
-                    for name, angle_rad in asdict(fov).items()
-                },
+                "pose": _pose_fields(pose(T_H_V @ rigid(translation_m=in_view.position_m))),
+                "inView": _pose_fields(in_view),
+                "fov": _fov_fields(fov),
+                "own": {"pose": _pose_fields(pose(T_H_V)), "fov": own_fov},
             }
         )
-    write_json(path, {"handcalOpenxr": _VERSION, "session": outcome.name, "views": views})
+    return {
+        "handcalOpenxr": _VERSION,
+        "session": outcome.name,
+        "wearer": outcome.record.wearer,
+        "rig": rig.name,
+        "headset": headset.name if headset else "",
+        "space": "pose and own.pose are in the rig's head, inView in the runtime's view of the eye",
+        "imageDistanceM": float(np.mean([rig.eyes[eye].z_C0_S_m for eye in EYES])),
+        "expiresUnixS": 0,
+        "movingEyes": int(rig.headset is not None and rig.headset.moves_views),
+        "views": views,
+    }
+
+
+def _pose_fields(one: Pose) -> dict[str, dict[str, float]]:
+    return {
+        "orientation": dict(zip("xyzw", one.quaternion_xyzw.tolist(), strict=True)),
+        "position": dict(zip("xyz", one.position_m.tolist(), strict=True)),
+    }
+
+
+def _fov_fields(fov: Fov) -> dict[str, float]:
+    return {
+        f"angle{name.removesuffix('_rad').capitalize()}": float(angle_rad)
+        for name, angle_rad in asdict(fov).items()
+    }
 
 
 def write_slicer(folder: Path, outcome: SessionOutcome, progress: Progress = Progress()) -> None:

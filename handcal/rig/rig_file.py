@@ -211,6 +211,8 @@ def _write_headset(storage: cv2.FileStorage, headset: HeadsetIdentity | None) ->
         storage.write("protocol", headset.protocol)
         if headset.eye_distance_m is not None:
             storage.write("eye_distance_m", headset.eye_distance_m)
+        if headset.moves_views:
+            storage.write("moves_views", 1)
         for eye, view in headset.views.items():
             with _map(storage, eye):
                 storage.write("width_px", view.width_px)
@@ -354,6 +356,7 @@ def _parse_headset(root: Fields) -> HeadsetIdentity | None:
         protocol=fields.integer("protocol"),
         views={eye: _parse_view(fields.section(eye)) for eye in EYES if fields.has(eye)},
         eye_distance_m=fields.number("eye_distance_m") if fields.has("eye_distance_m") else None,
+        moves_views=fields.has("moves_views") and fields.integer("moves_views") != 0,
     )
 
 

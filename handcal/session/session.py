@@ -48,6 +48,7 @@ from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
 from handcal.session.alignment_file import encode_alignment
 from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.facts import AlignmentFacts, SessionFacts, facts_json, with_facts
+from handcal.session.in_force import end_at_close
 from handcal.session.journal import JOURNAL, Event, JournalWriter, happens_now, journal_line
 from handcal.session.record import MAX_ALIGNMENT_BYTES as MAX_ALIGNMENT_BYTES
 from handcal.session.record import MAX_NOTES_CHARACTERS as MAX_NOTES_CHARACTERS
@@ -359,6 +360,7 @@ class Session(Closable):
                 with suppress(FileError):
                     self._require_own().write_end(self._notes_sha256)
             self._contents = self.contents
+            end_at_close(self.path)
         self._journal = None
         self._lock.release()
 

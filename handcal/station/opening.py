@@ -22,6 +22,7 @@ from handcal.register.fuse import FuseSettings
 from handcal.register.sitting import sitting_prior
 from handcal.register.wearers import fit_wearers
 from handcal.rig.rig_file import read_rig
+from handcal.session.in_force import end_at_begin
 from handcal.session.journal import JOURNAL, JOURNAL_END
 from handcal.session.record import replay
 from handcal.session.session import Session
@@ -56,6 +57,7 @@ def resume_or_create(
     """
     if resume is not None:
         with Session(resume) as session:
+            _end_former(settings, session)
             stored = stored_solve_settings(session.contents)
             target_arcmin = stored.verdict.target_arcmin
             yield session, _with_fuse(settings, stored.fuse, target_arcmin)
@@ -70,12 +72,19 @@ def resume_or_create(
     station = settings_json(settings)
     stored_settings = {"calibration": station.pop("calibration"), "station": station}
     with Session.create(settings.sessions_path, rig, stored_settings, wearer=wearer) as session:
+        _end_former(settings, session)
         try:
             yield session, settings
         except BaseException:
             session.close()
             _discard_if_empty(session.path)
             raise
+
+
+def _end_former(settings: StationSettings, session: Session) -> None:
+    """End the calibration in force of another wearer; a simulated one wears nothing."""
+    if settings.headset != "virtual":
+        end_at_begin(session.path)
 
 
 def _with_fuse(

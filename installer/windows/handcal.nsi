@@ -100,6 +100,8 @@ Section Uninstall
   RMDir /r "$INSTDIR\python"
   RMDir /r "$INSTDIR\wheels"
   RMDir /r "$INSTDIR\licences"
+  DeleteRegValue HKCU "Software\Khronos\OpenXR\1\ApiLayers\Implicit" "$LOCALAPPDATA\handcal\openxr\handcal.json"
+  RMDir /r "$LOCALAPPDATA\handcal\openxr" ; what handcal openxr install has made
   Delete "$INSTDIR\uv.exe"
   Delete "$INSTDIR\requirements.txt"
   Delete "$INSTDIR\requirements-open3d.txt"

@@ -3556,6 +3556,10 @@ of the trials above and below it, but not below 0. A single trial has no SD.</so
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>Nothing can be used: {}.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>There is nothing to inspect: {}.</source>
         <translation type="unfinished"></translation>
     </message>
@@ -3573,6 +3577,10 @@ of the trials above and below it, but not below 0. A single trial has no SD.</so
     </message>
     <message>
         <source>&amp;Sessions…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Use in OpenXR programs…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -7205,6 +7213,26 @@ width is {:.0f}′.</source>
     </message>
     <message>
         <source>no headset is paired; pair one with Connect a headset in the File menu</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Every OpenXR program that you start on this computer then loads handcal&apos;s layer, which gives it the calibrated eyes of this wearer; Remove ends it for all.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>OpenXR programs</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Keep it until it is replaced or the rig changes, not for 12 hours</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Use for every OpenXR program on this computer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>&amp;Remove</source>
         <translation type="unfinished"></translation>
     </message>
 </context>

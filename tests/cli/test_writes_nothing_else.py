@@ -56,6 +56,9 @@ COMMANDS = {
     "export": "SESSION --output OUTPUT",
     "inspect": "SESSION --picture OUTPUT/view.png",
     "prior": ".",
+    "openxr use": "SESSION",
+    "openxr status": "",
+    "openxr remove": "",
     "session check": "SESSION --json OUTPUT/checked.json",
     "session repair": "SESSION --output OUTPUT/repaired",
     "record": "OUTPUT/recording --source simulator --frames 2",
@@ -87,9 +90,11 @@ NEED_MORE = {
     "replay", "evaluate cube capture", "evaluate cube report", "evaluate detector",
     "study recorded", "rig take", "rig camera", "rig stereo", "rig convert", "rig display",
     "rig make", "rig depth", "rig accept", "evaluate segmentation", "evaluate cube track",
-    "evaluate trials", "pair",
+    "evaluate trials", "pair", "openxr install",
 }  # fmt: skip
-"""Commands whose input would have to be made first; they write as those above."""
+"""Commands whose input would have to be made first; they write as those above.
+
+``openxr install`` also writes where OpenXR looks for layers: tests/export/test_openxr.py."""
 
 
 def leaves(entries: Mapping[str, Entry], *groups: str) -> Iterator[str]:

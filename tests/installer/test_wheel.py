@@ -39,6 +39,8 @@ def test_it_carries_manual_protocol_examples_and_unity_package(wheel: Path) -> N
         wanted = {path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern)}
         assert wanted
         assert wanted <= carried
+    layer = ROOT / "resources/openxr"  # sources, and what has been built of them
+    assert {f"openxr/{path.name}" for path in layer.glob("*.*")} <= carried
     unity = ROOT / "resources/unity"
     scripts = {f"unity/{path.relative_to(unity).as_posix()}" for path in unity.rglob("*.cs")}
     assert scripts

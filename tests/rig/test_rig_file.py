@@ -186,6 +186,7 @@ HEADSET = HeadsetIdentity(
     protocol=2,
     views={"left": HeadsetView(np.eye(4), np.array([-0.5, 0.4, -0.3, 0.3]), 1268, 720)},
     eye_distance_m=0.0631,
+    moves_views=True,
 )
 FULL = dataclasses.replace(
     example_rig(),

@@ -372,6 +372,7 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     assert shown == ["Eyes", "Plots", "Compare"]
     assert child(program, QPushButton, "reviewExport").isEnabled()
     assert program.windows.export() is not None
+    assert program.windows.use_in_openxr() is not None
     program.window.panels.results.compare_requested.emit("linear")
     status = child(program, QLabel, "comparison-status")
     qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)
