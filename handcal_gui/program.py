@@ -217,6 +217,7 @@ class Program(QObject):
         self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.windows.export())
+        review_page.openxr_requested.connect(lambda: self.windows.use_in_openxr())
         review_page.resume_requested.connect(self._resume_reviewed)
         review_page.again_requested.connect(self._begin_from_shown)
         self.live.slipped.connect(self._begin_from_shown)

@@ -7,6 +7,7 @@ It is a file in the configuration, in the form of an export; here it only ends. 
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -53,6 +54,8 @@ def _is_kept(data: Mapping[str, Any]) -> bool:
 def _end_unless(stays: Callable[[Mapping[str, Any]], bool]) -> None:
     """Remove the file; one that cannot be read is of no use to the layer either."""
     path = in_force_path()
+    if not os.path.isfile(path):
+        return
     with suppress(FileError):
         if stays(read_json(path)):
             return

@@ -40,11 +40,13 @@ class ReviewPage(QWidget):
     ----------
     residuals : ResidualsTab
         The residual map of an alignment, where the window is high enough.
-    export_requested, resume_requested, again_requested, close_requested : Signal()
+    export_requested, openxr_requested, resume_requested : Signal()
+    again_requested, close_requested : Signal()
         *again_requested*: the wearer is to be calibrated again, beginning from this session.
     """
 
     export_requested = Signal()
+    openxr_requested = Signal()
     resume_requested = Signal()
     again_requested = Signal()
     close_requested = Signal()
@@ -63,6 +65,8 @@ class ReviewPage(QWidget):
         self._card = ResultCard()
         self.residuals = ResidualsTab()
         self._export = main_button("reviewExport", tr("E&xport…"))
+        self._openxr = button("reviewOpenxr", tr("&Use in OpenXR…"))
+        self._openxr.setToolTip(tr("Use for every OpenXR program on this computer"))
         self._resume = button("reviewResume", tr("&Resume"))
         self._resume.setToolTip(RESUME_HELP)
         self._again = button("reviewAgain", tr("Calibrate &again"))
@@ -74,10 +78,11 @@ class ReviewPage(QWidget):
         )
         close = button("reviewClose", tr("Close &session"))
         self._export.clicked.connect(self.export_requested)
+        self._openxr.clicked.connect(self.openxr_requested)
         self._resume.clicked.connect(self.resume_requested)
         self._again.clicked.connect(self.again_requested)
         close.clicked.connect(self.close_requested)
-        buttons = hbox(self._export, self._resume, self._again, 0, close)
+        buttons = hbox(self._export, self._openxr, self._resume, self._again, 0, close)
         vbox(
             self._title,
             self._task,
@@ -112,6 +117,7 @@ class ReviewPage(QWidget):
         """
         self.show_wearer(record.wearer)
         self._export.setEnabled(record.is_solvable)
+        self._openxr.setEnabled(record.is_solvable)
         self._again.setEnabled(results is not None)
         self._task.setText(_EXPORT if record.is_solvable else _RESUME)
         trials = eye_trials(results, record, target_arcmin) if results else {}

@@ -930,6 +930,14 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Use in OpenXR…</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Use for every OpenXR program on this computer</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Calibrate &amp;again</source>
         <translation type="unfinished"></translation>
     </message>

@@ -31,6 +31,7 @@ from handcal.session.record import Replayed, replay
 from handcal.session.session import Session, SessionRecord
 from handcal_gui.control import review
 from handcal_gui.control.review import _Stored
+from handcal_gui.dialogs.openxr import OpenxrDialog
 from handcal_gui.pages.review_page import ReviewPage
 from handcal_gui.pages.start.example import copy_example
 from handcal_gui.panels.results.verdict_card import VerdictCard
@@ -372,7 +373,8 @@ def test_a_session_that_was_only_verified_is_shown_compared_and_exported(
     assert shown == ["Eyes", "Plots", "Compare"]
     assert child(program, QPushButton, "reviewExport").isEnabled()
     assert program.windows.export() is not None
-    assert program.windows.use_in_openxr() is not None
+    child(program, QPushButton, "reviewOpenxr").click()
+    assert len(program.window.findChildren(OpenxrDialog)) == 1
     program.window.panels.results.compare_requested.emit("linear")
     status = child(program, QLabel, "comparison-status")
     qtbot.waitUntil(lambda: status.text().startswith("Δ"), timeout=PATIENCE_MS)

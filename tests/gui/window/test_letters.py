@@ -182,7 +182,7 @@ def test_each_letter_of_a_stored_session_leads_to_one_place(
     window.panels.results.show_results(results, record.alignments)
     window.show_page("review")
     around = letters(review, is_shown=True)
-    assert len(around) == 4
+    assert len(around) == 5
     for shown in of_docks(qtbot, program):
         found = [*"fevh", *around, *shown]
         assert len(set(found)) == len(found), found
