@@ -41,7 +41,10 @@ def check_recording(path: Path) -> None:
     except OSError as error:
         raise CameraError(f"cannot read {path}: {error.strerror or error}") from error
     if not begin.startswith(_BEGINNINGS):
-        raise CameraError(f"{path} is not a recording; choose a .db3 or .bag file of a RealSense")
+        raise CameraError(
+            f"{path} is not a recording; choose a .db3 or .bag file of a RealSense or of ROS, or "
+            "a folder by handcal, ROS 2, Open3D or TUM RGB-D"
+        )
 
 
 class RecordingCamera(PlayedCamera):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -55,6 +56,19 @@ REALSENSE_OPTIONS = (
     flag("--hole-filling", "apply the SDK's hole filling to depth"),
 )
 """One for every field of `RealSenseSettings`."""
+
+
+def _depth_scale(text: str) -> float:
+    """Convert metres per unit; units per metre, as Open3D and TUM give them, get a hint."""
+    try:
+        return number(float, *DEPTH_SCALES_M)(text)
+    except argparse.ArgumentTypeError as error:
+        if not re.fullmatch(r"[1-9]\d{2,5}(\.0*)?", text):
+            raise
+        hint = f"enter {1.0 / float(text):g} if a metre is {text} units"
+        raise argparse.ArgumentTypeError(f"{error}; {hint}") from error
+
+
 _ROI = arg(
     "--roi",
     choices=get_args(Roi),
@@ -163,7 +177,7 @@ def replay(arguments: argparse.Namespace) -> None:
     ),
     value(
         "--depth-scale",
-        number(float, *DEPTH_SCALES_M),
+        _depth_scale,
         "M",
         "metres per unit of depth (default: as the file of intrinsics says)",
     ),

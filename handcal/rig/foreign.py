@@ -38,13 +38,13 @@ _SAME = {
 _NAMES = {
     "K": "cameramatrix|intrinsicmatrix|intrinsics?|cameraintrinsics?|mtx|matrix|k|m",
     "D": "distortioncoefficients?|distortioncoeffs?|distcoeffs?|distortion|dist|coeffs|d",
-    "width": "(?:image|img|frame|sensor)?width",
-    "height": "(?:image|img|frame|sensor)?height",
+    "width": "(?:image|img|frame|sensor)?width|w",
+    "height": "(?:image|img|frame|sensor)?height|h",
     "size": "(?:image|img|frame|sensor)?(?:size|resolution)",
     "model": "distortionmodel|lensmodel|lens|model|modeltype",
     "camera_model": "cameramodel|cameratype",
-    "fx": "fx",
-    "fy": "fy",
+    "fx": "fx|flx",
+    "fy": "fy|fly",
     "p1": "p1",
     "p2": "p2",
     "cx": "cx|ppx",
@@ -58,7 +58,8 @@ _FIELD = re.compile(
 )
 _KINDS = (
     (rb"PK\x03\x04|\x93NUMPY", "a NumPy archive"),
-    (rb"MATLAB 5", "a MATLAB file"),
+    (rb"MATLAB 5|(?s:%.{,4000}?\bfc *=)", "a MATLAB file"),
+    (rb'Intrinsic of "', "the text of rs-enumerate-devices: use JSON with width to coeffs"),
     (rb"# oST", "ROS's ost.txt: use the ost.yaml beside it"),
     (rb"# Camera list|\d+ [A-Z_]+ \d+ \d+( [-+.\de]+){3,}", "COLMAP's cameras.txt"),
     (rb"\x89PNG|\xff\xd8|BM|II\*\x00|MM\x00\*|P[2-6]\s", "an image"),
@@ -142,8 +143,8 @@ def _found(values: Mapping[str, Any], levels: int = _DEEPEST) -> dict[str, dict[
             is_one = _count(value) == 1
             if name == "K" and match["K"] == "k" and is_one:
                 name, side = f"k{side}", ""  # a coefficient
-            if name in ("p1", "p2") and not is_one:
-                continue  # OpenCV's projection of a rectified camera
+            if name in ("p1", "p2", "width", "height") and not is_one:
+                continue  # OpenCV's projection of a rectified camera, or a homography H
             by_side.setdefault(side, {})[name] = value
         elif key == "Intrinsics" and is_map and "ModelParameters" in value:
             by_side.setdefault("", {})["azure"] = value

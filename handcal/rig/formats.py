@@ -113,6 +113,7 @@ def read_pose(path: Path) -> Float64:
         numbers = _matrix_in(path)
         if numbers is None:
             return _read(path, _pose_of)
+        require(bool(numbers), "the file is empty")
         require(len(numbers) == 16, "a matrix must have 4 rows of 4 numbers")
         return _pose(np.array(numbers).reshape(4, 4))
     except ValueError as error:

@@ -333,3 +333,13 @@ def test_an_interrupted_demo_leaves_no_headset_and_a_readable_session(tmp_path: 
     assert record.torn_bytes == 0
     with Session(path) as session:
         session.record("opened_again")
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(("text", "hint"), [("5000", "; enter 0.0002"), ("-1", "; see")])
+def test_a_depth_scale_in_units_per_metre_is_explained(text: str, hint: str) -> None:
+    command = "-m handcal segment --color a --depth b --intrinsics c --output d --depth-scale"
+    ran = subprocess.run(
+        [sys.executable, *command.split(), text], capture_output=True, text=True, check=False
+    )
+    assert f"{text!r} is not a number from 1e-06 to 0.1{hint}" in ran.stderr

@@ -91,6 +91,27 @@ def test_what_holds_no_camera_is_named(rigfiles: Path, name: str, said: str) -> 
         read_camera(rigfiles / name)
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("% Intrinsic Camera Parameters\nfc = [ 657.3 ; 657.7 ];\n", "a MATLAB file"),
+        (' Intrinsic of "Depth" / 640x480 / {Z16}\n  PPX: 320\n', "rs-enumerate-devices"),
+    ],
+)
+def test_texts_without_fields_are_named(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "camera.txt"
+    path.write_text(text)
+    with pytest.raises(FileError, match=said):
+        read_camera(path)
+
+
+def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
+    path = tmp_path / "pose.txt"
+    path.touch()
+    with pytest.raises(FileError, match="the file is empty"):
+        read_pose(path)
+
+
 def test_poses_by_other_programs(rigfiles: Path) -> None:
     assert has_pose(rigfiles / "stereo_extrinsics.yml")
     T = read_pose(rigfiles / "stereo_extrinsics.yml")
@@ -136,6 +157,9 @@ SIZE = {"image_width": 640, "image_height": 480}
          FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.0, 0.0, 0.4))),
         (SIZE | {"K": K, "D": T265, "distortion_model": "equidistant", "P1": [[1.0] * 4] * 3},
          FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, T265)),
+        ({"camera_model": "OPENCV", "fl_x": 500, "fl_y": 501, "cx": 320, "cy": 240, "w": 640,
+          "h": 480, "k1": 0.1, "k2": 0.2, "p1": 0, "p2": 0, "H": [[1, 0, 0]] * 3},
+         Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
         ({"resolution": [640, 480], "camera_model": "pinhole", "distortion_model": "equidistant",
           "distortion_coeffs": T265, "intrinsics": [500, 501, 320, 240]},
          FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, T265)),
