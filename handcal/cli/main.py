@@ -128,7 +128,7 @@ _RIG: Mapping[str, Entry] = {
 
 _SESSION: Mapping[str, Entry] = {
     "check": Entry(
-        "Check every part of a session; exit code 1 if any is damaged, 2 if it is not a session.",
+        "Check all of a session, and solve it; exit code 1 if any is bad, 2 if it is none.",
         "sessions",
     ),
     "repair": Entry("Copy the sound parts of a damaged session into a new one.", "sessions"),

@@ -125,7 +125,7 @@ def export(arguments: argparse.Namespace) -> None:
 
 @command(arg("session", type=Path, help="session folder"), json=True)
 def check(arguments: argparse.Namespace) -> None:
-    """Check all of a session, and solve it; exit code 1 if any is bad, 2 if it is not a session."""
+    """Check all of a session, and solve it; exit code 1 if any is bad, 2 if it is none."""
     from handcal.calibration.solve_again import check_solvable
 
     found = check_solvable(arguments.session)
