@@ -65,7 +65,7 @@ class ReviewPage(QWidget):
         self._card = ResultCard()
         self.residuals = ResidualsTab()
         self._export = main_button("reviewExport", tr("E&xport…"))
-        self._openxr = button("reviewOpenxr", tr("&OpenXR…"))
+        self._openxr = button("reviewOpenxr", tr("&Use in XR"))
         self._openxr.setToolTip(tr("Use for every OpenXR program on this computer"))
         self._resume = button("reviewResume", tr("&Resume"))
         self._resume.setToolTip(RESUME_HELP)
@@ -76,7 +76,7 @@ class ReviewPage(QWidget):
                 "this result and first verifies each eye"
             )
         )
-        close = button("reviewClose", tr("&Close"))
+        close = button("reviewClose", tr("Clo&se"))
         self._export.clicked.connect(self.export_requested)
         self._openxr.clicked.connect(self.openxr_requested)
         self._resume.clicked.connect(self.resume_requested)

@@ -930,6 +930,10 @@ local network can read them.</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
+        <source>&amp;Use in XR</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Use for every OpenXR program on this computer</source>
         <translation type="unfinished"></translation>
     </message>
@@ -939,6 +943,10 @@ local network can read them.</source>
     </message>
     <message>
         <source>For the same wearer again, or after the headset has slipped: starts from this result and first verifies each eye</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Clo&amp;se</source>
         <translation type="unfinished"></translation>
     </message>
     <message>
@@ -979,10 +987,6 @@ local network can read them.</source>
     </message>
     <message>
         <source>trial</source>
-        <translation type="unfinished"></translation>
-    </message>
-    <message>
-        <source>&amp;OpenXR…</source>
         <translation type="unfinished"></translation>
     </message>
     <message>

@@ -230,9 +230,9 @@ def _repeats(fit: Adjusted, sightings: Sequence[Sighting], count: int) -> bool:
     np.add.at(information, of, J.swapaxes(1, 2) @ J)
     np.add.at(gradient, of, J.swapaxes(1, 2) @ off[:, :, None])
     often = np.bincount(of, minlength=count) > 2
-    explained = float(
-        np.sum(gradient[often] * np.linalg.solve(information[often], gradient[often]))
-    )
+    # From views that are all alike a corner's depth is not known.
+    inverse = np.linalg.pinv(information[often], rcond=1e-12, hermitian=True)
+    explained = float(np.sum(gradient[often] * (inverse @ gradient[often])))
     freedom = 3 * int(often.sum())
     rest = off.size - freedom - 6 * len(fit.blocks)
     if rest <= 0 or not freedom:

@@ -185,7 +185,7 @@ def test_each_letter_of_a_stored_session_leads_to_one_place(
     assert len(around) == 5
     for shown in of_docks(qtbot, program):
         found = [*"fevh", *around, *shown]
-        assert len(set(found)) == len(found), found
+        assert len(set(found)) == len(found), "".join(found)
 
 
 def test_every_button_of_a_panel_has_a_letter_or_names_its_key(
