@@ -309,9 +309,8 @@ class Calibration:
         self._ask_to_look_around()
         contradiction = observation.contradiction
         if self.state is State.ALIGN and contradiction and contradiction.name == "clock-step":
-            self._show_hand_again()  # the cursor may have been placed by a pose of another time
-            self._withdrawn_for = "The headset's clock was set. Raise your hand again."
-            self._link.send_prompt(self._withdrawn_for, self.eyes)
+            # The cursor may have been placed by a pose of another time.
+            self._withdraw_cursor("The headset's clock was set. Raise your hand again.")
         if self._aligning is not None and self.state is State.ALIGN:
             observation = self._guide(observation, self._aligning)
             with suppress(FileError):
@@ -817,9 +816,9 @@ class Calibration:
     def _refuse(self, refused: Refused, aligning: Aligning) -> None:
         aligning.refusal, aligning.refused_for = refused.prompt, refused.was
         if refused.reason == OUT_OF_VIEW:
-            self._show_hand_again()
-            self._withdrawn_for = refused.prompt
-        self._link.send_prompt(refused.prompt, self.eyes)
+            self._withdraw_cursor(refused.prompt)
+        else:
+            self._link.send_prompt(refused.prompt, self.eyes)
         self._session.record(
             "refused",
             reason=refused.reason,
@@ -885,6 +884,12 @@ class Calibration:
         self.results = None
         if self.state is not State.APPLIED:
             self._show_hand_again()
+
+    def _withdraw_cursor(self, prompt: str) -> None:
+        """Discard a cursor that cannot be aligned, and say why another is needed."""
+        self._show_hand_again()
+        self._withdrawn_for = prompt
+        self._link.send_prompt(prompt, self.eyes)
 
     def _show_hand_again(self) -> None:
         self._clear_cursor()

@@ -79,7 +79,7 @@ class ClockEstimator:
             self._samples.clear()
             self.fit = None
         self._samples.append(sample)
-        self.checked_host_ns = sent_host_ns
+        self.checked_host_ns = max(self.checked_host_ns, sent_host_ns)
         if len(self._samples) >= MIN_SAMPLES:
             self.fit = _fit(self._samples)
         return step_ns
