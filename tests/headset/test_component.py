@@ -51,9 +51,8 @@ def player(compiled: Callable[..., Path]) -> Path:
 @pytest.fixture(scope="session")
 def library(player: Path) -> None:
     """Build the library of the native views, and a runtime, where the player finds them."""
-    needed = Path("/usr/include/openxr/openxr.h"), ROOT / "resources/openxr/views.c"
-    if shutil.which("gcc") is None or not all(path.exists() for path in needed):
-        pytest.skip("needs gcc, libopenxr-dev and the views of the layer for OpenXR")
+    if shutil.which("gcc") is None or not Path("/usr/include/openxr/openxr.h").exists():
+        pytest.skip("needs gcc and libopenxr-dev")
     for name, sources in (
         ("handcal_openxr", ("views.c", "unity.c")),
         ("unity_runtime", ("test/unity_runtime.c",)),
