@@ -71,8 +71,8 @@ class SlicerOutput:
             self._listening = socket.create_server((host, port), backlog=_MAX_CLIENTS)
         except OSError as error:
             raise LinkError(
-                f"OpenIGTLink cannot listen on {host}:{port}: {error.strerror or error}; "
-                "choose another port"
+                f"OpenIGTLink cannot listen on {host}:{port}: {error.strerror or error}",
+                "choose another port",
             ) from error
         self._listening.setblocking(False)
         self.address: tuple[str, int] = self._listening.getsockname()[:2]

@@ -199,7 +199,7 @@ class Aligning:
                 OUT_OF_VIEW,
             )
         except (HandError, PoseError) as error:
-            was = str(error).partition("; ")[0] if isinstance(error, HandError) else ""
+            was = error.what if isinstance(error, HandError) else ""
             return Refused(f"{error}. Align and confirm again.", "no hand", was=was)
         if refused := self._refuse(hand, rotation_W, shape):
             return refused

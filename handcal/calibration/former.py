@@ -45,10 +45,10 @@ def read_former(path: Path, rig: Rig) -> Former:
     """
     record = Session.open(path)
     if rig_numbers(record.rig) != rig_numbers(rig):
-        raise FileError(f"{path} was calibrated with another rig; start without it")
+        raise FileError(f"{path} was calibrated with another rig", "start without it")
     results = solve_again(record, stored_solve_settings(record))
     if results is None:
-        raise FileError(f"{path} has no alignment; start without it")
+        raise FileError(f"{path} has no alignment", "start without it")
     faulty = [one for one in results.verdicts.values() if one.name in _FAULTY]
     if faulty:
         raise FileError(f"{path} is not a calibration to start from: {faulty[0].reason}")

@@ -349,8 +349,9 @@ class Calibration:
             raise ProcedureError("hold the hand still in view of the camera, then try again")
         if self._sight.delay.is_needed:
             raise ProcedureError(
-                "the delay of the camera's pictures is not known yet; let the wearer look slowly "
-                "to the left and to the right, in front of a background with texture"
+                "the delay of the camera's pictures is not known yet",
+                "let the wearer look slowly "
+                "to the left and to the right, in front of a background with texture",
             )
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
@@ -360,8 +361,8 @@ class Calibration:
             # The cursor might be drawn with other projections than the solver assumes.
             self._link.send_again()
             raise ProcedureError(
-                "the headset has not acknowledged its projections yet; wait a moment, "
-                "or restart its app"
+                "the headset has not acknowledged its projections yet",
+                "wait a moment, or restart its app",
             )
         if hand is not self.raised:
             hand = merge_hold(self._sight.hands.held_at(hand), hand)
@@ -393,11 +394,12 @@ class Calibration:
             raise ProcedureError("hold the hand under the cursor, in view of the camera")
         cursor = self._sent_cursor
         if not self.is_applied or cursor is None or cursor.state is not Delivery.ACKED:
-            raise ProcedureError("the headset has not received the cursor and projections; wait")
+            raise ProcedureError("the headset has not received the cursor and projections", "wait")
         if self.evidence.is_drawn_otherwise:
             # Only the headset's own confirmation says what it draws.
             raise ProcedureError(
-                "the headset drew something else; let the wearer confirm, or restart its app"
+                "the headset drew something else",
+                "let the wearer confirm, or restart its app",
             )
         self._aligning.confirmation = Confirmation(hand.t_host_ns, hand.t_host_ns, self._cursor_id)
 
@@ -583,7 +585,7 @@ class Calibration:
             raise ProcedureError("hold the hand up in view of the camera, then verify")
         if not self.is_applied:
             self._link.send_again()
-            raise ProcedureError("the headset has not acknowledged its projections yet; wait")
+            raise ProcedureError("the headset has not acknowledged its projections yet", "wait")
         if self.verifying is not None:
             self._end_verifying(self.verifying.before_m)
         self.unmoved.discard(eye)
@@ -635,7 +637,7 @@ class Calibration:
         if hand is None:
             raise ProcedureError("the hand must be still and in view of the camera")
         if not self.is_applied:
-            raise ProcedureError("the headset has not received the projection yet; wait")
+            raise ProcedureError("the headset has not received the projection yet", "wait")
         if verifying.needs_proof:
             self._set_aside(verifying)
         else:

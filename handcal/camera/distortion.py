@@ -37,7 +37,8 @@ def opencv_distortion(camera: Any) -> tuple[float, ...]:
     if error_px > _LARGEST_ERROR_PX:
         raise CameraError(
             f"this camera's lens model, {camera.model.name}, is unknown to OpenCV: "
-            f"the best fit is {error_px:.1f} px off; choose another camera"
+            f"the best fit is {error_px:.1f} px off",
+            "choose another camera",
         )
     return coefficients
 

@@ -172,7 +172,7 @@ def record_folder(
     first, frames = of_one_camera(frames)
     make_folder(folder)
     if any(folder.iterdir()):
-        raise FileError(f"{folder} is not empty; choose a new folder")
+        raise FileError(f"{folder} is not empty", "choose a new folder")
     write_json(
         folder / DESCRIPTION,
         {
@@ -255,7 +255,8 @@ def _read_list(path: Path) -> list[_Listed]:
             frames.append(_listed(*fields))
         except ValueError as error:
             raise FileError(
-                f"{path} must hold {what} on each line; line {number} does not"
+                f"{path} must hold {what} on each line",
+                f"line {number} does not",
             ) from error
     return frames
 

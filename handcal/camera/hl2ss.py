@@ -148,8 +148,8 @@ class Hl2ssConnection(Closable):
             self._socket.sendall(request)
         except (OSError, UnicodeError) as error:
             raise CameraError(
-                f"no hl2ss answers at {self._where} ({error}); start it on the HoloLens, and check "
-                "address and network"
+                f"no hl2ss answers at {self._where} ({error})",
+                "start it on the HoloLens, and check address and network",
             ) from error
 
     def receive(self, size: int, timeout_s: float) -> bytes:
@@ -204,7 +204,8 @@ class Hl2ssConnection(Closable):
                 raise CameraError(f"the connection to hl2ss at {self._where} broke") from error
             if not arrived:
                 raise CameraError(
-                    f"hl2ss at {self._where} ended the stream; one program at a time can read it"
+                    f"hl2ss at {self._where} ended the stream",
+                    "one program at a time can read it",
                 )
             self._data += arrived
 
@@ -299,6 +300,6 @@ def _pair(stream: Stream, values: NDArray[np.uint16]) -> tuple[UInt16, UInt16]:
 def foreign(stream: Stream, found: str) -> CameraError:
     """Return the error for data that are not those of a stream."""
     return CameraError(
-        f"this is not the {stream.name} stream of a known hl2ss: {found}; install hl2ss of May "
-        "2025 or newer on the HoloLens"
+        f"this is not the {stream.name} stream of a known hl2ss: {found}",
+        "install hl2ss of May 2025 or newer on the HoloLens",
     )

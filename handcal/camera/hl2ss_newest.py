@@ -43,14 +43,15 @@ class NewestPackets(Closable):
                 lambda: self._packet or self._error or self._is_closed, timeout_s
             )
             if self._is_closed:
-                raise CameraError(f"{name} is closed; open it again")
+                raise CameraError(f"{name} is closed", "open it again")
             if self._packet is not None:
                 packet, self._packet = self._packet, None
                 return packet
             if self._error is not None:
                 raise self._error
         raise CameraTimeoutError(
-            f"{name} sent no image for {timeout_s:g} s; put the headset on, and keep hl2ss running"
+            f"{name} sent no image for {timeout_s:g} s",
+            "put the headset on, and keep hl2ss running",
         )
 
     def recent(self) -> list[bytes]:

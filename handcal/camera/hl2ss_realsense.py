@@ -139,19 +139,20 @@ def find_depth(listed: bytes, lens: Intrinsics) -> DepthFormat:
         ]
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise CameraError(
-            "hl2ss sent no list of cameras; install hl2ss of May 2025 or newer on the HoloLens"
+            "hl2ss sent no list of cameras",
+            "install hl2ss of May 2025 or newer on the HoloLens",
         ) from error
     size = f"{lens.width}x{lens.height}"
     if not depth:
         names = ", ".join(name for name, _, _ in cameras[:_MOST_NAMED]) or "none"
         raise CameraError(
-            f"no depth camera of a RealSense is on the HoloLens's USB port (found: {names}); plug "
-            "one in, with a powered hub if it fails to start"
+            f"no depth camera of a RealSense is on the HoloLens's USB port (found: {names})",
+            "plug one in, with a powered hub if it fails to start",
         )
     if not formats:
         raise CameraError(
-            f"{depth[0][0]} has no depth images of {size} at 15 Hz or more; use a rig file made "
-            "with a size that it has"
+            f"{depth[0][0]} has no depth images of {size} at 15 Hz or more",
+            "use a rig file made with a size that it has",
         )
     found = min(formats)[1]
     if _OTHER_UNIT in found.camera:

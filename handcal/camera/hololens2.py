@@ -113,7 +113,8 @@ class HoloLens2Camera(Closable):
         packet = parse_packet(self._stream, data)
         if packet.T_W_H is None:
             raise CameraTimeoutError(
-                f"{self.name} does not know where it is; look around in a lit room"
+                f"{self.name} does not know where it is",
+                "look around in a lit room",
             )
         distance_m: Float32 = packet.distance.astype(np.float32)
         distance_m /= np.float32(self._calibration.units_per_m)
@@ -168,7 +169,7 @@ def _with_picture(frame: Frame, packets: list[bytes], name: str) -> Frame:
     picture = parse_color(nearest)
     assert frame.T_W_D is not None
     if picture is None:
-        raise CameraTimeoutError(f"{name} does not know where it is; look around in a lit room")
+        raise CameraTimeoutError(f"{name} does not know where it is", "look around in a lit room")
     return replace(
         frame,
         color=picture.image,

@@ -76,8 +76,8 @@ def read_frame(
         values["depth_scale"] = depth_scale_m
     if "depth_scale" not in values:
         raise FileError(
-            f"{intrinsics} must give depth_scale, in metres per unit of depth; or use "
-            "--depth-scale: 0.001 for millimetres"
+            f"{intrinsics} must give depth_scale, in metres per unit of depth",
+            "or use --depth-scale: 0.001 for millimetres",
         )
     depth_scale_m = depth_scale_from(values, intrinsics)
     depth_image = read_depth(depth, camera)
@@ -158,8 +158,8 @@ def depth_scale_from(values: dict[str, Any], path: Path) -> float:
     scale = values.get("depth_scale")
     if isinstance(scale, int | float) and 1.0 / DEPTH_SCALES_M[1] <= scale <= 1e6:
         raise FileError(
-            f"{path}: depth_scale is {scale:g}, but must be in metres per unit; "
-            f"enter {1.0 / scale:g} if a metre is {scale:g} units"
+            f"{path}: depth_scale is {scale:g}, but must be in metres per unit",
+            f"enter {1.0 / scale:g} if a metre is {scale:g} units",
         )
     return number_from(values, path, "depth_scale", *DEPTH_SCALES_M)
 

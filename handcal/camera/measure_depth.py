@@ -114,7 +114,7 @@ def run_depth_check(
         if not passed_over:
             raise
         why, count = passed_over.most_common(1)[0]
-        raise ViewsError(f"{error}; {count} frames were not used: {why}") from error
+        raise ViewsError(f"{error}", f"{count} frames were not used: {why}") from error
 
 
 def _seen_in(frame: Frame, board: Board, selector: ViewSelector) -> BoardView:

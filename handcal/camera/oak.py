@@ -55,7 +55,7 @@ class OakCamera(Closable):
         ]
         if not found:
             which = f"OAK-D {device_id} is" if device_id else "OAK-D is"
-            raise CameraError(f"no {which} connected; plug one into a USB 3 port")
+            raise CameraError(f"no {which} connected", "plug one into a USB 3 port")
         try:
             self._device = dai.Device(found[0])
             self.identity = CameraIdentity(
@@ -71,8 +71,8 @@ class OakCamera(Closable):
         except (RuntimeError, CameraTimeoutError) as error:
             self.close()
             raise CameraError(
-                f"the OAK-D does not start: {error}; close other programs that use it, or plug it "
-                "in again"
+                f"the OAK-D does not start: {error}",
+                "close other programs that use it, or plug it in again",
             ) from error
         lens = np.asarray(first["color"].getTransformation().getIntrinsicMatrix(), np.float64)
         width, height = _COLOR_PX
@@ -83,11 +83,11 @@ class OakCamera(Closable):
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Return the next frame; see `Camera.read`."""
         if self._pipeline is None:
-            raise CameraError(f"{self.name} is closed; open it again")
+            raise CameraError(f"{self.name} is closed", "open it again")
         try:
             pair = self._wait(timeout_s)
         except RuntimeError as error:
-            raise CameraError(f"{self.name} was unplugged: {error}; plug it in again") from error
+            raise CameraError(f"{self.name} was unplugged: {error}", "plug it in again") from error
         depth, color = pair["depth"], pair["color"]
         camera = self.depth_intrinsics
         units = np.asarray(depth.getFrame(), np.uint16)

@@ -52,7 +52,7 @@ class OrbbecCamera(Closable):
         sdk.Context.set_logger_level(sdk.OBLogLevel.NONE)
         devices = sdk.Context().query_devices()
         if not devices.get_count():
-            raise CameraError("no Orbbec camera is connected; plug one into a USB 3 port")
+            raise CameraError("no Orbbec camera is connected", "plug one into a USB 3 port")
         try:
             device = (
                 devices.get_device_by_serial_number(serial)
@@ -81,15 +81,15 @@ class OrbbecCamera(Closable):
         except self._error as error:
             which = f"the Orbbec camera {serial}".rstrip()
             raise CameraError(
-                f"{which} does not start: {error}; close other programs that use it, check its "
-                "serial number, or plug it in again"
+                f"{which} does not start: {error}",
+                "close other programs that use it, check its serial number, or plug it in again",
             ) from error
         self._pipeline = pipeline
 
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Return the next frame with depth; see `Camera.read`."""
         if self._pipeline is None:
-            raise CameraError(f"{self.name} is closed; open it again")
+            raise CameraError(f"{self.name} is closed", "open it again")
         deadline_s = time.monotonic() + timeout_s
         depth = None
         while depth is None:
@@ -99,7 +99,7 @@ class OrbbecCamera(Closable):
             try:
                 frames = self._pipeline.wait_for_frames(max(1, round(1e3 * left_s)))
             except self._error as error:
-                raise CameraError(f"{self.name} failed: {error}; plug it in again") from error
+                raise CameraError(f"{self.name} failed: {error}", "plug it in again") from error
             depth = None if frames is None else frames.get_depth_frame()
         color = frames.get_color_frame()
         t_us = depth.get_timestamp_us()

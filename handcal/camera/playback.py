@@ -49,7 +49,7 @@ class PlayedCamera(Closable):
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Return the next frame; see `Camera.read`."""
         if not self._is_open:
-            raise CameraError(f"{self.name} is closed; open it again")
+            raise CameraError(f"{self.name} is closed", "open it again")
         deadline_s = time.monotonic() + timeout_s
         frame = self._take(timeout_s)
         if self._settings.real_time:
@@ -69,7 +69,7 @@ class PlayedCamera(Closable):
         Beyond the end there is no next frame.
         """
         if not self._is_open:
-            raise CameraError(f"{self.name} is closed; open it again")
+            raise CameraError(f"{self.name} is closed", "open it again")
         if self._begin_ns is None:
             self._take(1.0)
         assert self._begin_ns is not None

@@ -57,7 +57,10 @@ class PinholeView:
         missed = wanted - _look(rays, place)
         self._is_inside = (np.abs(missed) < _SAME_RAY).all(axis=2)
         if self._is_inside.mean() < _LEAST_COVERED:
-            raise CameraError("the camera's rays do not fill an image; its calibration is damaged")
+            raise CameraError(
+                "the camera's rays do not fill an image",
+                "its calibration is damaged",
+            )
         self._place = place
         self._corner = np.floor(place)
         self._z_per_m = 1.0 / np.sqrt(1.0 + np.square(wanted).sum(axis=2))
@@ -125,7 +128,10 @@ def _pinhole(rays: Float32) -> Intrinsics:
         slopes[1] = (rays[row + 8, column, 1] - rays[row - 8, column, 1]) / 16.0
     low, high = _FOCAL_PX
     if not ((slopes > 1.0 / high) & (slopes < 1.0 / low)).all():
-        raise CameraError("the camera's rays are not those of a lens; its calibration is damaged")
+        raise CameraError(
+            "the camera's rays are not those of a lens",
+            "its calibration is damaged",
+        )
     fx, fy = 1.0 / slopes
     x, y = rays[row, column]
     return Intrinsics(

@@ -77,8 +77,8 @@ class RealSenseCamera(Closable):
         except RuntimeError as error:
             self.close()
             raise CameraError(
-                f"{self._device.name} does not start: {error}; "
-                "close other programs that use it, or plug it in again"
+                f"{self._device.name} does not start: {error}",
+                "close other programs that use it, or plug it in again",
             ) from error
         size = f"{self.depth_intrinsics.width}x{self.depth_intrinsics.height}"
         slow = f", only USB {self._device.usb}" if self._device.is_slow else ""
@@ -87,7 +87,7 @@ class RealSenseCamera(Closable):
     def read(self, timeout_s: float = 1.0) -> Frame:
         """Return the next frame with depth; see `Camera.read`."""
         if not self._sensors:
-            raise CameraError(f"{self.name} is closed; open it again")
+            raise CameraError(f"{self.name} is closed", "open it again")
         depth, color = self._wait(timeout_s)
         frame = frame_of(self._filter(depth), self.depth_intrinsics)
         if not color or apart_ms(color, depth) > 1e3 / _RATE_HZ:
@@ -129,11 +129,11 @@ class RealSenseCamera(Closable):
             try:
                 arrived, frames = self._syncer.try_wait_for_frames(max(1, round(1e3 * left_s)))
             except RuntimeError as error:
-                raise CameraError(f"{self.name} failed: {error}; plug it in again") from error
+                raise CameraError(f"{self.name} failed: {error}", "plug it in again") from error
             if arrived and (depth := frames.get_depth_frame()):
                 return depth, frames.get_color_frame()
         if self._device.serial not in [device.serial for device in connected_devices()]:
-            raise CameraError(f"{self.name} was unplugged; plug it in again")
+            raise CameraError(f"{self.name} was unplugged", "plug it in again")
         raise CameraTimeoutError(f"{self.name}: no frame for {timeout_s:g} s")
 
 
@@ -159,8 +159,8 @@ def _choose_streams(handle: Any, device: Device, wanted: Profile) -> tuple[_Stre
     if device.is_slow:
         advice = f"it is on USB {device.usb}: use a USB 3 port and cable"
     raise CameraError(
-        f"{device.name} offers no depth with colour of {' or '.join(sizes)} at {_RATE_HZ} Hz; "
-        f"{advice}"
+        f"{device.name} offers no depth with colour of {' or '.join(sizes)} at {_RATE_HZ} Hz",
+        f"{advice}",
     )
 
 

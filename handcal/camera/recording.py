@@ -42,8 +42,9 @@ def check_recording(path: Path) -> None:
         raise CameraError(f"cannot read {path}: {error.strerror or error}") from error
     if not begin.startswith(_BEGINNINGS):
         raise CameraError(
-            f"{path} is not a recording; choose a .db3 or .bag file of a RealSense or of ROS, or "
-            "a folder by handcal, ROS 2, Open3D or TUM RGB-D"
+            f"{path} is not a recording",
+            "choose a .db3 or .bag file of a RealSense or of ROS, or "
+            "a folder by handcal, ROS 2, Open3D or TUM RGB-D",
         )
 
 
@@ -139,8 +140,8 @@ def _require_known_options(rs: Any, path: Path) -> None:
     recorded = {name for (topic,) in topics for name in _OPTION.findall(str(topic))}
     if unknown := sorted(recorded - known):
         raise CameraError(
-            f"it has the option {unknown[0][:40]!r}, which this pyrealsense2 does not know; "
-            "install the version with which it was recorded"
+            f"it has the option {unknown[0][:40]!r}, which this pyrealsense2 does not know",
+            "install the version with which it was recorded",
         )
 
 

@@ -150,7 +150,8 @@ class RosCamera(PlayedCamera):
             found = "; ".join(self._ignored(kinds, firsts)) or "it has no images"
             raise CameraError(
                 f"{self._folder} has no depth images (16UC1 or 32FC1, or of these compressedDepth "
-                f"with PNG): {found}; record the camera's depth topic"
+                f"with PNG): {found}",
+                "record the camera's depth topic",
             )
         raw_first = set(self._topics(_COMPRESSED))
         self._depth_topic = min(
@@ -214,7 +215,10 @@ class RosCamera(PlayedCamera):
         info_topic = self._info_topic(topic)
         info = None if info_topic is None else self._first(info_topic)
         if info is None:
-            raise CameraError(f"{self._folder} has no camera_info for {topic}; record it as well")
+            raise CameraError(
+                f"{self._folder} has no camera_info for {topic}",
+                "record it as well",
+            )
         k, d = (info.k, info.d) if hasattr(info, "k") else (info.K, info.D)  # ROS 1
         fx, skew, cx, _, fy, cy, *_ = (float(one) for one in k)
         values = np.array([fx, fy, cx, cy, *d])
@@ -225,8 +229,8 @@ class RosCamera(PlayedCamera):
         distortion = tuple(float(one) for one in d) if np.any(d) else ()
         if info.distortion_model not in _MODELS or len(distortion) not in DISTORTION_COUNTS:
             raise CameraError(
-                f"{self._folder}: lens model {info.distortion_model!r} of {topic} is not known; "
-                "record rectified images"
+                f"{self._folder}: lens model {info.distortion_model!r} of {topic} is not known",
+                "record rectified images",
             )
         return Intrinsics(info.width, info.height, fx, fy, cx, cy, distortion)
 
@@ -243,7 +247,8 @@ class RosCamera(PlayedCamera):
                 if not np.isfinite(values).all() or not np.any(values[:4]):
                     raise CameraError(
                         f"{self._folder}: the transform between {parent!r} and {child!r} is not "
-                        "made of finite numbers; record /tf_static again"
+                        "made of finite numbers",
+                        "record /tf_static again",
                     )
                 T_parent_child = rigid(Rotation.from_quat(values[:4]).as_matrix(), values[4:])
                 near.setdefault(child, {}).setdefault(parent, T_parent_child)
@@ -258,7 +263,8 @@ class RosCamera(PlayedCamera):
         if dst not in found or not is_rigid(found[dst], _REACH_M):
             raise CameraError(
                 f"{self._folder} has no transform between {src!r} and {dst!r}, the frames of depth "
-                "and colour; record /tf_static as well"
+                "and colour",
+                "record /tf_static as well",
             )
         return found[dst]
 

@@ -84,8 +84,9 @@ def sdk_devices() -> list[Any]:
         return _query()
     except RuntimeError as error:
         raise CameraError(
-            f"the RealSense SDK cannot list devices: {error}; plug the camera into a USB 3 port "
-            "of the computer itself, as hubs may give too little power"
+            f"the RealSense SDK cannot list devices: {error}",
+            "plug the camera into a USB 3 port "
+            "of the computer itself, as hubs may give too little power",
         ) from error
 
 
@@ -190,7 +191,7 @@ def choose_device(devices: Sequence[Device], serial: str = "") -> Device:
         if serial in ("", device.serial):
             return device
     there = ", ".join(f"{device.name} {device.serial}" for device in devices)
-    raise CameraError(f"the RealSense with serial {serial} is not connected; there is {there}")
+    raise CameraError(f"the RealSense with serial {serial} is not connected", f"there is {there}")
 
 
 def _line(text: str) -> str:

@@ -140,7 +140,7 @@ def depth_filter(settings: RealSenseSettings) -> Callable[[Any], Any]:
 
 def _set(sensor: Any, option: Any, value: float, what: str, unit: str = "") -> None:
     if not sensor.supports(option):
-        raise CameraError(f"this camera has no {what} to set; leave it as it is")
+        raise CameraError(f"this camera has no {what} to set", "leave it as it is")
     limits = sensor.get_option_range(option)
     if not limits.min <= value <= limits.max:
         raise CameraError(

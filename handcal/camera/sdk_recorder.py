@@ -141,7 +141,8 @@ def _wait_for_disk(path: Path, written: int) -> None:
     while written - path.stat().st_size > _BACKLOG_BYTES:
         if time.monotonic() > deadline_s:
             raise CameraError(
-                f"{path.parent} accepts no more data; check that the disk is not full"
+                f"{path.parent} accepts no more data",
+                "check that the disk is not full",
             )
         time.sleep(0.001)
 

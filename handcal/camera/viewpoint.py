@@ -106,7 +106,7 @@ class _Images(ViewpointCamera):
 
     def read(self) -> tuple[UInt8, int]:
         if self._remaining is None:
-            raise CameraError(f"{self.name}: this camera is closed; open it again")
+            raise CameraError(f"{self.name}: this camera is closed", "open it again")
         if time.monotonic() < self._until_s:  # again, in the pace of a camera
             time.sleep(_PERIOD_S)
             return self._shown, time.monotonic_ns()
@@ -139,7 +139,7 @@ class _Capture(ViewpointCamera):
 
     def _read(self) -> UInt8 | None:
         if not self._capture.isOpened():
-            raise CameraError(f"{self.name}: this camera is closed; open it again")
+            raise CameraError(f"{self.name}: this camera is closed", "open it again")
         is_read, image = self._capture.read()
         return np.ascontiguousarray(image[..., ::-1], np.uint8) if is_read else None
 
@@ -147,11 +147,17 @@ class _Capture(ViewpointCamera):
 class _Device(_Capture):
     def __init__(self, number: int, size_px: tuple[int, int] | None) -> None:
         if not _is_listed(number):
-            raise CameraError(f"there is no camera {number}; plug it in or choose another number")
+            raise CameraError(
+                f"there is no camera {number}",
+                "plug it in or choose another number",
+            )
         capture = cv2.VideoCapture(number, _BACKENDS.get(sys.platform, cv2.CAP_ANY))
         super().__init__(f"Camera {number}", capture)
         if not capture.isOpened():
-            raise CameraError(f"camera {number} cannot be opened; close other programs that use it")
+            raise CameraError(
+                f"camera {number} cannot be opened",
+                "close other programs that use it",
+            )
         if size_px is not None:
             capture.set(cv2.CAP_PROP_FRAME_WIDTH, size_px[0])
             capture.set(cv2.CAP_PROP_FRAME_HEIGHT, size_px[1])
@@ -160,7 +166,7 @@ class _Device(_Capture):
     def read(self) -> tuple[UInt8, int]:
         image = self._read()
         if image is None:
-            raise CameraError(f"{self.name} delivers no image; plug it in again")
+            raise CameraError(f"{self.name} delivers no image", "plug it in again")
         return image, time.monotonic_ns()
 
 

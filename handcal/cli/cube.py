@@ -128,7 +128,7 @@ def capture(arguments: argparse.Namespace) -> None:
         try:
             console.input(f"{escape(what)}, then press Enter ")
         except EOFError:
-            raise HandcalError("no answer; repeat the command to take what is missing") from None
+            raise HandcalError("no answer", "repeat the command to take what is missing") from None
 
     try:
         plan = CapturePlan(
@@ -246,5 +246,5 @@ def _only_camera() -> int:
     cameras = list_viewpoints()
     if len(cameras) != 1:
         there = f"cameras {', '.join(map(str, cameras))} are there" if cameras else "there is none"
-        raise CameraError(f"say which camera: --camera N; {there}")
+        raise CameraError("say which camera: --camera N", f"{there}")
     return cameras[0]

@@ -78,7 +78,7 @@ def display_check(arguments: argparse.Namespace) -> None:
     write_rig(arguments.output, replace(rig, display_check=made))
     console.print(str(arguments.output), markup=False)
     if not finding.is_fine:
-        raise HandcalError("the headset does not draw what it is sent; see above")
+        raise HandcalError("the headset does not draw what it is sent", "see above")
 
 
 @contextmanager
@@ -108,7 +108,7 @@ def network_server(arguments: argparse.Namespace) -> Iterator[HeadsetServer]:
 
     pairings = paired_headsets(arguments.keys)
     if not pairings.all:
-        raise HandcalError("no headset is paired; pair one with handcal pair")
+        raise HandcalError("no headset is paired", "pair one with handcal pair")
     with HeadsetServer(pairings, (arguments.host, arguments.port)) as server:
         console.print("Waiting for the headset")
         server.wait_connected(arguments.patience_s)

@@ -154,7 +154,7 @@ def take(arguments: argparse.Namespace) -> None:
     for why, count in taken.passed_over.items():
         console.print(f"{count} of {taken.looked_at} moments skipped: {why}")
     if not taken.kept:
-        raise HandcalError("no image was kept; see the reasons above")
+        raise HandcalError("no image was kept", "see the reasons above")
     console.print(f"{taken.kept} kept in {' and '.join(map(str, folders))}", markup=False)
 
 
@@ -232,7 +232,8 @@ def stereo(arguments: argparse.Namespace) -> None:
 
     if arguments.format == "ros":
         raise HandcalError(
-            "ROS camera_info has no pose between cameras; use --format opencv or json"
+            "ROS camera_info has no pose between cameras",
+            "use --format opencv or json",
         )
     board = board_of(arguments)
     pairs = pair_views(

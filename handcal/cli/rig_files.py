@@ -170,7 +170,7 @@ def check(arguments: argparse.Namespace) -> None:
     save(arguments.json, {"findings": [asdict(one) for one in findings]})
     doubtful = sum(not one.is_fine for one in findings)
     if doubtful:
-        raise HandcalError(f"{doubtful} of {len(findings)} findings are doubtful; see above")
+        raise HandcalError(f"{doubtful} of {len(findings)} findings are doubtful", "see above")
 
 
 @command(

@@ -194,4 +194,4 @@ def paired_headsets(path: Path | None) -> Pairings:
     try:
         return Pairings((Pairing(key),))
     except ValueError as error:
-        raise LinkError(f"{error}; see {KEY_VARIABLE}") from error
+        raise LinkError(f"{error}", f"see {KEY_VARIABLE}") from error

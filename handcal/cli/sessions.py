@@ -202,10 +202,14 @@ def prior(arguments: argparse.Namespace) -> None:
     from handcal.rig.rig_file import read_rig
 
     if not arguments.folder.is_dir():
-        raise FileError(f"{arguments.folder} is not a folder; choose the one that holds sessions")
+        raise FileError(
+            f"{arguments.folder} is not a folder",
+            "choose the one that holds sessions",
+        )
     if (arguments.folder / "journal.jsonl").exists():
         raise FileError(
-            f"{arguments.folder} is one session; choose the folder above, which holds all sessions"
+            f"{arguments.folder} is one session",
+            "choose the folder above, which holds all sessions",
         )
     settings = PriorSettings()
     with show_progress() as progress:

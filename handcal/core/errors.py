@@ -2,7 +2,23 @@
 
 
 class HandcalError(Exception):
-    """Base class of all user-facing errors; the text is shown unchanged."""
+    """Base class of all user-facing errors.
+
+    Parameters
+    ----------
+    what : str
+        What is wrong.
+    advice : str
+        What to do about it; may be empty. The error's text is both, unchanged.
+    """
+
+    def __init__(self, what: str, advice: str = "") -> None:
+        super().__init__(what, advice)
+        self.what = what
+        self.advice = advice
+
+    def __str__(self) -> str:
+        return f"{self.what}; {self.advice}" if self.advice else self.what
 
 
 class CameraError(HandcalError):
@@ -36,8 +52,8 @@ class FileError(HandcalError):
 class InUseError(FileError):
     """A program, this one if `is_here`, holds a folder or a file."""
 
-    def __init__(self, text: str, *, is_here: bool) -> None:
-        super().__init__(text)
+    def __init__(self, what: str, advice: str = "", *, is_here: bool) -> None:
+        super().__init__(what, advice)
         self.is_here = is_here
 
 

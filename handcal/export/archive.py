@@ -51,7 +51,8 @@ def write_archive(
         if total_bytes > MAX_ARCHIVE_BYTES:
             raise FileError(
                 f"{folder} has {total_bytes:,} bytes, more than the {MAX_ARCHIVE_BYTES:,} "
-                "that fit in one zip file; copy the folder instead"
+                "that fit in one zip file",
+                "copy the folder instead",
             )
         with path.open("xb") as stream:
             done_bytes = 0

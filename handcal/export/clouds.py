@@ -102,7 +102,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
     """
     path = Path(path)
     if path.suffix.lower() not in _FORMATS:
-        raise FileError(f"{path} is not a cloud; its name must end in {', '.join(_FORMATS)}")
+        raise FileError(f"{path} is not a cloud", f"its name must end in {', '.join(_FORMATS)}")
     data = read_limited(path, _MAX_CLOUD_BYTES)
     table = None if path.suffix.lower() == ".xyz" else _require_all_points(path, data)
     try:

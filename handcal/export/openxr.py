@@ -122,7 +122,8 @@ def install_layer() -> Path:
         write_atomic(library, data)
     except FileError as error:
         raise FileError(
-            f"{error}; if OpenXR programs are running, end them and try again"
+            f"{error}",
+            "if OpenXR programs are running, end them and try again",
         ) from error
     manifest = _manifest()
     make_folder(manifest.parent)
@@ -167,7 +168,8 @@ def remove_layer() -> bool:
             path.unlink(missing_ok=True)
         except OSError as error:
             raise FileError(
-                f"cannot remove {path}: {error.strerror}; end all OpenXR programs"
+                f"cannot remove {path}: {error.strerror}",
+                "end all OpenXR programs",
             ) from error
     return was_there
 
@@ -222,7 +224,7 @@ def _in_force() -> InForce | None:
     data = read_json(path)
     expires_s = data.get("expiresUnixS")
     if not isinstance(expires_s, int | float):
-        raise FileError(f"{path} is damaged; put a calibration in force again")
+        raise FileError(f"{path} is damaged", "put a calibration in force again")
     return InForce(
         wearer=_text(data, "wearer"),
         headset=_text(data, "headset") or _text(data, "rig"),
@@ -255,15 +257,15 @@ def _shipped_library() -> Path:
     if library.exists():
         return library
     if (folder.parents[1] / "installer/openxr.sh").exists():
-        raise FileError("the layer has not been built yet; run: bash installer/openxr.sh")
-    raise FileError(f"the shipped file openxr/{_LIBRARY} is missing; install handcal again")
+        raise FileError("the layer has not been built yet", "run: bash installer/openxr.sh")
+    raise FileError(f"the shipped file openxr/{_LIBRARY} is missing", "install handcal again")
 
 
 def _data_folder() -> Path:
     if sys.platform == "win32":
         return configuration_folder()
     if sys.platform == "darwin":
-        raise FileError("there is no OpenXR layer for macOS; use Linux or Windows")
+        raise FileError("there is no OpenXR layer for macOS", "use Linux or Windows")
     return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local/share")
 
 

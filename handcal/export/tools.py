@@ -76,7 +76,7 @@ def openxr_values(outcome: SessionOutcome) -> dict[str, object]:
         try:
             in_view, fov = openxr_view(outcome.projection(eye, outcome.final(eye)))
         except ValueError as error:
-            raise FileError(f"{error} ({eye} eye); export json instead") from error
+            raise FileError(f"{error} ({eye} eye)", "export json instead") from error
         own_fov = None
         if headset and eye in headset.views:
             left, right, up, down = np.arctan(headset.views[eye].tangents)

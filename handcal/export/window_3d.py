@@ -88,12 +88,12 @@ def inspect_session(
     number = list(scenes)[-1] if number is None else number
     if number not in scenes:
         known = ", ".join(map(str, scenes))
-        raise FileError(f"{outcome.record.path} has no alignment {number}; it has {known}")
+        raise FileError(f"{outcome.record.path} has no alignment {number}", f"it has {known}")
     if find_spec("open3d") is None:
         raise HandcalError("Open3D is not installed: pip install 'handcal[3d]'")
     if picture is None:
         if not _has_display():
-            raise HandcalError("no display found for the 3D window; --picture FILE needs none")
+            raise HandcalError("no display found for the 3D window", "--picture FILE needs none")
         _run(_Order(outcome.name, scenes, number, None), progress)
         return
     require_suffix(picture, ".png")
@@ -139,15 +139,16 @@ def _run(order: _Order, progress: Progress) -> None:
         lines = messages.read().decode(errors="replace").split("\n")
     if status == _NO_WINDOW:
         raise HandcalError(
-            "Open3D opened no window: it needs OpenGL 3.3 and a display; "
-            "update the graphics driver, or on Debian install libgl1-mesa-dri"
+            "Open3D opened no window: it needs OpenGL 3.3 and a display",
+            "update the graphics driver, or on Debian install libgl1-mesa-dri",
         )
     if status == 1:
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
         raise HandcalError(f"the 3D window failed: {last}")
     if status:
         raise HandcalError(
-            f"the 3D window crashed (status {status}), perhaps in the graphics driver; update it"
+            f"the 3D window crashed (status {status}), perhaps in the graphics driver",
+            "update it",
         )
 
 

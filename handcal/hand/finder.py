@@ -57,8 +57,8 @@ class HandFinder:
         in_box = np.count_nonzero(hand.mask[y0:y1, x0:x1])
         if in_box < _IN_BOX_MIN * np.count_nonzero(hand.mask):
             raise HandError(
-                "the detector and the depth image disagree about where the hand is; hold it clear "
-                "of other things"
+                "the detector and the depth image disagree about where the hand is",
+                "hold it clear of other things",
             )
         return hand
 

@@ -255,8 +255,8 @@ def _locate_within(
     if found is None:
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
-            f"{settings.depth_max_m:.2f} m; raise the bare hand in front of the camera"
-            f"{_unit_hint(view, settings)}"
+            f"{settings.depth_max_m:.2f} m",
+            f"raise the bare hand in front of the camera{_unit_hint(view, settings)}",
         )
     _check_wrist(found)
     _check_covered(found)
@@ -309,8 +309,8 @@ def _check_wrist(located: LocatedHand) -> None:
     """Raise HandError if it is too uncertain at which end the hand is, and where the wrist."""
     if located.limit_sigma_m == np.inf:
         raise HandError(
-            "the arm points along the camera's line of sight; raise the hand so that its palm or "
-            "its back faces the camera"
+            "the arm points along the camera's line of sight",
+            "raise the hand so that its palm or its back faces the camera",
         )
     seen_m = (EDGE_RADIUS_M, FACING_RADIUS_M)
     if located.limit_sigma_m > np.interp(located.palm_radius_m, seen_m, _LIMIT_SIGMAS_M):
@@ -337,7 +337,8 @@ def _check_covered(located: LocatedHand) -> None:
     other = cv2.morphologyEx(other.view(np.uint8), cv2.MORPH_OPEN, NEIGHBOURS).view(bool)
     if np.count_nonzero(covered(hand, other, view.depth, jump)) > most_px:
         raise HandError(
-            "part of the hand is hidden behind something; hold it clear of other things"
+            "part of the hand is hidden behind something",
+            "hold it clear of other things",
         )
 
 

@@ -71,16 +71,16 @@ def mask_hand(frame: Frame, located: LocatedHand, settings: SegmentSettings) -> 
     within[near_wrist] = along_m <= located.limit_m
     outlined = _outline(within, is_hand, settings.hole_area_m2 / pitch_m**2, PART_M2 / pitch_m**2)
     if outlined is None:
-        raise HandError("the depth image is too sparse where the hand is; check the camera")
+        raise HandError("the depth image is too sparse where the hand is", "check the camera")
     outline, filled = outlined
     surface = within & (filled > 0)
     if _border_contact_px(surface, view) * pitch_m > _BORDER_CONTACT_M:
         if np.count_nonzero(located.arm) * (pitch_m * located.view.step_px) ** 2 > _ARM_AREA_M2:
             raise HandError(
-                "arm and body cannot be told apart in the depth image; hold the arm clear of the "
-                "body and of other things"
+                "arm and body cannot be told apart in the depth image",
+                "hold the arm clear of the body and of other things",
             )
-        raise OutOfViewError("hand cut by the image border; move it toward the middle")
+        raise OutOfViewError("hand cut by the image border", "move it toward the middle")
     cut = on_border(surface) | goes_on(surface, solid & ~surface, view.depth, jump)
     return HandMask(view, surface, filled, outline, cut, pitch_m)
 

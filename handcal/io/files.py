@@ -192,7 +192,7 @@ def refuse_links(path: Path, inside: Path) -> None:
         with suppress(OSError):  # nothing is there
             found = os.lstat(part)
             if stat.S_ISLNK(found.st_mode) or getattr(found, "st_reparse_tag", 0) == _JUNCTION:
-                raise FileError(f"{part} is a link, which is not followed here; remove it")
+                raise FileError(f"{part} is a link, which is not followed here", "remove it")
         part, below = os.path.dirname(part), part  # noqa: PTH120
 
 

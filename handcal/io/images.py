@@ -73,7 +73,7 @@ def decode_image(data: bytes, name: object, flags: int) -> NDArray[Any]:
         if len(data) > _HARMLESS_BYTES:
             _require_pixels_only(data, chunks, name, width, height)
     if data.startswith(_JPEG) and data.count(_JPEG_SCAN) > _MOST_SCANS:
-        raise FileError(f"{name} has more than {_MOST_SCANS} scans; save it as a plain JPEG")
+        raise FileError(f"{name} has more than {_MOST_SCANS} scans", "save it as a plain JPEG")
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error as error:

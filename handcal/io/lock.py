@@ -59,7 +59,8 @@ class FileLock:
         if holder.strip("0123456789"):
             file.close()
             raise FileError(
-                f"{path} is no lock of handcal, as it holds something else; move it away"
+                f"{path} is no lock of handcal, as it holds something else",
+                "move it away",
             )
         try:
             _try_lock(file)
@@ -68,7 +69,7 @@ class FileLock:
             is_here = holder == str(os.getpid())
             whose = "this program" if is_here else "another program"
             raise InUseError(
-                f"{path.parent} is in use by process {holder or 'unknown'}, {whose}; "
+                f"{path.parent} is in use by process {holder or 'unknown'}, {whose}",
                 "close it there, then try again",
                 is_here=is_here,
             ) from error
@@ -93,7 +94,8 @@ class FileLock:
             raise FileError(f"cannot write to {folder}: it was moved or deleted")
         raise FileError(
             f"cannot write to {folder}: it was replaced or restored, or its lock was deleted, so "
-            "another program may be writing to it; open it again"
+            "another program may be writing to it",
+            "open it again",
         )
 
     def release(self) -> None:

@@ -19,7 +19,7 @@ def resource_path(name: str) -> Path:
     for folder in _folders():
         if (path := folder / name).exists():
             return path
-    raise FileError(f"the shipped file {name} is missing; install handcal again")
+    raise FileError(f"the shipped file {name} is missing", "install handcal again")
 
 
 @cache  # a window asks for hundreds of icons

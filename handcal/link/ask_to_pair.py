@@ -71,18 +71,19 @@ def _pair(
                     cookie = answer.retry.cookie
                 if answer.refused.nonce == nonce:
                     raise LinkError(
-                        "the PC takes no more codes after too many wrong ones; show a new one on it"
+                        "the PC takes no more codes after too many wrong ones",
+                        "show a new one on it",
                     )
                 if answer.paired.nonce == nonce:
                     key = exchange.finish(answer.paired, device, nonce, value, secret)
                     if key is None:
-                        raise LinkError("the code is wrong; read it again from the PC's screen")
+                        raise LinkError("the code is wrong", "read it again from the PC's screen")
                     return key
     finally:
         transport.close()
     raise LinkError(
-        f"no PC at {server[0]}:{server[1]} answered within {timeout_s:g} s; let it show a code "
-        "with handcal pair"
+        f"no PC at {server[0]}:{server[1]} answered within {timeout_s:g} s",
+        "let it show a code with handcal pair",
     )
 
 

@@ -121,7 +121,7 @@ class ClockEstimator:
 
     def _ready(self) -> ClockFit:
         if self.fit is None:
-            raise PosePendingError("the headset's clock is not known yet; wait for a few pings")
+            raise PosePendingError("the headset's clock is not known yet", "wait for a few pings")
         return self.fit
 
 

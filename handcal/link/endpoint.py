@@ -107,8 +107,8 @@ class Endpoint(Closable):
                 raise LinkError(f"the {name} was replaced by a newer one before it arrived")
             if message.state is not Delivery.ACKED:
                 raise LinkError(
-                    f"the headset did not answer: the {name} was not acknowledged; check that it "
-                    "is on and that its app runs"
+                    f"the headset did not answer: the {name} was not acknowledged",
+                    "check that it is on and that its app runs",
                 )
 
     def close(self) -> None:

@@ -56,7 +56,10 @@ def read_invitation(text: str) -> Invitation:
     """
     found = _TEXT.fullmatch(text.strip().upper())
     if found is None or not 0 < int(found["port"]) < 65536:
-        raise LinkError("this is not an invitation from handcal; scan the QR code of handcal pair")
+        raise LinkError(
+            "this is not an invitation from handcal",
+            "scan the QR code of handcal pair",
+        )
     return Invitation((found["ipv6"] or found["host"]).lower(), int(found["port"]), found["code"])
 
 

@@ -51,7 +51,7 @@ def run_pairing(
         try:
             server = stack.enter_context(HeadsetServer(pairings, bind))
         except LinkError as error:
-            raise LinkError(f"{error}; if handcal is open, pair there, or close it") from error
+            raise LinkError(f"{error}", "if handcal is open, pair there, or close it") from error
         invitation = server.invite()
         show(invitation)
         try:
@@ -66,4 +66,4 @@ def run_pairing(
             if added := set(pairings.all) - known:
                 return added.pop()
             time.sleep(_POLL_S)
-    raise LinkError(f"no new headset connected within {timeout_s / 60:g} min; pair again")
+    raise LinkError(f"no new headset connected within {timeout_s / 60:g} min", "pair again")

@@ -80,7 +80,8 @@ def read_pairing_key(path: Path | None = None) -> bytes:
         raise LinkError(f"no pairing key: set {KEY_VARIABLE} or give a file that holds it")
     if len(key) < MIN_PAIRING_KEY_BYTES:
         raise LinkError(
-            f"the pairing key has {len(key)} bytes; use at least {MIN_PAIRING_KEY_BYTES}"
+            f"the pairing key has {len(key)} bytes",
+            f"use at least {MIN_PAIRING_KEY_BYTES}",
         )
     return key
 
@@ -268,7 +269,7 @@ class Pairings:
     def _require(self, device_id: str) -> None:
         self.refresh()
         if not device_id or all(one.device_id != device_id for one in self.all):
-            raise LinkError(f"no device {device_id!r} is paired; see handcal devices")
+            raise LinkError(f"no device {device_id!r} is paired", "see handcal devices")
 
     def _change(self, edit: Callable[[tuple[Pairing, ...]], tuple[Pairing, ...]]) -> None:
         """Change the pairings, in memory even if the file cannot be written."""
@@ -317,8 +318,8 @@ def _read(path: Path) -> tuple[Pairing, ...]:
         return tuple(Pairing(**device) for device in devices)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise FileError(
-            f"the pairing keys in {path} are damaged; restore the file, or make a new key and "
-            "enter it in every headset"
+            f"the pairing keys in {path} are damaged",
+            "restore the file, or make a new key and enter it in every headset",
         ) from error
 
 

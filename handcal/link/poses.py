@@ -78,8 +78,8 @@ class PoseBuffer:
         if gap_ns > limit_ns:
             raise PoseError(
                 f"the headset sent no pose for {gap_ns / 1e6:.0f} ms, more than the "
-                f"{limit_ns / 1e6:.0f} ms allowed at this speed of the head; close other "
-                "programs on it"
+                f"{limit_ns / 1e6:.0f} ms allowed at this speed of the head",
+                "close other programs on it",
             )
         return interpolate_pose(before, after, (t_headset_ns - times[index - 1]) / gap_ns)
 

@@ -153,7 +153,7 @@ def reachable_address(bound: Address) -> Address:
         if not (number.is_loopback or number.is_link_local):
             return address, port
     missing = "no network" if families == 2 else "no IPv4 network (:: listens on IPv6, too)"
-    raise LinkError(f"this computer has {missing}; connect it to the headset's network")
+    raise LinkError(f"this computer has {missing}", "connect it to the headset's network")
 
 
 def resolve(host: str, port: int) -> Address:
@@ -167,7 +167,7 @@ def resolve(host: str, port: int) -> Address:
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:  # UnicodeError: not a valid name
-        raise LinkError(f"unknown host {host!r}; check its name or use its address") from error
+        raise LinkError(f"unknown host {host!r}", "check its name or use its address") from error
     best = min(found, key=lambda one: one[0] is not socket.AF_INET)
     return _plain(best[4])
 

@@ -155,7 +155,8 @@ def solve_icp_open3d(
         import open3d
     except ImportError as error:
         raise HandcalError(
-            "the method icp-open3d needs Open3D: pip install 'handcal[3d]'; icp needs nothing"
+            "the method icp-open3d needs Open3D: pip install 'handcal[3d]'",
+            "icp needs nothing",
         ) from error
     registration = open3d.pipelines.registration
     cursor, hand = (

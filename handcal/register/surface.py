@@ -201,7 +201,8 @@ def clip_surface(surface: Surface, beyond_m: Float64, band_m: float) -> Surface:
 def _checked(surface: Surface) -> Surface:
     if np.count_nonzero(~surface.near_cut) < _LEAST_FREE:
         raise HandError(
-            "all of the hand lies beside cut edges; hold it free, in the middle of view"
+            "all of the hand lies beside cut edges",
+            "hold it free, in the middle of view",
         )
     return surface
 

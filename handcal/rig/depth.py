@@ -157,7 +157,8 @@ def fit_depth(views: Sequence[DepthView], made: str | None = None) -> DepthCheck
     if true_m.max() < _LEAST_SPREAD * true_m.min():
         raise ViewsError(
             f"the board was held only at {true_m.min():.2f} to {true_m.max():.2f} m: hold it "
-            f"nearer and farther as well; the farthest must be {_LEAST_SPREAD} times the nearest"
+            f"nearer and farther as well",
+            f"the farthest must be {_LEAST_SPREAD} times the nearest",
         )
     J = np.column_stack([true_m, np.ones(len(views))])
     (scale, offset_m), *_ = np.linalg.lstsq(J, measured_m, rcond=None)

@@ -173,7 +173,7 @@ class JournalWriter:
             If the journal cannot be written or is full; its contents are kept.
         """
         if self._bytes + len(line) > MAX_JOURNAL_BYTES:
-            raise FileError(f"the journal of {self._path.parent} is full; start another session")
+            raise FileError(f"the journal of {self._path.parent} is full", "start another session")
         try:
             # Reopened each time, so that a folder that was moved or removed is noticed.
             with open(self._path, "r+b", opener=open_no_link) as file:
@@ -208,8 +208,8 @@ class JournalWriter:
         is_known = self._bytes <= found.st_size <= self._bytes + self._torn_bytes
         if (found.st_dev, found.st_ino) != self._file or not is_known:
             raise FileError(
-                f"cannot write {self._path}: it was changed or replaced by another program; "
-                "open the session again"
+                f"cannot write {self._path}: it was changed or replaced by another program",
+                "open the session again",
             )
 
 

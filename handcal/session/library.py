@@ -146,7 +146,7 @@ def delete_session(path: Path) -> Path:
     """
     _require_there(path)
     if not (path / JOURNAL).is_file():
-        raise FileError(f"{path} is not a session; nothing was deleted")
+        raise FileError(f"{path} is not a session", "nothing was deleted")
     FileLock(path / "lock").release()  # only a test, or another program would lose its folder
     folder = path.absolute().parent
     bin_folder = make_folder(folder / DELETED, folder)
@@ -164,9 +164,9 @@ def restore_session(path: Path) -> Path:
     """
     target = path.parent.parent / path.name
     if path.parent.name != DELETED:
-        raise FileError(f"{path} is not in a folder {DELETED}; nothing was restored")
+        raise FileError(f"{path} is not in a folder {DELETED}", "nothing was restored")
     if target.exists():
-        raise FileError(f"{target} exists; rename it, then restore again")
+        raise FileError(f"{target} exists", "rename it, then restore again")
     return _move(path, target)
 
 

@@ -145,7 +145,7 @@ def replay(path: Path) -> Replayed:
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror or error}") from error
     if not is_session:
-        raise FileError(f"{path} is not a session; choose the folder that contains {JOURNAL}")
+        raise FileError(f"{path} is not a session", f"choose the folder that contains {JOURNAL}")
     journal = read_journal(path / JOURNAL)
     damaged = list(journal.damaged)
     first = journal.events[0]
@@ -281,15 +281,16 @@ def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
     except (FileError, ValueError) as error:
         if not state.rig:
             raise FileError(
-                f"{file} is damaged: {error}; repair the session with another copy of the rig file"
+                f"{file} is damaged: {error}",
+                "repair the session with another copy of the rig file",
             ) from error
         damaged.append(Damage("rig.yaml", None, f"{error}; the journal's copy was read"))
         try:
             return parse_rig(state.rig.encode())
         except ValueError as worse:
             raise FileError(
-                f"{file} and its copy in the journal are damaged: {worse}; repair the session with "
-                "another copy of the rig file"
+                f"{file} and its copy in the journal are damaged: {worse}",
+                "repair the session with another copy of the rig file",
             ) from worse
     if not state.rig_sha256:
         damaged.append(Damage("rig.yaml", None, "its checksum, in the journal, is lost"))

@@ -92,7 +92,7 @@ def repair_session(path: Path, output: Path, rig: Rig | None = None) -> SessionR
     """
     record = without_unsolvable(load_session(path, rig).contents(), SolveSettings())
     if output.exists():
-        raise FileError(f"{output} exists; choose a new folder")
+        raise FileError(f"{output} exists", "choose a new folder")
     hidden = make_folder(output.absolute().parent) / f".{output.name}.repairing"
     try:
         shutil.rmtree(hidden, ignore_errors=True)

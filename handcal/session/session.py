@@ -416,7 +416,7 @@ class Session(Closable):
 
     def _require_open(self) -> JournalWriter:
         if self._journal is None:
-            raise FileError(f"{self.path} is closed; open the session again")
+            raise FileError(f"{self.path} is closed", "open the session again")
         return self._journal
 
     def _require_own(self) -> JournalWriter:

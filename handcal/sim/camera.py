@@ -131,7 +131,7 @@ class SyntheticCamera(Closable):
             If the camera was closed.
         """
         if not self._is_open:
-            raise CameraError("the simulated camera is closed; open it again")
+            raise CameraError("the simulated camera is closed", "open it again")
         while True:
             self._under_way.append(self._expose(self._wait_for_scene(timeout_s)))
             if not self._settings.late_s:

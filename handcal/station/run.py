@@ -92,10 +92,10 @@ def run_calibration(
 def _require_ready(settings: StationSettings, pairings: Pairings) -> None:
     key = next((one.key for one in pairings.all), "")
     if settings.headset == "network" and not key:
-        raise HandcalError("no headset is paired; pair one with handcal pair")
+        raise HandcalError("no headset is paired", "pair one with handcal pair")
     for finding in check_station(settings, key).values():
         if finding.health is Health.BROKEN:
-            raise HandcalError(f"{finding.what.lower()}: {finding.found}; {finding.advice}")
+            raise HandcalError(f"{finding.what.lower()}: {finding.found}", f"{finding.advice}")
 
 
 def _result(station: Station, snapshot: Snapshot) -> dict[str, Any]:

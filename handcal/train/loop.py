@@ -220,7 +220,7 @@ def read_average(folder: Path) -> HandNet:
     """
     path = folder / _CHECKPOINT
     if not path.exists():
-        raise FileError(f"{path} is missing; train first")
+        raise FileError(f"{path} is missing", "train first")
     average = torch.load(path, map_location="cpu", weights_only=True)["average"]
     net = HandNet()
     net.load_state_dict(

@@ -71,7 +71,7 @@ def shown(photo: Photo, conditions: Conditions) -> Shown:
     if conditions.hand_height is None:
         return Shown(image, 1.0, np.zeros(2))
     if not len(photo.boxes):
-        raise HandcalError(f"{photo.path} has no hand to scale; leave out the hand's height")
+        raise HandcalError(f"{photo.path} has no hand to scale", "leave out the hand's height")
     return _at_height(image, photo.boxes[0], conditions.hand_height)
 
 

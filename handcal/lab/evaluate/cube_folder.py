@@ -133,8 +133,8 @@ def find_captures(folder: Path) -> tuple[list[CapturedPose], dict[str, str]]:
                 incomplete[f"{position.name}/{pose.name}"] = f"there is no {lacking}.png"
     if not poses:
         raise FileError(
-            f"{folder} holds no captures: POSITION/POSE/real.png and virtual.png are looked for; "
-            "take them with Capture… in the window, or with handcal evaluate cube capture"
+            f"{folder} holds no captures: POSITION/POSE/real.png and virtual.png are looked for",
+            "take them with Capture… in the window, or with handcal evaluate cube capture",
         )
     if len(poses) > MAX_POSES:
         raise FileError(f"{folder} holds {len(poses)} poses, more than the {MAX_POSES} allowed")

@@ -108,8 +108,8 @@ def read_user_test(folders: Iterable[Path], progress: Progress = Progress()) -> 
                 left_out[str(path)] = record.left_out
     if not kept:
         raise FileError(
-            "there is no trial of the user test to evaluate; record some first "
-            f"({_reasons(left_out) or 'no folder'})"
+            "there is no trial of the user test to evaluate",
+            f"record some first ({_reasons(left_out) or 'no folder'})",
         )
     names = Counter(path.name for path in kept)
     sessions = {

@@ -104,7 +104,7 @@ def resumable() -> Iterator[None]:
     try:
         yield
     except CancelledError:
-        raise CancelledError("the study was cancelled; run it again to resume it") from None
+        raise CancelledError("the study was cancelled", "run it again to resume it") from None
 
 
 def share_done(study: Study, folder: Path) -> float:

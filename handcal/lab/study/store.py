@@ -41,7 +41,7 @@ def free_of_studies(folder: Path) -> Path:
         If it is the folder of a study, whose report would be replaced.
     """
     if holds_study(folder):
-        raise FileError(f"{folder} holds a study; choose another folder for the results")
+        raise FileError(f"{folder} holds a study", "choose another folder for the results")
     return folder
 
 
@@ -90,7 +90,8 @@ class StudyFolder:
             write_json(file, study)
         elif others := _differences(read_json(file, path), study):
             raise FileError(
-                f"{path} holds another study ({others}); choose another folder, or the same entries"
+                f"{path} holds another study ({others})",
+                "choose another folder, or the same entries",
             )
 
     def has_chunk(self, number: int) -> bool:

@@ -83,7 +83,8 @@ def fit_noise(
     if excess(_SCALES[0]) > 0.0 or excess(_SCALES[1]) < 0.0:
         means = ", ".join(f"{errors.mean():.1f}′ at {scale:g}" for scale, errors in tried.items())
         raise HandcalError(
-            f"no noise gives the paper's {PAPER_MEAN_ARCMIN}′ ({means}); try more wearers"
+            f"no noise gives the paper's {PAPER_MEAN_ARCMIN}′ ({means})",
+            "try more wearers",
         )
     scale = float(brentq(excess, *_SCALES, xtol=_NEAR_ENOUGH))
     nearest = min(tried, key=lambda found: abs(found - scale))

@@ -52,7 +52,8 @@ def open_workers(workers: int | None, scheduler: str | None) -> Iterator[Executo
     if scheduler is None and workers > max(cores, 2) and not os.environ.get(OVERSUBSCRIBE):
         raise HandcalError(
             f"{workers} processes on the {cores} cores of this computer are slower than {cores}, "
-            f"and may fill its memory; choose fewer, or set {OVERSUBSCRIBE}=1 if you insist"
+            f"and may fill its memory",
+            f"choose fewer, or set {OVERSUBSCRIBE}=1 if you insist",
         )
     if scheduler is not None:
         opened = _cluster(scheduler)
@@ -85,16 +86,17 @@ def _cluster(address: str) -> Iterator[Executor]:
         )
     except (OSError, ValueError) as error:
         raise HandcalError(
-            f"no Dask scheduler answers at {address!r}; start one with `dask scheduler` and "
-            "give the address that it shows, as tcp://HOST:PORT"
+            f"no Dask scheduler answers at {address!r}",
+            "start one with `dask scheduler` and "
+            "give the address that it shows, as tcp://HOST:PORT",
         ) from error
     with client:
         try:
             yield client.get_executor(pure=False)  # type: ignore[no-untyped-call]
         except (KilledWorker, CancelledError) as error:
             raise HandcalError(
-                "the Dask cluster lost its scheduler or its workers; restart it, and run the study "
-                "again to resume it"
+                "the Dask cluster lost its scheduler or its workers",
+                "restart it, and run the study again to resume it",
             ) from error
 
 
@@ -122,8 +124,8 @@ def _processes(workers: int) -> Iterator[Executor]:
                 raise
     except BrokenExecutor as error:
         raise HandcalError(
-            "a process of the study died, perhaps for lack of memory; run the study again with "
-            "fewer processes to resume it"
+            "a process of the study died, perhaps for lack of memory",
+            "run the study again with fewer processes to resume it",
         ) from error
     finally:
         for name, value in before.items():

@@ -192,8 +192,8 @@ def accept_eye(
     """
     if len(pairs) < FEWEST_VIEWS:
         raise ViewsError(
-            f"{len(pairs)} pairs of images show the board; take at least {FEWEST_VIEWS}, at "
-            "different distances"
+            f"{len(pairs)} pairs of images show the board",
+            f"take at least {FEWEST_VIEWS}, at different distances",
         )
     _, board = boards_seen({name: seen for name, (_, seen) in pairs.items()}, depth_camera)
     pairs = {name: (board.of(first), board.of(second)) for name, (first, second) in pairs.items()}
@@ -202,7 +202,7 @@ def accept_eye(
     T_H_B = {name: rig.T_H_D @ board_pose(seen, depth_camera) for name, (_, seen) in pairs.items()}
     depths_m = {name: _middle_m(T_C_B[name], pairs[name][0]) for name in pairs}
     if max(depths_m.values()) < _LEAST_SPREAD * min(depths_m.values()):
-        raise ViewsError("the board is at nearly the same distance in all images; move it")
+        raise ViewsError("the board is at nearly the same distance in all images", "move it")
     # Far away the board is smaller and its rotation acts on a longer lever: σ grows as z².
     weights = [depths_m[name] ** -4 for name in pairs]
     T_S_C = np.linalg.inv(homography.H_C_S)

@@ -107,7 +107,7 @@ def image_files(paths: Iterable[Path]) -> list[Path]:
         raise FileError(f"{len(files)} images are more than the {MAX_VIEWS} allowed")
     name, count = Counter(file.name for file in files).most_common(1)[0]
     if count > 1:
-        raise FileError(f"{count} images are called {name}; give each a different name")
+        raise FileError(f"{count} images are called {name}", "give each a different name")
     return files
 
 
@@ -221,7 +221,8 @@ def one_size(found: Mapping[str, BoardView]) -> tuple[int, int]:
     if others:
         raise ViewsError(
             f"the images have mixed resolutions: most are {width}x{height}, but not "
-            f"{', '.join(others[:5])}{' …' if len(others) > 5 else ''}; drop those"
+            f"{', '.join(others[:5])}{' …' if len(others) > 5 else ''}",
+            "drop those",
         )
     return width, height
 

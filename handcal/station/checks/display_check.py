@@ -134,7 +134,7 @@ def by_camera(
             show(what)
             seen = take()
             if seen.shape != dark[0].shape:
-                raise CameraError("the camera's pictures changed their size; check again")
+                raise CameraError("the camera's pictures changed their size", "check again")
             found[what] = find_square(dark, seen)
         return shares_seen(found)
 

@@ -213,7 +213,7 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
     try:
         _require_free((settings.host, settings.port))
     except LinkError as error:  # which says itself what to do
-        return _broken(*str(error).split("; ", 1))
+        return _broken(error.what, error.advice)
     try:
         host, port = reachable_address((str(address), settings.port))
     except LinkError:

@@ -132,8 +132,8 @@ def known_names(settings: SupportSettings) -> frozenset[str]:
         if not entries and folder in settings.sessions:
             what = "holds no session" if folder.is_dir() else "is not a folder"
             raise FileError(
-                f"{folder} {what}, so that the names of its wearers would stay in the log; give "
-                "the folder in which the sessions are"
+                f"{folder} {what}, so that the names of its wearers would stay in the log",
+                "give the folder in which the sessions are",
             )
         for entry in entries:
             names |= {entry.wearer, *entry.former_wearers}
@@ -182,12 +182,12 @@ def _frames(source: Path | None) -> Sequence[tuple[Path, str]]:
     else:
         files = [source] if source.is_file() else []
     if not files:
-        raise FileError(f"there are no frames in {source}; choose a recording, or leave it out")
+        raise FileError(f"there are no frames in {source}", "choose a recording, or leave it out")
     total_bytes = sum(one.stat().st_size for one in files)
     if total_bytes > MAX_FRAMES_BYTES:
         raise FileError(
-            f"{source} has {total_bytes / 2**20:,.0f} MiB; choose a recording of at most "
-            f"{MAX_FRAMES_BYTES // 2**20} MiB"
+            f"{source} has {total_bytes / 2**20:,.0f} MiB",
+            f"choose a recording of at most {MAX_FRAMES_BYTES // 2**20} MiB",
         )
     root = source if source.is_dir() else source.parent
     return [(one, f"frames/{one.relative_to(root).as_posix()}") for one in files]

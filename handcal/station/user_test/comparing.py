@@ -59,7 +59,10 @@ class Comparing:
             If the link is closed.
         """
         if all(np.abs(shift_m).max() < _SAME_M for shift_m in applied_shift_m.values()):
-            raise ProcedureError("the headset draws with the offline calibration; solve and apply")
+            raise ProcedureError(
+                "the headset draws with the offline calibration",
+                "solve and apply",
+            )
         self.end()
         self._applied_m = dict(applied_shift_m)
         self._first = self._draw_lot(_ORDERS)

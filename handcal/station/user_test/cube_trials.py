@@ -105,7 +105,8 @@ def record_user_trials(
         if connect is None:
             if "station" not in record.settings:
                 raise FileError(
-                    f"{order.session}: it is not of a simulated wearer; make one with handcal demo"
+                    f"{order.session}: it is not of a simulated wearer",
+                    "make one with handcal demo",
                 )
             seed = record.settings["station"].get("seed", 1)
             server, bench = stack.enter_context(simulated_wearer(rig, cube, seed))
@@ -219,7 +220,7 @@ def calibrated_shifts_m(record: SessionRecord, eyes: Sequence[Eye]) -> Mapping[E
     solved_m = read_rendered_shift_m(record.results)
     missing = [eye for eye in eyes if eye not in solved_m]
     if missing:
-        raise FileError(f"{record.path}: the {missing[0]} eye is not solved; calibrate it first")
+        raise FileError(f"{record.path}: the {missing[0]} eye is not solved", "calibrate it first")
     return {eye: solved_m[eye] for eye in eyes}
 
 
@@ -254,7 +255,7 @@ def wait_for_cube(
             return found
         else:
             why = "it moves"
-    raise HandcalError(f"the cube did not come to rest at {depth_m} m: {why}; put it down there")
+    raise HandcalError(f"the cube did not come to rest at {depth_m} m: {why}", "put it down there")
 
 
 def _head_now(server: HeadsetServer) -> Float64:
