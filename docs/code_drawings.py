@@ -72,7 +72,7 @@ QUEUES = (
     ("jobs", "window", 40, "progress"),
     ("engine", "bridge", -70, "items (bounded)"),
 )
-"""What passes from one to another, and how far its arrow is shifted aside, in px."""
+"""Source, target, how far the arrow is moved aside (px), and the content of each queue."""
 _HIGH = 62
 
 
