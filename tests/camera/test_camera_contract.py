@@ -14,8 +14,7 @@ import pytest
 
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
-from handcal.camera.hl2ss_realsense import HoloLens2RealSense
-from handcal.camera.hololens2 import HoloLens2Camera
+from handcal.camera.hololens2 import HoloLens2Camera, HoloLens2RealSense
 from handcal.camera.live import open_hololens2
 from handcal.camera.oak import OakCamera
 from handcal.camera.orbbec import OrbbecCamera
@@ -29,7 +28,7 @@ from handcal.sim.camera import SyntheticCamera
 from handcal.sim.hand import make_hand
 from handcal.sim.render import World
 from handcal.sim.room import RoomSettings, make_room
-from handcal.sim.sway import swaying_hand
+from handcal.sim.scene import swaying_hand
 from tests.camera.hl2ss_server import (
     GROUPS,
     NAME,

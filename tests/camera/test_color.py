@@ -10,11 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.camera.color import ColorCamera
 from handcal.camera.playback import PlaybackSettings
 from handcal.camera.recordings import open_recording, record_frames
 from handcal.camera.settings import RealSenseSettings
-from handcal.camera.view_source import REALSENSE, open_view_source
+from handcal.camera.view_source import REALSENSE, ColorCamera, open_view_source
 from handcal.core.errors import CameraEndError, CameraError
 from handcal.core.types import CameraIdentity, Frame
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.camera.distortion import opencv_distortion
+from handcal.camera.sdk_frames import opencv_distortion
 from handcal.core.errors import CameraError
 from handcal.core.geometry import image_points
 from handcal.core.types import Intrinsics

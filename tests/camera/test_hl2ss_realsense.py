@@ -12,8 +12,7 @@ from typing import TypeAlias
 import numpy as np
 import pytest
 
-from handcal.camera.hl2ss_realsense import DepthFormat, HoloLens2RealSense, find_depth
-from handcal.camera.hololens2 import hololens2_settings
+from handcal.camera.hololens2 import DepthFormat, HoloLens2RealSense, find_depth, hololens2_settings
 from handcal.camera.live import is_live, open_hololens2
 from handcal.camera.settings import HoloLens2Settings
 from handcal.core.errors import CameraError

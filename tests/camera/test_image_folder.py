@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.camera.image_folder import ImageFolderCamera
+from handcal.camera.folder import ImageFolderCamera
 from handcal.camera.recordings import open_recording
 from handcal.core.errors import CameraEndError, CameraError
 from handcal.core.types import Frame

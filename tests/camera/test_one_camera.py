@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.camera.one_camera import of_one_camera
+from handcal.camera.playback import of_one_camera
 from handcal.core.types import Frame
 
 MakeFrames = Callable[..., Iterator[Frame]]

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.camera.recording import RecordingCamera
-from handcal.camera.sdk_recorder import record_db3
+from handcal.camera.recording import RecordingCamera, record_db3
 from handcal.core.errors import CameraEndError, CameraError
 from handcal.core.types import Frame, Intrinsics
 

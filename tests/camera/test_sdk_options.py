@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handcal.camera.sdk_options import HandExposure, apply_options
+from handcal.camera.realsense import HandExposure, apply_options
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.errors import CameraError
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.camera.usb import explain_absence
+from handcal.camera.sdk_devices import explain_absence
 
 
 @pytest.mark.parametrize(

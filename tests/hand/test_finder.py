@@ -7,7 +7,8 @@ from handcal.core.errors import HandError
 from handcal.core.types import Frame, HandCloud, UInt8
 from handcal.hand.detect import Detections
 from handcal.hand.finder import HandFinder
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
 
 from .conftest import CAMERA, shoot

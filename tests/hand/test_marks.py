@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.core.types import Float64
-from handcal.hand import marks
-from handcal.hand.marks import outline_marks
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand import outline
+from handcal.hand.outline import outline_marks
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import SegmentSettings
 
 from .conftest import Shot
 
@@ -84,5 +85,5 @@ def test_tips_are_the_prominent_peaks(heights: list[int]) -> None:
         lowest_m = (side[:end].min() for side, end in zip(sides, ends, strict=True))
         return float(reach_m[index] - max(lowest_m))
 
-    prominent = [i for i in range(len(reach_m)) if prominence_m(i) >= marks._LEAST_FINGER_M]
-    assert marks._tips(reach_m) == prominent
+    prominent = [i for i in range(len(reach_m)) if prominence_m(i) >= outline._LEAST_FINGER_M]
+    assert outline._tips(reach_m) == prominent

@@ -6,8 +6,9 @@ import numpy as np
 
 from handcal.core.geometry import rigid
 from handcal.core.types import Frame, Intrinsics, UInt8
-from handcal.hand.overlay import contour_px
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.outline import contour_px
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import SegmentSettings
 
 from .conftest import CAMERA, Shot
 

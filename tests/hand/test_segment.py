@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from handcal.core.errors import HandError
 from handcal.core.geometry import camera_matrix, project, rigid
 from handcal.core.types import Frame, HandCloud, Intrinsics, UInt16
-from handcal.hand.segment import SegmentSettings, segment_hand
-from handcal.hand.settings import NEARER_M
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import NEARER_M, SegmentSettings
 
 from .conftest import CAMERA, Shot, shoot
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from handcal.core.types import UInt16
-from handcal.hand.surface import goes_on, on_border, solid_surface
+from handcal.hand.view import goes_on, on_border, solid_surface
 
 DEPTHS = arrays(np.uint16, (7, 8), elements=st.sampled_from([0, 1, 490, 500, 505, 520, 900, 65535]))
 

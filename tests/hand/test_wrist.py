@@ -11,10 +11,10 @@ import pytest
 from handcal.core.errors import HandError
 from handcal.core.geometry import rotation_matrix, rotation_vector
 from handcal.core.types import Float32
+from handcal.hand.locate import find_wrist_m
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
-from handcal.hand.wrist import find_wrist_m
 
 from .conftest import Shot, shoot
 

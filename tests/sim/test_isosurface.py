@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handcal.sim.isosurface import isosurface
+from handcal.sim.hand import isosurface
 
 
 def _edges(triangles: np.ndarray) -> list[tuple[int, int]]:

@@ -11,8 +11,7 @@ import numpy as np
 from handcal.camera.radial import DEPTH_SCALE_M, PinholeView, is_not_wrapped, white_brightness
 from handcal.core.geometry import invert, transform
 from handcal.core.types import Bool, Float32, Float64, Frame, Intrinsics, Rig, UInt16
-from handcal.hand.edges import edges_of
-from handcal.hand.outline import with_outline
+from handcal.hand.outline import edges_of, with_outline
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance

@@ -17,8 +17,7 @@ from pathlib import Path
 
 from handcal.calibration.states import CalibrationSettings
 from handcal.camera.camera import Camera
-from handcal.camera.sdk_devices import Device, devices_by_child
-from handcal.camera.usb import explain_absence
+from handcal.camera.sdk_devices import Device, devices_by_child, explain_absence
 from handcal.core.errors import CancelledError, HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import CameraIdentity, Intrinsics, Rig

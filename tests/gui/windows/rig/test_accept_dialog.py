@@ -24,8 +24,7 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.types import EYES
 from handcal.rig.formats import write_intrinsics
-from handcal.sim.acceptance import write_acceptance
-from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
+from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_acceptance
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.windows.rig.accept_dialog import AcceptDialog
