@@ -255,7 +255,7 @@ class HoloLens2RealSense(Closable):
         try:
             self.depth_intrinsics = read_rig(settings.realsense_rig).depth_intrinsics
         except FileError as error:
-            raise CameraError(str(error)) from error
+            raise CameraError(*error.args) from error
         host, port = settings.host, settings.port or _DEPTH_PORT
         with Hl2ssConnection(host, settings.color_port or _VIDEO_PORT, _LIST_REQUEST) as connection:
             (size,) = struct.unpack("<I", connection.receive(4, _LIST_S))
