@@ -26,6 +26,7 @@ from handcal.hand.view import (
     pixels_of,
     solid_surface,
     view_depth,
+    widened,
 )
 
 # Share of the hand's outline that may touch the image border.
@@ -233,7 +234,7 @@ def _cloud(frame: Frame, hand: HandMask, settings: SegmentSettings) -> HandCloud
         t_camera_ns=frame.t_camera_ns,
         t_host_ns=frame.t_host_ns,
         points_m=points_m,
-        is_cut=_widened(hand.cut, round(settings.cut_band_m / hand.pitch_m))[chosen],
+        is_cut=widened(hand.cut, round(settings.cut_band_m / hand.pitch_m))[chosen],
         colors=_colors(frame, points_m, (chosen[0] + y0, chosen[1] + x0)),
         contour_m=deproject(view, *outline).T,
         contour_is_cut=hand.cut[outline],
@@ -253,12 +254,6 @@ def _even_choice(shape: tuple[int, ...], fraction: float) -> Bool:
     columns = np.arange(shape[1], dtype=np.uint16) * np.uint16(49472)
     chosen: Bool = rows[:, None] + columns <= np.uint16(min(fraction, 1.0) * 65535)
     return chosen
-
-
-def _widened(mask: Bool, by_px: int) -> Bool:
-    """Dilate a mask by a square with the given half side."""
-    square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
-    return cv2.dilate(mask.astype(np.uint8), square).astype(bool)
 
 
 def _colors(frame: Frame, points_m: Float32, pixels: Pixels) -> UInt8 | None:
