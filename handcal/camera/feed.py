@@ -109,7 +109,8 @@ class CameraFeed(Closable):
         if now_s < self._next_open_s:
             time.sleep(min(_READ_S, self._next_open_s - now_s))
             # Nothing was tried, so the reason is that of the last attempt.
-            raise self._error or CameraError("the camera is not open yet")
+            assert self._error is not None
+            raise CameraError(*self._error.args)
         self._next_open_s = now_s + _REOPEN_S
         self._camera = self._open_camera()
         self._name, self._identity = self._camera.name, self._camera.identity

@@ -74,7 +74,7 @@ class _ListedCamera(PlayedCamera):
     _color_intrinsics: Intrinsics | None = None
     _T_C_D: Float64 = np.eye(4)
 
-    def __init__(self, folder: Path, settings: PlaybackSettings | None) -> None:
+    def __init__(self, folder: Path, settings: PlaybackSettings | None = None) -> None:
         super().__init__(settings)
         self.name = f"Recording {folder.name}"
         self.identity = CameraIdentity()

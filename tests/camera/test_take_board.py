@@ -228,29 +228,3 @@ def test_the_command_says_what_it_kept_and_what_it_passed_over(
     heard = capsys.readouterr()
     assert "skipped: the board is not seen" in heard.out
     assert "no image was kept" in heard.err
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "said"),
-    [
-        (("1", "--headset", "1"), 2, "must differ"),
-        (("99",), 1, "there is no camera 99"),
-        (("nothing.mp4",), 1, "there is no video nothing.mp4"),
-        (("nothing.db3",), 1, "there is no recording nothing.db3"),
-        (("nothing.mp4", "--grid", "60", "60"), 1, "no room for 3 squares"),
-    ],
-)
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lists cameras as files")
-def test_what_is_wrong_is_one_line(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    words: tuple[str, ...],
-    code: int,
-    said: str,
-) -> None:
-    assert run(monkeypatch, *words, "--output", tmp_path / "out") == code
-    line = capsys.readouterr().err
-    assert said in line
-    assert line.count("\n") == 1
-    assert not (tmp_path / "out").exists()

@@ -222,17 +222,6 @@ def test_reading_allocates_the_files_size_not_the_limit(tmp_path: Path) -> None:
     assert most < 2**20
 
 
-@pytest.mark.parametrize("size", [0, 1, 7, 8, 9])
-def test_no_more_than_the_limit_is_read(tmp_path: Path, size: int) -> None:
-    path = tmp_path / "a.bin"
-    path.write_bytes(bytes(size))
-    if size <= 8:
-        assert read_limited(path, 8) == bytes(size)
-    else:
-        with pytest.raises(FileError, match="larger than the 8 bytes"):
-            read_limited(path, 8)
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="there is no /proc")
 def test_a_file_that_does_not_know_its_size_is_read_to_its_end() -> None:
     assert len(read_limited(Path("/proc/self/status"), 2**20)) > 100

@@ -15,7 +15,6 @@ from handcal.sim.raster import draw_hand
 from handcal.sim.silhouette import (
     OutlineView,
     find_gaps,
-    outline_normals,
     overlay_outline,
     silhouette,
     view_outline,
@@ -118,14 +117,6 @@ def test_a_grown_outline_is_found_as_such(hand: HandModel, rim_m: Float64, size:
     assert abs(found.right_arcmin) < 0.4
     # The middle of the line is not that of what is compared, so that growth moves a little.
     assert abs(found.down_arcmin) < 1.5
-
-
-def test_an_outline_that_is_far_away_is_found_by_looking_again(
-    hand: HandModel, rim_m: Float64
-) -> None:
-    found = seen(hand, altered(rim_m, -12.0, 9.0))
-    assert found is not None
-    np.testing.assert_allclose((found.right_arcmin, found.down_arcmin), (12.0, -9.0), atol=0.6)
 
 
 @pytest.mark.parametrize("away_m", [(0.006, -0.004, 0.012), (-0.006, 0.004, -0.03)])
@@ -232,35 +223,6 @@ def test_an_inner_rim_of_the_hand_is_no_silhouette(hand: HandModel) -> None:
     sight = eye_m - rim.points_m
     sight /= np.linalg.norm(sight, axis=1)[:, None]
     assert np.abs(np.einsum("ij,ij->i", rim.normals, sight)).max() < 0.1
-
-
-def test_normals_point_outward_whichever_way_the_outline_runs() -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)
-    circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    for outline, outward in ((circle, circle), (circle[::-1], circle[::-1])):
-        np.testing.assert_allclose(outline_normals(50.0 * outline + 300.0), outward, atol=1e-3)
-
-
-def test_given_normals_need_no_order(hand: HandModel, rim_m: Float64) -> None:
-    ordered = view(rim_m)
-    points_W_m = to_W("left", rim_m)
-    mixed = np.random.default_rng(0).permutation(len(points_W_m))
-    T_E_W = view_of_eye(RIG.eyes["left"], T_W_H)
-    outward_px = outline_normals(rim_m[:, :2] / rim_m[:, 2:])
-    outward_W = np.pad(outward_px, ((0, 0), (0, 1))) @ T_E_W[:3, :3]
-    unordered = view_outline(
-        RIG.eyes["left"],
-        TRUE_M,
-        T_W_H,
-        drawn_with("left", TRUE_M),
-        points_W_m[mixed],
-        outward_W[mixed],
-    )
-    one, other = (find_gaps(hand, pose_W("left"), v) for v in (ordered, unordered))
-    assert one is not None
-    assert other is not None
-    assert np.median(other.gap_px) == pytest.approx(np.median(one.gap_px), abs=0.05)
-    assert len(other.gap_px) > 0.9 * len(one.gap_px)
 
 
 def test_a_view_is_of_the_true_eye_and_not_of_the_drawn_one(

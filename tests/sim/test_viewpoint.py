@@ -36,13 +36,3 @@ def test_a_pixel_is_seen_where_a_point_of_the_focal_plane_is(shift_m: list[float
     seen = [float((axis * light).sum() / light.sum()) for axis in (columns, rows)]
     expected = image_points(transform(invert(T_E_C), point_E_m), CAMERA)[0]
     np.testing.assert_allclose(seen, expected, atol=0.05)
-
-
-def test_noise_and_darkness_are_as_asked() -> None:
-    dark = np.zeros((DISPLAY.height_px, DISPLAY.width_px), np.uint8)
-    settings = PictureSettings(blur_px=0.5, noise=4.0, samples=1)
-    rng = np.random.default_rng(0)
-    image = photograph_display(dark, DISPLAY, np.eye(3), CAMERA, rng, settings=settings)
-    assert image.shape == (360, 640)
-    assert image.std() == pytest.approx(4.0, rel=0.1)
-    assert image.mean() < 20.0

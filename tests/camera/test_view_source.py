@@ -78,20 +78,6 @@ def test_a_realsense_is_run_as_its_settings_say(
         open_view_source(REALSENSE, RealSenseSettings(serial="9"))
 
 
-def test_a_video_is_played_over_and_over_at_its_pace(tmp_path: Path) -> None:
-    path = tmp_path / "view.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
-    for level in (50, 200):
-        writer.write(np.full((48, 64, 3), level, np.uint8))
-    writer.release()
-    with open_view_source(
-        str(path), playback=PlaybackSettings(real_time=True, loop=True)
-    ) as camera:
-        read = [camera.read() for _ in range(4)]
-    assert [round(float(image.mean()), -1) for image, _ in read] == [50, 200, 50, 200]
-    assert read[2][1] == read[0][1]
-
-
 def test_images_and_cameras_are_opened_by_what_they_are_called(tmp_path: Path) -> None:
     assert cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
     with open_view_source(str(tmp_path)) as camera:
