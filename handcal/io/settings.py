@@ -46,7 +46,7 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
     unknown = sorted(str(name) for name in set(data) - names)
     if unknown:
         shown = ", ".join(name or "field without a name" for name in unknown)
-        raise FileError(f"{where} has no {shown}", f"it has {', '.join(sorted(names))}")
+        raise FileError(f"{where} has no {shown}, only {', '.join(sorted(names))}")
     values = {name: _convert(hints[name], value, f"{where}.{name}") for name, value in data.items()}
     try:
         return kind(**values)

@@ -114,7 +114,7 @@ def test_what_cannot_be_recorded_leaves_nothing_behind(
     rational = replace(frame.depth_intrinsics, distortion=(0.1,) * 8)
     with pytest.raises(ValueError, match="5 distortion coefficients, not 8; record into a folder"):
         record_db3(tmp_path / "hand.db3", [replace(frame, depth_intrinsics=rational)])
-    with pytest.raises(ValueError, match="holds no poses; record this camera into a folder"):
+    with pytest.raises(ValueError, match="holds no poses: record this camera into a folder"):
         record_db3(tmp_path / "hand.db3", [replace(frame, T_W_D=np.eye(4))])
     with pytest.raises(ValueError, match="not from the camera"):
         record_db3(tmp_path / "hand.db3", [frame, *make_frames(1)])

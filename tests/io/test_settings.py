@@ -88,8 +88,8 @@ def test_what_is_absent_takes_its_default_and_a_whole_number_serves_as_any() -> 
     [
         ([], "settings must be an object"),
         (None, "settings must be an object"),
-        ({"speed": 1}, "settings has no speed; it has count, inner, "),
-        ({"inner": {"b": 1, "a": 2}}, "settings.inner has no a, b; it has place_m, ratio"),
+        ({"speed": 1}, "settings has no speed, only count, inner, "),
+        ({"inner": {"b": 1, "a": 2}}, "settings.inner has no a, b, only place_m, ratio"),
         ({"inner": 3}, "settings.inner must be an object"),
         ({"inner": {"ratio": "1"}}, "settings.inner.ratio must be a finite number, not '1'"),
         ({"inner": {"ratio": True}}, "settings.inner.ratio must be a finite number, not 'True'"),
@@ -109,7 +109,7 @@ def test_what_is_absent_takes_its_default_and_a_whole_number_serves_as_any() -> 
         ({"is_on": 1}, "settings.is_on must be true or false, not '1'"),
         ({"kind": "c"}, "settings.kind must be one of a, b"),
         ({"kind": ["a"]}, "settings.kind must be one of a, b"),
-        ({"": 1}, "settings has no field without a name; it has count"),
+        ({"": 1}, "settings has no field without a name, only count"),
         ({"limit_s": "no"}, "settings.limit_s must be a finite number, not 'no'"),
     ],
 )
