@@ -302,7 +302,7 @@ def find_depth(listed: bytes, lens: Intrinsics) -> DepthFormat:
             (_name(group["DisplayName"]), _number(key), group["SourceInfos"]["0"])
             for key, group in groups.items()
         ]
-        depth = [one for one in cameras if "RealSense" in one[0] and one[0].endswith("Depth")]
+        depth = [camera for camera in cameras if re.search("RealSense.*Depth$", camera[0])]
         formats = [
             (rate_hz, DepthFormat(name, group, media, round(rate_hz / _RATE_HZ)))
             for name, group, source in depth

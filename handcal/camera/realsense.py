@@ -147,8 +147,8 @@ def depth_filter(settings: RealSenseSettings) -> Callable[[Any], Any]:
         filters.append(rs.hole_filling_filter())
 
     def apply(depth: Any) -> Any:
-        for one in filters:
-            depth = one.process(depth).as_depth_frame()
+        for step in filters:
+            depth = step.process(depth).as_depth_frame()
         return depth
 
     return apply

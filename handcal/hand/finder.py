@@ -116,7 +116,7 @@ class CoarseCloud:
         nearest = np.quantile(depth[inside], 0.1)
         near = depth < (1.0 + _OBJECT_DEPTH) * nearest
         wider = inside_box(px, color_box + np.concatenate([-wider_px, wider_px]))
-        filled, around = (np.count_nonzero(near & one) for one in (inside, wider & ~inside))
+        filled, around = (np.count_nonzero(near & part) for part in (inside, wider & ~inside))
         area = float(np.prod(color_box[2:] - color_box[:2])) / STEP_PX**2
         return bool(filled > max(_OBJECT_MIN * area, around / _AROUND_MAX))
 
@@ -256,7 +256,7 @@ class RoiFinder:
         self._wanted = segmenting.roi
         self._track: Track | None = None
         self._misses = 0
-        self._seen_ns: int | None = None
+        self._former_ns: int | None = None
         self._looked_ns: int | None = None
         self._chosen_ns = 0
 
@@ -265,10 +265,11 @@ class RoiFinder:
         if frame.color is None:
             return None
         now_ns = frame.t_camera_ns
-        if self._seen_ns is None or now_ns < self._seen_ns:
+        if self._former_ns is None or now_ns < self._former_ns:
             self._track = self._looked_ns = None  # a recording has started or restarted
-            self._seen_ns = now_ns
-        half_frame_ns, self._seen_ns = (now_ns - self._seen_ns) / 2, now_ns
+            self._former_ns = now_ns
+        # A look is taken in the frame nearest to its time, which may be half a frame early.
+        half_frame_ns, self._former_ns = (now_ns - self._former_ns) / 2, now_ns
         cloud = CoarseCloud(frame, self._gate_m)
         self._track = self._track and cloud.follow(self._track)
         wait_s = _SEARCH_S
@@ -281,7 +282,7 @@ class RoiFinder:
 
     def _look(self, color: UInt8, cloud: CoarseCloud, now_ns: int) -> None:
         """Run the detector to confirm the track, drop it, or start one."""
-        confirmed = self._track and self._confirm(self._track, color, cloud)
+        confirmed = self._track and self._confirm(self._track, color, cloud)[0]
         if confirmed is not None:
             self._track, self._misses = confirmed, 0
             is_due = now_ns - self._chosen_ns >= _CHOOSE_S * 1e9
@@ -301,29 +302,37 @@ class RoiFinder:
         A hand seen only in the whole image would soon be dropped and detected again.
         """
         height, width = color.shape[:2]
-        self.problem = _NOT_SEEN
-        hands = self._hands(color, (0, 0, width, height), None, cloud)
+        hands, problem = self._hands(color, (0, 0, width, height), None, cloud)
         least = _SURE_MIN * max((hand.score for hand in hands), default=0.0)
-        sure = sorted((hand for hand in hands if hand.score >= least), key=self._order)
-        confirmed = (self._confirm(hand, color, cloud) for hand in sure)
-        return next(filter(None, confirmed), None)
+        confirmed = None
+        for hand in sorted((hand for hand in hands if hand.score >= least), key=self._order):
+            confirmed, doubt = self._confirm(hand, color, cloud)
+            problem = problem or doubt
+            if confirmed is not None:
+                break
+        self.problem = problem or _NOT_SEEN
+        return confirmed
 
-    def _confirm(self, track: Track, color: UInt8, cloud: CoarseCloud) -> Track | None:
-        """Return the track as updated by the detector; None if it sees no hand there."""
+    def _confirm(
+        self, track: Track, color: UInt8, cloud: CoarseCloud
+    ) -> tuple[Track | None, HandError | None]:
+        """Return the track as updated by the detector, or why it sees no hand there, if known."""
         part = cloud.surroundings(track, _CHECK_MARGIN)
-        hands = self._hands(color, part, _CHECK_PIXELS, cloud)
-        return next((hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP), None)
+        hands, problem = self._hands(color, part, _CHECK_PIXELS, cloud)
+        same = (hand for hand in hands if _overlap(hand, track) >= _SAME_OVERLAP)
+        return next(same, None), problem
 
     def _hands(
         self, color: UInt8, part: Box, pixels: int | None, cloud: CoarseCloud
-    ) -> list[Track]:
-        """Return the plausible hands detected in a part of the image."""
+    ) -> tuple[list[Track], HandError | None]:
+        """Return the plausible hands in a part of the image, and why the surest other is none."""
         x0, y0, x1, y1 = part
-        found = self._detector.detect(color[y0:y1, x0:x1], pixels)
-        boxes = found.boxes_px + np.array([x0, y0, x0, y0])
+        detections = self._detector.detect(color[y0:y1, x0:x1], pixels)
+        boxes = detections.boxes_px + np.array([x0, y0, x0, y0])
         hands: list[Track] = []
         beyond: list[Float64] = []
-        for box, score in zip(boxes, found.scores, strict=True):
+        first_problem: HandError | None = None
+        for box, score in zip(boxes, detections.scores, strict=True):
             if any(inside_box(center(box)[None], other).any() for other in beyond):
                 continue  # a part of that hand
             hand = cloud.track(box, float(score))
@@ -331,11 +340,10 @@ class RoiFinder:
             if hand is None or problem is not None:
                 if isinstance(problem, OutOfViewError):
                     beyond.append(box)
-                if self.problem is _NOT_SEEN and problem is not None:  # that of the surest
-                    self.problem = problem
+                first_problem = first_problem or problem  # the surest come first
             elif not any(_on_one_hand(hand, surer) for surer in hands):
                 hands.append(hand)
-        return hands
+        return hands, first_problem
 
     def _order(self, track: Track) -> float:
         if self._wanted in ("left", "right"):

@@ -76,7 +76,7 @@ _AT_M = np.asarray(
 )
 
 
-def arm_fit(
+def _arm_fit(
     from_palm_m: Float32,
     area_m2: Float32,
     at_end: Bool,
@@ -88,12 +88,8 @@ def arm_fit(
 
     It is that of all places of the wrist together, in units of the palm's size: a limb that begins
     with a forearm does not become narrower, and then suddenly wider. NaN if the axis points along
-    the line of sight, so that nothing behind the palm is seen in its width.
-
-    Parameters
-    ----------
-    from_palm_m, area_m2, at_end, palm_m, palm_radius_m, axis
-        See `find_wrist_m`.
+    the line of sight, so that nothing behind the palm is seen in its width. The parameters are
+    those of `find_wrist_m`.
     """
     cosine = _cosine(axis, palm_m)
     if cosine <= _LEAST_COS:
@@ -109,7 +105,7 @@ def arm_fit(
     return float(np.log(likely.sum() + _NEVER))
 
 
-def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
+def _box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
     """Return the distance from the palm along the axis to the side of a box in the image."""
     camera = view.camera
     sides = (
@@ -121,7 +117,7 @@ def box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> flo
     rates = [float(axis[k] - tangent * axis[2]) for k, tangent in sides]
     gaps_m = [float(tangent * palm_m[2] - palm_m[k]) for k, tangent in sides]
     exits_m = (gap / rate for gap, rate in zip(gaps_m, rates, strict=True) if abs(rate) > 1e-6)
-    return min((one for one in exits_m if one > 0.0), default=np.inf)
+    return min((exit_m for exit_m in exits_m if exit_m > 0.0), default=np.inf)
 
 
 def find_wrist_m(
@@ -460,7 +456,7 @@ def _locate_within(
 
 def _are_one(located: LocatedHand, other: LocatedHand) -> bool:
     """Return whether two results in one image are the same hand."""
-    areas = [np.count_nonzero(one.hand) for one in (located, other)]
+    areas = [np.count_nonzero(hand.hand) for hand in (located, other)]
     apart_m = float(np.linalg.norm(located.palm_m - other.palm_m))
     return apart_m < _ONE_HAND_M and bool(min(areas) > (1.0 - _ONE_HAND_AREA) * max(areas))
 
@@ -625,7 +621,7 @@ def _locate_on(
         palm_m, palm_radius_m = _palm(limb, likely)
         axis = _axis(points_m - palm_m[:, None], area_m2, _arm_end(limb) - palm_m)
     from_palm_m = points_m - palm_m[:, None]
-    exit_m = np.inf if box is None else box_exit_m(limb.view, box, palm_m, axis)
+    exit_m = np.inf if box is None else _box_exit_m(limb.view, box, palm_m, axis)
     wrist_m, wrist_sigma_m = find_wrist_m(
         from_palm_m, area_m2, limb.at_end, palm_m, palm_radius_m, axis, exit_m
     )
@@ -664,7 +660,7 @@ def _hand_end(limb: _Limb, area_m2: Float32) -> tuple[Float32, float, Float32, f
         palm_m, radius_m = _palm(limb, likely.astype(np.float32))
         from_palm_m = points_m - palm_m[:, None]
         axis = _axis(from_palm_m, area_m2, end_m - palm_m)
-        fit = arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
+        fit = _arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
         found.append((palm_m, radius_m, axis))
         scores.append((fit, _THICKER * float(np.log(thickness_m))))
     fits, thicker = np.subtract(scores[0], scores[1]).clip(-_COUNTS, _COUNTS).tolist()

@@ -64,7 +64,7 @@ def _convert(kind: Any, value: object, where: str) -> Any:
     if origin in (Union, types.UnionType):
         if value is None and type(None) in choices:
             return None
-        texts = [text for one in choices if get_origin(one) is Literal for text in get_args(one)]
+        texts = [text for kind in choices if get_origin(kind) is Literal for text in get_args(kind)]
         if isinstance(value, str) and value in texts:
             return value
         return _convert(

@@ -8,7 +8,7 @@ movement and growth that would make them coincide.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -151,7 +151,7 @@ class SimulatedVerification:
         self._looks += 1
         if self._looks > _MOST_LOOKS:
             return
-        mean = np.mean([[one.right_arcmin, one.down_arcmin, one.size] for one in self._samples], 0)
+        mean = np.mean([astuple(sample) for sample in self._samples], axis=0)
         presses = presses_for(SeenDifference(*mean.tolist()), self._error, self.request)
         steps = self.request.step_arcmin, self.request.step_arcmin, self.request.step_size
         for axis, (whole, step) in enumerate(zip(presses, steps, strict=True)):
@@ -171,7 +171,7 @@ def presses_for(
         seen.size + error.size,
     )
     right, down, size = (
-        step * round(one / step) if abs(one) > _CONTENT_STEPS * step else 0.0
-        for one, step in zip(wanted, steps, strict=True)
+        step * round(move / step) if abs(move) > _CONTENT_STEPS * step else 0.0
+        for move, step in zip(wanted, steps, strict=True)
     )
     return right, down, size
