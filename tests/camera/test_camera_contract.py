@@ -174,12 +174,3 @@ def test_a_camera_tells_which_device_it_is(open_camera: OpenCamera) -> None:
         others[f"{NAME} on the HoloLens 2 at 127.0.0.1"] = CameraIdentity("Intel RealSense D415")
         others["HoloLens 2 AHAT at 127.0.0.1"] = CameraIdentity("HoloLens 2 AHAT")
         assert camera.identity == others.get(camera.name, D415)
-
-
-@pytest.mark.parametrize("name", ["0925_012.bag", "0925_015.bag"])
-def test_a_recording_by_a_real_camera_names_it(shared_data: Path, name: str) -> None:
-    pytest.importorskip("pyrealsense2")
-    with open_recording(shared_data / "recordings" / name) as camera:
-        assert camera.identity == CameraIdentity(
-            "Intel RealSense D435", "817512071792", "05.11.06.250"
-        )

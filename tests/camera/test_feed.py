@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 
 from handcal.camera.feed import CameraFeed
-from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
-from handcal.core.types import CameraIdentity, Float32, Frame, Intrinsics
-from handcal.io.closable import Closable
+from handcal.core.errors import CameraEndError, CameraError
+from handcal.core.types import Float32, Frame
+from tests.camera.stand_ins import SILENT, UNPLUGGED, Scripted
 
-CAMERA = Intrinsics(8, 6, 10.0, 10.0, 3.5, 2.5)
 REOPEN_S = 0.05
-UNPLUGGED = CameraError("the camera was unplugged; plug it in again")
-SILENT = CameraTimeoutError("nothing came")
 
 
 @pytest.fixture(autouse=True)
@@ -22,28 +19,6 @@ def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("handcal.camera.feed._READ_S", 0.01)
     monkeypatch.setattr("handcal.camera.feed._SILENT_S", 0.03)
     monkeypatch.setattr("handcal.camera.feed._REOPEN_S", REOPEN_S)
-
-
-class Scripted(Closable):
-    """Gives what its script says, a frame for a number."""
-
-    name = "Scripted camera"
-    identity = CameraIdentity()
-    depth_intrinsics = CAMERA
-
-    def __init__(self, script: Sequence[int | Exception]) -> None:
-        self.script = list(script)
-        self.is_closed = False
-
-    def read(self, timeout_s: float = 1.0) -> Frame:
-        step = self.script.pop(0) if self.script else SILENT
-        if isinstance(step, Exception):
-            time.sleep(timeout_s if isinstance(step, CameraTimeoutError) else 0.0)
-            raise step
-        return Frame(step, step, step, np.zeros((6, 8), np.uint16), 1e-3, CAMERA)
-
-    def close(self) -> None:
-        self.is_closed = True
 
 
 def opener(*scripts: Sequence[int | Exception]) -> tuple[Callable[[], Scripted], list[Scripted]]:

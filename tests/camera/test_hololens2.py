@@ -138,25 +138,6 @@ def test_a_small_hand_tells_a_large_far_wall_apart() -> None:
     assert white_brightness(np.zeros_like(distance_m), brightness) == 0.0
 
 
-def test_a_mirror_is_forgotten(
-    serve: Serve, held_up: tuple[World, UInt16, UInt16], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("handcal.camera.hololens2._FADING", 0.3)  # within a few images
-    _, distance, brightness = held_up
-    mirror = brightness.copy()
-    mirror[:60, :60] = 30_000
-    near = np.where(mirror == 30_000, 500, distance).astype(np.uint16)
-    is_there = True
-    hand, dazzled = (
-        packet_of(5, ahat_payload(*images), T_W_H)
-        for images in ((distance, brightness), (near, mirror))
-    )
-    with HoloLens2Camera(serve(lambda: dazzled if is_there else hand)) as camera:
-        assert not camera.read(5.0).depth[200:300, 220:290].any()
-        is_there = False
-        eventually(lambda: camera.read(5.0).depth[200:300, 220:290].any(), 20.0)
-
-
 def test_a_plane_is_flat_up_to_the_sides(serve: Serve) -> None:
     plane = sensed(np.full((720, 720), 0.45, np.float32), 0.5, noise=0.0, blur_px=0.1)
     frame = view(serve(packet_of(5, ahat_payload(*plane), T_W_H)))

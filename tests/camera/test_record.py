@@ -3,57 +3,26 @@
 from __future__ import annotations
 
 import shutil
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from handcal.camera.record import Recorded, RecordSettings, record
 from handcal.camera.recordings import open_recording
 from handcal.core.errors import CameraEndError, CameraError, CameraTimeoutError
 from handcal.core.progress import Progress
-from handcal.core.types import CameraIdentity, Frame, Intrinsics
-from handcal.io.closable import Closable
+from handcal.core.types import Frame
+from tests.camera.stand_ins import PALE, UNPLUGGED, Scripted
 
-CAMERA = Intrinsics(16, 12, 20.0, 20.0, 7.5, 5.5)
 SETTINGS = RecordSettings()
-PALE = "a frame without colour"
-UNPLUGGED = CameraError("the camera was unplugged; plug it in again")
 
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("handcal.camera.record._SILENT_S", 0.1)
     monkeypatch.setattr("handcal.camera.record._FREE_BYTES", 0)
-
-
-class Scripted(Closable):
-    """Gives what its script says: a frame for a number, and silence at the end."""
-
-    name = "Scripted camera"
-    identity = CameraIdentity()
-    depth_intrinsics = CAMERA
-
-    def __init__(self, script: Sequence[int | str | Exception]) -> None:
-        self.script = list(script)
-        self.number = 0
-
-    def read(self, timeout_s: float = 1.0) -> Frame:
-        step = self.script.pop(0) if self.script else CameraTimeoutError("no frame came")
-        if isinstance(step, Exception):
-            time.sleep(0.05)
-            raise step
-        self.number = step if isinstance(step, int) else self.number + 1
-        color = np.full((12, 16, 3), self.number, np.uint8)
-        depth = np.full((12, 16), self.number, np.uint16)
-        frame = Frame(self.number, self.number * 100_000_000, 0, depth, 1e-3, CAMERA, color, CAMERA)
-        return frame if step != PALE else replace(frame, color=None, color_intrinsics=None)
-
-    def close(self) -> None:
-        pass
 
 
 def run(

@@ -94,15 +94,6 @@ def test_compressed_images_and_ros_1_are_played_alike(
         assert camera.notes == ()
 
 
-@pytest.mark.parametrize("name", ["raw_depth_compressed_colour", "compressed_depth_and_colour"])
-def test_compressed_topics_of_others_are_played_with_colour(shared_data: Path, name: str) -> None:
-    with open_recording(shared_data / "field" / "ros" / name) as camera:
-        for _ in range(3):
-            assert camera.read().color is not None
-        with pytest.raises(CameraEndError):
-            camera.read()
-
-
 def test_compressed_metres_are_a_over_value_minus_b(tmp_path: Path) -> None:
     metres = np.array([[np.nan, 0.4, 0.5, 0.6], [0.7, 0.8, 1, 2], [0.3, 0.5, 0.5, 3]], "<f4")
     message = compressed(image(2, "depth", "32FC1", metres), 2_000.0, 9.0)
@@ -161,11 +152,6 @@ def test_metres_become_tenths_of_a_millimetre(tmp_path: Path) -> None:
     assert frame.depth_scale_m == 1e-4
     wanted = [[0, 0, 0, 0], [5000, 65000, 0, 0], [10000, 20000, 30000, 40000]]
     assert frame.depth.tolist() == wanted
-
-
-def test_rows_may_be_padded_and_big_endian(tmp_path: Path) -> None:
-    padded = image(2, "depth", "16UC1", GRAY.astype(">u2"), pad_bytes=6)
-    assert np.array_equal(play(tmp_path, [INFO, (DEPTH, 2, padded)]).depth, GRAY)
 
 
 def test_blue_first_colours_are_turned_and_the_nearest_in_time_taken(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, rigid, transform
-from handcal.core.types import Bool, DepthEdges, Float64, Frame, HandCloud, Intrinsics, UInt8
+from handcal.core.types import Bool, DepthEdges, Float64, HandCloud, Intrinsics
 from handcal.hand import outline
 from handcal.hand.outline import (
     contour_px,
@@ -97,17 +97,6 @@ def test_a_cut_stays_where_the_arm_continues() -> None:
     assert np.hypot(*move_px.T).max() <= 2.0 + 1e-6
 
 
-def test_too_short_a_contour_is_left_alone() -> None:
-    contour_m = star()[:2]
-    np.testing.assert_array_equal(moved_inward(contour_m, 2.0), contour_m)
-
-
-def test_normals_of_a_circle_point_to_its_middle() -> None:
-    place_px = on_image(star(600, 100.0, 0.0))
-    inward = inward_normals(place_px)
-    np.testing.assert_allclose(inward, -place_px / 100.0, atol=1e-6)
-
-
 def drawn_beside_truth(
     fatten_px: int, edges: DepthEdges, **photographed: Any
 ) -> tuple[Difference, list[HandCloud]]:
@@ -176,16 +165,6 @@ def test_color_that_tells_nothing_changes_nothing() -> None:
         assert drawn.outline_sigma_px == TYPICAL.sigma_px
 
 
-def test_what_is_registered_stays_as_measured() -> None:
-    cloud, frame, _, _ = fat_hand(0, 2)
-    drawn = with_outline(cloud, frame, DepthEdges(2.0, 0.2, "measured"))
-    assert drawn.contour_m is not drawn.outline_m
-    np.testing.assert_array_equal(drawn.contour_m, cloud.contour_m)
-    np.testing.assert_array_equal(drawn.points_m, cloud.points_m)
-    np.testing.assert_array_equal(cloud.outline_m, cloud.contour_m)
-    np.testing.assert_array_equal(cloud.outline_is_cut, cloud.contour_is_cut)
-
-
 _STEP_M = 0.001
 # Wrist, three fingers of 4 cm, 2 cm apart, and back.
 _CORNERS_M = 0.01 * np.column_stack(
@@ -240,12 +219,6 @@ def test_without_an_arm_nothing_is_marked(is_cut: bool) -> None:
     assert not len(outline_marks(outline_m, np.full_like(cut, is_cut)))
 
 
-def test_points_may_be_repeated() -> None:
-    outline_m, is_cut = comb()
-    marks_m = outline_marks(outline_m.repeat(3, axis=0), is_cut.repeat(3))
-    assert np.isfinite(marks_m).all()
-
-
 @given(st.lists(st.integers(0, 30), min_size=1, max_size=40, unique=True))
 def test_tips_are_the_prominent_peaks(heights: list[int]) -> None:
     reach_m = 0.005 * np.array(heights)  # no difference is near the limit
@@ -261,10 +234,6 @@ def test_tips_are_the_prominent_peaks(heights: list[int]) -> None:
 
 
 LENS = (0.1, -0.2, 0.001, -0.002, 0.05)
-
-
-def black(camera: Intrinsics) -> UInt8:
-    return np.zeros((camera.height, camera.width, 3), np.uint8)
 
 
 def test_the_contour_lies_on_the_mask_s_border(shot: Shot) -> None:
@@ -285,24 +254,14 @@ def test_a_lens_moves_the_contour_back_to_its_pixels(shot: Shot) -> None:
     np.testing.assert_allclose(depth_px, np.rint(depth_px), atol=0.02)
 
 
-def test_an_aligned_colour_image_has_it_at_the_same_pixels(shot: Shot) -> None:
-    frame = replace(shot.frame, color=black(SHOT_CAMERA), color_intrinsics=SHOT_CAMERA)
-    depth_px, color_px = contour_px(segment_hand(frame, SegmentSettings()), frame)
-    assert color_px is not None
-    np.testing.assert_allclose(color_px, depth_px)
-
-
-def test_a_colour_camera_beside_the_depth_camera_sees_it_shifted(shot: Shot) -> None:
-    beside_m = 0.015
-    frame = with_color(shot.frame, beside_m)
+@pytest.mark.parametrize("beside_m", [0.0, 0.015])
+def test_a_colour_camera_sees_the_contour_shifted_by_its_place(shot: Shot, beside_m: float) -> None:
+    color = np.zeros((SHOT_CAMERA.height, SHOT_CAMERA.width, 3), np.uint8)
+    T_C_D = rigid(translation_m=[beside_m, 0.0, 0.0])
+    frame = replace(shot.frame, color=color, color_intrinsics=SHOT_CAMERA, T_C_D=T_C_D)
     cloud = segment_hand(frame, SegmentSettings())
     depth_px, color_px = contour_px(cloud, frame)
     assert color_px is not None
     disparity_px = SHOT_CAMERA.fx * beside_m / cloud.contour_m[:, 2]
     np.testing.assert_allclose(color_px[:, 0] - depth_px[:, 0], disparity_px, atol=1e-3)
     np.testing.assert_allclose(color_px[:, 1], depth_px[:, 1], atol=1e-3)
-
-
-def with_color(frame: Frame, beside_m: float) -> Frame:
-    T_C_D = rigid(translation_m=[beside_m, 0.0, 0.0])
-    return replace(frame, color=black(SHOT_CAMERA), color_intrinsics=SHOT_CAMERA, T_C_D=T_C_D)

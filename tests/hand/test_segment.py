@@ -86,15 +86,6 @@ def test_points_lie_on_the_true_surface(shot: Shot) -> None:
     assert (cloud.t_camera_ns, cloud.t_host_ns) == (1_000, 2_000)
 
 
-def test_points_are_spread_evenly_and_the_same_each_time(shot: Shot) -> None:
-    cloud = segment_hand(shot.frame, SETTINGS)
-    again = segment_hand(shot.frame, SETTINGS)
-    np.testing.assert_array_equal(cloud.points_m, again.points_m)
-    few = segment_hand(shot.frame, SegmentSettings(points=500))
-    assert abs(len(few.points_m) - 500) < 25
-    np.testing.assert_allclose(few.points_m.mean(0), cloud.points_m.mean(0), atol=0.001)
-
-
 def test_only_the_wrist_is_marked_as_cut(shot: Shot) -> None:
     cloud = segment_hand(shot.frame, SETTINGS)
     beyond_m = shot.beyond_wrist_m(cloud.contour_m)

@@ -98,25 +98,20 @@ def test_an_exact_outline_leaves_no_gap_and_asks_for_nothing(
     assert abs(found.size) < 1e-3
 
 
-@pytest.mark.parametrize("moved", [(4.0, 0.0), (-4.0, 0.0), (0.0, 4.0), (0.0, -4.0)])
-def test_a_moved_outline_is_found_as_such(
-    hand: HandModel, rim_m: Float64, moved: tuple[float, float]
+@pytest.mark.parametrize(
+    "change",
+    [(4.0, 0.0, 0.0), (-4.0, 0.0, 0.0), (0.0, 4.0, 0.0), (-12.0, 9.0, 0.0), (0.0, 0.0, 0.01)],
+)
+def test_a_moved_or_grown_outline_is_found_as_such(
+    hand: HandModel, rim_m: Float64, change: tuple[float, float, float]
 ) -> None:
     """The movement back would make it fit."""
-    found = seen(hand, altered(rim_m, *moved))
+    found = seen(hand, altered(rim_m, *change))
     assert found is not None
-    np.testing.assert_allclose((found.right_arcmin, found.down_arcmin), -np.array(moved), atol=0.4)
-    assert abs(found.size) < 1e-3
-
-
-@pytest.mark.parametrize("size", [0.01, -0.01])
-def test_a_grown_outline_is_found_as_such(hand: HandModel, rim_m: Float64, size: float) -> None:
-    found = seen(hand, altered(rim_m, size=size))
-    assert found is not None
-    assert found.size == pytest.approx(-size, abs=1e-3)
-    assert abs(found.right_arcmin) < 0.4
+    assert found.right_arcmin == pytest.approx(-change[0], abs=0.6)
     # The middle of the line is not that of what is compared, so that growth moves a little.
-    assert abs(found.down_arcmin) < 1.5
+    assert found.down_arcmin == pytest.approx(-change[1], abs=1.5 if change[2] else 0.6)
+    assert found.size == pytest.approx(-change[2], abs=1e-3)
 
 
 @pytest.mark.parametrize("away_m", [(0.006, -0.004, 0.012), (-0.006, 0.004, -0.03)])
@@ -223,17 +218,3 @@ def test_an_inner_rim_of_the_hand_is_no_silhouette(hand: HandModel) -> None:
     sight = eye_m - rim.points_m
     sight /= np.linalg.norm(sight, axis=1)[:, None]
     assert np.abs(np.einsum("ij,ij->i", rim.normals, sight)).max() < 0.1
-
-
-def test_a_view_is_of_the_true_eye_and_not_of_the_drawn_one(
-    hand: HandModel, rim_m: Float64
-) -> None:
-    """A drawing for an eye 1 mm farther right is too far left: the hand is before the display."""
-    display, drawn = RIG.eyes["left"], drawn_with("left", TRUE_M + np.array([0.001, 0.0, 0.0]))
-    outline_W_m = to_W("left", rim_m)
-    found = see_difference(display, TRUE_M, drawn, T_W_H, hand, pose_W("left"), outline_W_m)
-    assert found is not None
-    depth_m = float(np.mean(rim_m[:, 2] + TRUE_M[2]))
-    expected_arcmin = 60.0 * np.degrees(0.001 * (1.0 / depth_m - 1.0 / display.z_C0_S_m))
-    assert found.right_arcmin == pytest.approx(expected_arcmin, abs=0.4)
-    assert abs(found.down_arcmin) < 0.4
