@@ -86,7 +86,7 @@ _Steps: TypeAlias = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _ColorEdge:
+class ColorEdge:
     """The edge in colour beside a contour."""
 
     inward_px: Float64
@@ -98,12 +98,23 @@ class _ColorEdge:
     show the same place or time."""
 
 
-def _find_color_edge(
+def find_color_edge(
     frame: Frame, contour_m: Float64, inward_m: Float64, px_m: float, expected_px: float
-) -> _ColorEdge:
-    """Find the hand's edge in colour beside a closed contour (N, 3), in order, in frame D.
+) -> ColorEdge:
+    """Find the hand's edge in colour beside the border of its mask.
 
-    The inward normals are as long as a pixel of the depth image is wide there, `px_m`.
+    Parameters
+    ----------
+    frame : Frame
+        With colour.
+    contour_m : (N, 3) float64
+        Closed, in order, in frame D.
+    inward_m : (N, 3) float64
+        Normals of the contour, as long as a pixel of the depth image is wide.
+    px_m : float
+        That width.
+    expected_px : float
+        Where the edge is expected, inward from the contour.
     """
     stride = -(-len(contour_m) // _MOST_RAYS)
     chosen = np.arange(0, len(contour_m), stride)
@@ -122,7 +133,7 @@ def _find_color_edge(
     found_px = inward_px[path]
     at_ends = is_told & ((path < _MARGIN) | (path >= len(edges) - _MARGIN))
     at, turn = np.arange(len(contour_m)), len(contour_m)
-    return _ColorEdge(
+    return ColorEdge(
         np.interp(at, chosen, found_px, period=turn),
         np.interp(at, chosen, is_told.astype(np.float64), period=turn) > 0.5,
         float(at_ends.sum() / max(1, is_told.sum())),
@@ -338,7 +349,7 @@ def _to_color_edge(
     camera = frame.depth_intrinsics
     place_px = _places_px(contour_m, camera)
     to_smooth_px = _smoothed(place_px, _STEP_SMOOTH_PX) - place_px
-    edge = _find_color_edge(
+    edge = find_color_edge(
         frame,
         contour_m + _in_space_m(contour_m, camera, to_smooth_px),
         _in_space_m(contour_m, camera, inward),
