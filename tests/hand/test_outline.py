@@ -151,6 +151,14 @@ def test_an_eye_below_the_camera_sees_the_outline_on_the_silhouette() -> None:
     assert np.mean([one.down_px for one in at_the_border]) < -0.6
 
 
+def test_color_of_another_moment_is_not_followed() -> None:
+    cloud, frame, _, _ = fat_hand(1, 2, (40, 110, 50))
+    assert frame.color is not None
+    moved = replace(frame, color=np.roll(frame.color, 6, axis=1))
+    assert with_outline(cloud, moved, TYPICAL).outline_sigma_px == TYPICAL.sigma_px
+    assert with_outline(cloud, frame, TYPICAL).outline_sigma_px < TYPICAL.sigma_px
+
+
 def test_color_that_tells_nothing_changes_nothing() -> None:
     cloud, frame, _, _ = fat_hand(1, 2, SKIN)
     without = with_outline(cloud, replace(frame, color=None, color_intrinsics=None), TYPICAL)
