@@ -9,7 +9,8 @@ import numpy as np
 
 from handcal.core.geometry import invert, rigid, transform
 from handcal.core.types import Bool, Float64, Frame, HandCloud, Intrinsics, UInt8
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import D415, draw_hand

@@ -84,7 +84,7 @@ from handcal.core.types import (
     HeadsetIdentity,
     Verification,
 )
-from handcal.hand.marks import outline_marks
+from handcal.hand.outline import outline_marks
 from handcal.link.nudges import VerifyRequest
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer, Nudge

@@ -12,8 +12,7 @@ from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import HandError, PoseError
 from handcal.core.types import CameraIdentity, Frame, HandCloud, Rig
-from handcal.hand.edges import edges_of
-from handcal.hand.outline import with_outline
+from handcal.hand.outline import edges_of, with_outline
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
 

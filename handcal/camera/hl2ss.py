@@ -8,6 +8,8 @@ calibration     mode u8 = 2
 AHAT            mode u8 = 1, divisor u8, depth profile u8 = 0 (as the brightness), profile u8 = 255
                 (raw), level u8 = 255, bit rate u32 = 0, number of encoder options u8 = 0
 long throw      mode u8 = 1, divisor u8, filter of the PNG u32 = 0
+colour (PV)     mode u8 = 1, width u16, height u16, images per second u8, divisor u8, profile u8 =
+                255 (raw), level u8 = 255, bit rate u32 = 0, number of options u8 = 0
 ==============  ==================================================================================
 
 The calibration is an array of float32: x, then y of every pixel's ray in the plane z = 1, by rows;
@@ -20,13 +22,21 @@ Transforms are for row vectors, in WinRT's axes (x right, y up, z back) except t
 are OpenCV's. The payload of AHAT is two u32, 0 and the size of the images, distance u16 and
 brightness u16 by rows, and a time u64; that of long throw is a PNG of 4 channels, whose bytes are
 the same two images, and a time u64.
+
+Colour is that of the front camera. The client first sends, on a separate connection, mode u8 = 7
+(start) and the options of mixed reality capture: seven u8, opacity, width and height f32, two u32.
+All are 0: plain pictures. To end, it sends mode u8 = 11. The payload is NV12 with rows of a
+multiple of 64 bytes, and 80 bytes: focal lengths and principal point, four f32 in px, values of the
+exposure that are not used here, width u16 and height u16. The pose is that of the camera itself.
 """
 
 from __future__ import annotations
 
 import socket
 import struct
+import threading
 import time
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -37,8 +47,9 @@ from numpy.typing import NDArray
 
 from handcal.core.conventions import opengl_transform
 from handcal.core.errors import CameraError, CameraTimeoutError, FileError
+from handcal.core.frozen import freeze
 from handcal.core.geometry import invert, is_rigid
-from handcal.core.types import Float32, Float64, UInt16
+from handcal.core.types import Float32, Float64, Intrinsics, UInt8, UInt16
 from handcal.io.closable import Closable
 from handcal.io.images import PNG_START, decode_image
 
@@ -204,8 +215,7 @@ class Hl2ssConnection(Closable):
                 raise CameraError(f"the connection to hl2ss at {self._where} broke") from error
             if not arrived:
                 raise CameraError(
-                    f"hl2ss at {self._where} ended the stream",
-                    "one program at a time can read it",
+                    f"hl2ss at {self._where} ended the stream: one program at a time can read it"
                 )
             self._data += arrived
 
@@ -302,4 +312,158 @@ def foreign(stream: Stream, found: str) -> CameraError:
     return CameraError(
         f"this is not the {stream.name} stream of a known hl2ss: {found}",
         "install hl2ss of May 2025 or newer on the HoloLens",
+    )
+
+
+_POLL_S = 0.2
+_KEPT = 4
+
+
+class NewestPackets(Closable):
+    """The newest packets of a stream, received by a thread of its own: older ones are dropped."""
+
+    def __init__(self, connection: Hl2ssConnection, stream: Stream) -> None:
+        self._connection = connection
+        self._stream = stream
+        self._packet: tuple[int, int, bytes] | None = None
+        self._recent: deque[bytes] = deque(maxlen=_KEPT)
+        self._error: CameraError | None = None
+        self._is_closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._receive, name="hl2ss", daemon=True)
+        self._thread.start()
+
+    def take(self, name: str, timeout_s: float) -> tuple[int, int, bytes]:
+        """Return number, time of arrival on the host's clock, and data of the newest packet.
+
+        Raises
+        ------
+        CameraTimeoutError
+            If there is no new one in time.
+        CameraError
+            If the stream has ended.
+        """
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._packet or self._error or self._is_closed, timeout_s
+            )
+            if self._is_closed:
+                raise CameraError(f"{name} is closed", "open it again")
+            if self._packet is not None:
+                packet, self._packet = self._packet, None
+                return packet
+            if self._error is not None:
+                raise self._error
+        raise CameraTimeoutError(
+            f"{name} sent no image for {timeout_s:g} s",
+            "put the headset on, and keep hl2ss running",
+        )
+
+    def recent(self) -> list[bytes]:
+        """Return the last few packets; CameraError if the stream has ended."""
+        with self._changed:
+            if self._error is not None:
+                raise self._error
+            return list(self._recent)
+
+    def close(self) -> None:
+        """End the stream; safe to call twice."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+        self._connection.close()
+        self._thread.join()
+
+    def _receive(self) -> None:
+        number = 0
+        while not self._is_closed:
+            try:
+                data = self._connection.receive_packet(self._stream, _POLL_S)
+            except CameraTimeoutError:
+                continue
+            except CameraError as error:
+                with self._changed:
+                    self._error = error
+                    self._changed.notify_all()
+                return
+            number += 1
+            with self._changed:
+                self._packet = number, time.monotonic_ns(), data
+                self._recent.append(data)
+                self._changed.notify_all()
+
+
+WIDTH_PX, HEIGHT_PX = 640, 360
+_COLOR_SIZE = WIDTH_PX, HEIGHT_PX
+_COLOR_HZ = 15
+_STRIDE_PX = (WIDTH_PX + 63) // 64 * 64
+_ABOUT_BYTES = 80
+_COLOR_BYTES = _STRIDE_PX * HEIGHT_PX * 3 // 2 + _ABOUT_BYTES
+_START_COLOR = struct.pack("<B7B3f2I", 7, *7 * (0,), 0.0, 0.0, 0.0, 0, 0)
+_STOP_COLOR = struct.pack("<B", 11)
+
+COLOR = Stream("colour", 3810, WIDTH_PX, HEIGHT_PX, False, (_COLOR_BYTES, _COLOR_BYTES))
+COLOR_REQUEST = struct.pack("<BHHBBBBIB", 1, WIDTH_PX, HEIGHT_PX, _COLOR_HZ, 1, 255, 255, 0, 0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColorPacket:
+    """One colour image."""
+
+    t_ns: int
+    """Time of its exposure on the headset's clock."""
+    image: UInt8
+    """(H, W, 3); RGB."""
+    intrinsics: Intrinsics
+    """Focus moves them; distortion is ignored."""
+    T_W_C: Float64
+    """(4, 4); the colour camera's pose."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "image", np.uint8, HEIGHT_PX, WIDTH_PX, 3)
+        freeze(self, "T_W_C", np.float64, 4, 4)
+
+
+def start_color(host: str, port: int) -> Hl2ssConnection:
+    """Switch the colour camera on, and return the connection on which its images come.
+
+    Raises
+    ------
+    CameraError
+        If nothing answers there.
+    """
+    Hl2ssConnection(host, port, _START_COLOR).close()
+    return Hl2ssConnection(host, port, COLOR_REQUEST)
+
+
+def stop_color(host: str, port: int) -> None:
+    """Switch the colour camera off; raises as `start_color`."""
+    Hl2ssConnection(host, port, _STOP_COLOR).close()
+
+
+def parse_color(data: bytes) -> ColorPacket | None:
+    """Return the contents of a packet; None if the headset did not know where it was.
+
+    Raises
+    ------
+    CameraError
+        If it is not one of this stream.
+    """
+    payload, about = (
+        data[12 : 12 + _COLOR_BYTES - _ABOUT_BYTES],
+        data[12 + _COLOR_BYTES - _ABOUT_BYTES :],
+    )
+    fx, fy, cx, cy = (float(value) for value in struct.unpack_from("<4f", about))
+    size = struct.unpack_from("<2H", about, _ABOUT_BYTES - 4)
+    is_camera = 100.0 < fx < 5000.0 and 100.0 < fy < 5000.0
+    if not is_camera or not 0.0 < cx < WIDTH_PX or not 0.0 < cy < HEIGHT_PX or size != _COLOR_SIZE:
+        raise foreign(COLOR, "no camera of the requested size")
+    T_W_C = pose_of(COLOR, data)
+    if T_W_C is None:
+        return None
+    rows = np.frombuffer(payload, np.uint8).reshape(HEIGHT_PX * 3 // 2, _STRIDE_PX)
+    nv12 = np.ascontiguousarray(rows[:, :WIDTH_PX])
+    image = np.asarray(cv2.cvtColor(nv12, cv2.COLOR_YUV2RGB_NV12), np.uint8)
+    return ColorPacket(
+        time_of(COLOR, data), image, Intrinsics(WIDTH_PX, HEIGHT_PX, fx, fy, cx, cy), T_W_C
     )

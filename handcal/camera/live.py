@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from handcal.camera.camera import Camera
-from handcal.camera.hl2ss_realsense import HoloLens2RealSense
-from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
+from handcal.camera.hololens2 import HoloLens2Camera, HoloLens2RealSense, hololens2_settings
 from handcal.camera.oak import OakCamera
 from handcal.camera.orbbec import OrbbecCamera
 from handcal.camera.settings import HoloLens2Settings

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from handcal.camera.folder import FolderCamera, record_folder
-from handcal.camera.image_folder import ImageFolderCamera, is_image_folder
+from handcal.camera.folder import FolderCamera, ImageFolderCamera, is_image_folder, record_folder
 from handcal.camera.playback import PlaybackSettings, PlayedCamera
-from handcal.camera.recording import RecordingCamera
+from handcal.camera.recording import RecordingCamera, record_db3
 from handcal.camera.ros import RosCamera, ros_recording
-from handcal.camera.sdk_recorder import record_db3
 from handcal.core.types import CameraIdentity, Frame
 
 RECORDING_SUFFIXES = (".db3", ".bag")

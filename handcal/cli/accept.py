@@ -112,8 +112,13 @@ def simulate(arguments: argparse.Namespace) -> None:
     from handcal.rig.example import example_rig
     from handcal.rig.formats import write_intrinsics
     from handcal.rig.rig_file import read_rig
-    from handcal.sim.acceptance import write_acceptance
-    from handcal.sim.photographs import BOARD, DEPTH_CAMERA, HEADSET_CAMERA, write_photographs
+    from handcal.sim.photographs import (
+        BOARD,
+        DEPTH_CAMERA,
+        HEADSET_CAMERA,
+        write_acceptance,
+        write_photographs,
+    )
 
     folder = make_folder(arguments.folder)
     if any(folder.iterdir()):

@@ -236,7 +236,7 @@ def open_source(
     from handcal.sim.hand import make_hand
     from handcal.sim.render import World
     from handcal.sim.room import make_room
-    from handcal.sim.sway import swaying_hand
+    from handcal.sim.scene import swaying_hand
 
     match source:
         case "simulator":

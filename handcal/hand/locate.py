@@ -17,18 +17,203 @@ from numpy.typing import NDArray
 from handcal.core.errors import HandError, OutOfViewError
 from handcal.core.types import Bool, Float32, Float64
 from handcal.hand.settings import NEARER_M, SegmentSettings
-from handcal.hand.surface import NEIGHBOURS, covered, goes_on, on_border, solid_surface
 from handcal.hand.view import (
+    NEIGHBOURS,
     Box,
     DepthView,
     Pixels,
     between,
+    covered,
     crop_view,
     deproject,
     gate_problem,
+    goes_on,
+    on_border,
     pixels_of,
+    solid_surface,
+    widened,
 )
-from handcal.hand.wrist import EDGE_RADIUS_M, FACING_RADIUS_M, arm_fit, box_exit_m, find_wrist_m
+
+_LEAST_COS = 0.5  # of the angle between the axis and the image plane
+# Where the wrist is expected along the axis, from the palm's centre: the palm is 95 to 120 mm long
+# (see the survey in locate.py), and an inscribed circle of 40 to 45 mm in radius touches its upper
+# end.
+_WRIST_M, _WRIST_SIGMA_M = 0.065, 0.02
+# Inscribed radius of a palm seen from its edge, and of one seen from the front. Seen from its edge
+# a hand is about as wide everywhere, so that neither the palm's centre nor the width says much.
+EDGE_RADIUS_M, FACING_RADIUS_M = 0.018, 0.034
+_SIGMA_MORE, _WIDTH_SCALE_MORE = 2.0, 2.0
+# A detector's box ends at the wrist or up to _BEHIND_M behind it, with these errors in the image.
+_BEYOND_BOX_M, _BEHIND_M, _BEHIND_SIGMA_M = 0.02, 0.03, 0.03
+# Weight of the places that the palm or the box rules out: both are sometimes mistaken.
+_MISTAKEN = 0.01
+# The limb's width along the axis, in bins of this size, smoothed; a place this much wider than
+# another is e times less likely the wrist.
+_BIN_M, _SMOOTH_M, _WIDTH_SCALE_M = 0.0025, 0.004, 0.006
+_PROFILE_M = (-0.035, 0.175)
+# A narrower limb is no arm, as a finger is 24 mm wide; but none reaches to the profile's end.
+_LIMB_WIDTH_M, _NOTHING_M = 0.03, 0.005
+# From the wrist to the elbow an arm widens, but slowly: nowhere behind the wrist is it this much
+# narrower, nor this much wider within so many bins. A wrist seen from its edge is 36 mm wide.
+_NARROWER_M, _WIDER_M, _SHORTLY, _WRIST_WIDTH_M = 0.01, 0.025, 16, 0.036
+_MISFIT_SCALE_M = 0.003  # a place that misses this by as much is e times less likely
+# Where the arm leaves the view it is cut off at an angle; where it ends in view it is rounded.
+_END_M, _ROUNDED_M = 0.005, 0.02
+# The surface of a wrist is this far from its middle, toward the camera. The narrowest place is this
+# far behind the wrist.
+_HALF_THICKNESS_M, _NARROWEST_M = 0.017, 0.004
+# An adult's palm has this inscribed radius. Which end of a limb is the hand is decided in units of
+# the palm found there, for hands of these sizes; its centre is the less certain.
+_USUAL_RADIUS_M, _SIZES, _FIT_SIGMA_M = 0.038, (0.5, 1.3), 0.03
+_NEVER = 1e-30
+
+_SMOOTHING = np.exp(-0.5 * (np.arange(-6, 7) * _BIN_M / _SMOOTH_M) ** 2)
+_SMOOTHING /= _SMOOTHING.sum()
+_BINS = round((_PROFILE_M[1] - _PROFILE_M[0]) / _BIN_M)
+_AT_M = np.asarray(
+    _PROFILE_M[0] + _BIN_M * (np.arange(_BINS - len(_SMOOTHING) + 1) + 0.5 * len(_SMOOTHING)),
+    np.float64,
+)
+
+
+def _arm_fit(
+    from_palm_m: Float32,
+    area_m2: Float32,
+    at_end: Bool,
+    palm_m: Float32,
+    palm_radius_m: float,
+    axis: Float32,
+) -> float:
+    """Return how well a limb fits a forearm behind a wrist behind a palm: the log of a likelihood.
+
+    It is that of all places of the wrist together, in units of the palm's size: a limb that begins
+    with a forearm does not become narrower, and then suddenly wider. NaN if the axis points along
+    the line of sight, so that nothing behind the palm is seen in its width. The parameters are
+    those of `find_wrist_m`.
+    """
+    cosine = _cosine(axis, palm_m)
+    if cosine <= _LEAST_COS:
+        return np.nan
+    size = float(np.clip(palm_radius_m / _USUAL_RADIUS_M, *_SIZES))
+    along_m = axis @ from_palm_m / np.float32(size)
+    width_m = _width_m(along_m, area_m2 / np.float32(size**2), cosine)
+    likely = _gaussian(_AT_M - _WRIST_M, _FIT_SIGMA_M) + _MISTAKEN
+    likely /= likely.sum()
+    misfit_m = _misfit_m(width_m, _AT_M, along_m[at_end])
+    likely *= np.exp(-width_m / _WIDTH_SCALE_M - misfit_m / _MISFIT_SCALE_M)
+    likely *= np.minimum(width_m / _WRIST_WIDTH_M, 1.0) ** 4
+    return float(np.log(likely.sum() + _NEVER))
+
+
+def _box_exit_m(view: DepthView, box: Box, palm_m: Float32, axis: Float32) -> float:
+    """Return the distance from the palm along the axis to the side of a box in the image."""
+    camera = view.camera
+    sides = (
+        (0, (box[0] - camera.cx) / camera.fx),
+        (1, (box[1] - camera.cy) / camera.fy),
+        (0, (box[2] - camera.cx) / camera.fx),
+        (1, (box[3] - camera.cy) / camera.fy),
+    )
+    rates = [float(axis[k] - tangent * axis[2]) for k, tangent in sides]
+    gaps_m = [float(tangent * palm_m[2] - palm_m[k]) for k, tangent in sides]
+    exits_m = (gap / rate for gap, rate in zip(gaps_m, rates, strict=True) if abs(rate) > 1e-6)
+    return min((exit_m for exit_m in exits_m if exit_m > 0.0), default=np.inf)
+
+
+def find_wrist_m(
+    from_palm_m: Float32,
+    area_m2: Float32,
+    at_end: Bool,
+    palm_m: Float32,
+    palm_radius_m: float,
+    axis: Float32,
+    exit_m: float,
+) -> tuple[float, float]:
+    """Return the distance of the wrist from the palm along the axis, and its standard deviation.
+
+    Infinite and zero without an arm. The standard deviation is infinite if the arm points along the
+    line of sight.
+
+    Parameters
+    ----------
+    from_palm_m : (3, N) float32
+        Points of the limb's surface relative to the palm's centre, camera frame.
+    area_m2 : (N,) float32
+        Of the points, across the line of sight.
+    at_end : (N,) bool
+        Where the surface continues out of view.
+    palm_m : (3,) float32
+    palm_radius_m : float
+    axis : (3,) float32
+        From the palm to the elbow.
+    exit_m : float
+        Where the axis leaves the detector's box; infinite without one.
+    """
+    along_m, at_m = axis @ from_palm_m, _AT_M
+    cosine = _cosine(axis, palm_m)
+    width_m = _width_m(along_m, area_m2, cosine)
+    if width_m[at_m > _WRIST_M].max() < _LIMB_WIDTH_M:
+        return np.inf, np.inf if width_m[-1] > _NOTHING_M else 0.0
+    edgewise = float(np.interp(palm_radius_m, (EDGE_RADIUS_M, FACING_RADIUS_M), (1.0, 0.0)))
+    likely = _gaussian(at_m - _WRIST_M, _WRIST_SIGMA_M * (1.0 + _SIGMA_MORE * edgewise)) + _MISTAKEN
+    likely *= _gaussian(np.maximum(at_m - exit_m, 0.0) * cosine, _BEYOND_BOX_M) + _MISTAKEN
+    if exit_m < np.inf:
+        before_m = np.maximum(exit_m - _BEHIND_M - at_m, 0.0) * cosine
+        likely *= _gaussian(before_m, _BEHIND_SIGMA_M) ** edgewise
+    likely *= np.exp(-width_m / (_WIDTH_SCALE_M * (1.0 + _WIDTH_SCALE_MORE * edgewise)))
+    likely *= np.exp(-_misfit_m(width_m, at_m, along_m[at_end]) / _MISFIT_SCALE_M)
+    likely *= np.minimum(width_m / _WRIST_WIDTH_M, 1.0) ** 4
+    likely /= max(float(likely.sum()), 1e-300)
+    wrist_m = float(likely @ at_m)
+    sigma_m = float(np.sqrt(likely @ (at_m - wrist_m) ** 2))
+    # The outline shows where the wrist's middle is; on the line of sight to it, the surface is
+    # nearer, and so elsewhere along the axis.
+    return (
+        wrist_m + _HALF_THICKNESS_M * _forward(axis, palm_m) / cosine - _NARROWEST_M,
+        sigma_m if cosine > _LEAST_COS else np.inf,
+    )
+
+
+def _forward(axis: Float32, palm_m: Float32) -> float:
+    """Return the cosine of the angle between the axis and the line of sight."""
+    return float(axis @ palm_m) / max(float(np.linalg.norm(palm_m)), 1e-9)
+
+
+def _cosine(axis: Float32, palm_m: Float32) -> float:
+    """Return the cosine of the angle between the axis and the image plane, at least one half."""
+    return max(_LEAST_COS, float(np.sqrt(max(0.0, 1.0 - _forward(axis, palm_m) ** 2))))
+
+
+def _width_m(along_m: Float32, area_m2: Float32, cosine: float) -> Float64:
+    """Return a limb's width at each place of the profile.
+
+    Seen at an angle, a limb's length is foreshortened, and so is its area.
+    """
+    place = np.floor((along_m - _PROFILE_M[0]) / _BIN_M).astype(int)
+    kept = (place >= 0) & (place < _BINS)
+    width_m = np.bincount(place[kept], area_m2[kept], _BINS) / (_BIN_M * cosine)
+    return np.convolve(width_m, _SMOOTHING, "valid")
+
+
+def _misfit_m(width_m: Float64, at_m: Float64, ends_m: Float32) -> Float64:
+    """Return by how much the limb behind each place differs from a forearm behind a wrist.
+
+    The difference is what it is narrower anywhere behind, and wider shortly behind, than a forearm
+    may be.
+    """
+    last_m = float(at_m[width_m > _NOTHING_M].max(initial=0.0)) - _ROUNDED_M
+    end_m = float(ends_m[ends_m > 0.0].min(initial=last_m)) - _END_M
+    is_arm = (at_m < end_m) & (width_m > _WRIST_WIDTH_M)
+    narrowest_m = np.minimum.accumulate(np.where(is_arm, width_m, np.inf)[::-1])[::-1]
+    widest_m = cv2.dilate(width_m, np.ones(_SHORTLY, np.uint8), anchor=(0, 0)).ravel()
+    misfit_m: Float64 = np.maximum(width_m - narrowest_m - _NARROWER_M, 0.0)
+    misfit_m += np.maximum(widest_m - width_m - _WIDER_M, 0.0)
+    return misfit_m
+
+
+def _gaussian(deviation_m: Float64, sigma_m: float) -> Float64:
+    return np.asarray(np.exp(-0.5 * (deviation_m / sigma_m) ** 2), np.float64)
+
 
 # Sizes of adult hands, with a margin (Gordon et al., 2012 Anthropometric Survey of U.S. Army
 # Personnel: hand breadth 68–100 mm, hand length 165–220 mm). Seen from its edge the inscribed
@@ -83,26 +268,25 @@ _ALONG_GATE_M, _BEYOND_MIN, _BEYOND_MAX = 0.008, 0.01, 0.5
 # Within and without the gate it is the same hand if neither palm nor area differs by more.
 _FAR_UNIT = 2.0  # with nothing nearer than so many times the gate's end its unit may be wrong
 _ONE_HAND_M, _ONE_HAND_AREA = 0.01, 0.03
+# What is wrong, and what to do about it.
+_TURN = "turn its palm or its back to the camera"
 _NOT_A_HAND = (
-    "what the detector takes for a hand is not shaped like one in the depth image; show the whole "
-    "bare hand, clear of other things"
+    "what the detector takes for a hand is not shaped like one in the depth image",
+    "show the whole bare hand, clear of other things",
 )
 _TOO_SMALL = (
-    "the hand is too small, or only a part of it is seen in the depth image; show the whole bare "
-    "hand, clear of other things"
+    "the hand is too small, or only a part of it is seen in the depth image",
+    "show the whole bare hand, clear of other things",
 )
-_SMALL_OR_FROM_EDGE = (
-    "the hand is smaller than a six-year-old's, or seen from its edge; turn its palm or its back "
-    "to the camera"
-)
-_FROM_EDGE = "the hand is seen from its edge; turn its palm or its back to the camera"
+_SMALL_OR_FROM_EDGE = "the hand is smaller than a six-year-old's, or seen from its edge", _TURN
+_FROM_EDGE = "the hand is seen from its edge", _TURN
 _EITHER_END = (
-    "the hand cannot be told from the arm in the depth image; turn its palm or its back to the "
-    "camera, spread the fingers, and show more of the arm"
+    "the hand cannot be told from the arm in the depth image",
+    f"{_TURN}, spread the fingers, and show more of the arm",
 )
 _NO_WRIST = (
-    "the wrist cannot be found in the depth image; turn the palm or the back of the hand to the "
-    "camera"
+    "the wrist cannot be found in the depth image",
+    "turn the palm or the back of the hand to the camera",
 )
 
 Labels: TypeAlias = NDArray[np.int32]
@@ -210,7 +394,8 @@ def locate_hand(view: DepthView, settings: SegmentSettings, box: Box | None = No
             raise problem
         return located if located is not None and _are_one(located, whole) else whole
     if move := gate_problem(depth_m, gate_m, 0.0 if whole.leaves_gate else _BEYOND_MAX):
-        raise OutOfViewError(move + ("" if box else _unit_hint(view, settings)))
+        hint = "" if box else _unit_hint(view, settings)
+        raise OutOfViewError(move.what, move.advice + hint)
     return whole
 
 
@@ -251,7 +436,7 @@ def _locate_within(
         elif _has_palm(located):
             problem = _TOO_SMALL
     if found is None and box is not None:
-        raise HandError(problem)
+        raise HandError(*problem)
     if found is None:
         raise HandError(
             f"no hand-sized object between {settings.depth_min_m:.2f} and "
@@ -271,7 +456,7 @@ def _locate_within(
 
 def _are_one(located: LocatedHand, other: LocatedHand) -> bool:
     """Return whether two results in one image are the same hand."""
-    areas = [np.count_nonzero(one.hand) for one in (located, other)]
+    areas = [np.count_nonzero(hand.hand) for hand in (located, other)]
     apart_m = float(np.linalg.norm(located.palm_m - other.palm_m))
     return apart_m < _ONE_HAND_M and bool(min(areas) > (1.0 - _ONE_HAND_AREA) * max(areas))
 
@@ -283,12 +468,12 @@ def _unit_hint(view: DepthView, settings: SegmentSettings) -> str:
         return ""
     nearest_m, farthest_m = np.quantile(measured, [0.02, 0.98]) * view.scale_m
     if nearest_m > _FAR_UNIT * settings.depth_max_m:
-        what = f"nearer than {nearest_m:.1f} m"
+        where = f"nearer than {nearest_m:.1f} m"
     elif farthest_m < settings.depth_min_m:
-        what = f"farther than {farthest_m:.2f} m"
+        where = f"farther than {farthest_m:.2f} m"
     else:
         return ""
-    return f" (nothing is measured {what}: if a hand is in view, correct the unit of depth)"
+    return f" (nothing is measured {where}: if a hand is in view, correct the unit of depth)"
 
 
 def _pitch(view: DepthView) -> float:
@@ -315,13 +500,13 @@ def _check_wrist(located: LocatedHand) -> None:
     seen_m = (EDGE_RADIUS_M, FACING_RADIUS_M)
     if located.limit_sigma_m > np.interp(located.palm_radius_m, seen_m, _LIMIT_SIGMAS_M):
         if located.palm_radius_m >= _FROM_EDGE_M:
-            raise HandError(_NO_WRIST)
+            raise HandError(*_NO_WRIST)
         points_m = deproject(located.view, *pixels_of(located.hand)).T
         reach_m = -np.percentile((points_m - located.palm_m) @ located.axis, 1.0)
         is_short = reach_m < _SHORT * located.palm_radius_m
-        raise HandError(_SMALL_OR_FROM_EDGE if is_short else _FROM_EDGE)
+        raise HandError(*(_SMALL_OR_FROM_EDGE if is_short else _FROM_EDGE))
     if located.end_log_odds < _SURE:
-        raise HandError(_EITHER_END)
+        raise HandError(*_EITHER_END)
 
 
 def _check_covered(located: LocatedHand) -> None:
@@ -346,7 +531,7 @@ def _check_arm(located: LocatedHand, within: Float32) -> None:
     """Raise HandError if much of what is in the middle of a hand's box would be arm."""
     arm, hand = (float(within[part].sum()) for part in (located.arm, located.hand))
     if arm > _ARM_IN_BOX_MAX * (arm + hand):
-        raise HandError(_NO_WRIST)
+        raise HandError(*_NO_WRIST)
 
 
 def _within(view: DepthView, box: Box) -> Float32:
@@ -409,19 +594,14 @@ def _limb(parts: _Parts, main: int) -> tuple[_Limb, tuple[slice, slice]]:
 def _joined(parts: _Parts, surface: Bool, may_join: Bool, gap_px: int, jump_m: Float64) -> Bool:
     """Return a surface with those parts beside it that are no more than `jump_m`, (N,), off it."""
     view, is_limb = parts.view, np.zeros(len(parts.stats), bool)
-    near = _widened(surface, gap_px)
+    near = widened(surface, gap_px)
     beside = np.bincount(parts.labels[near], minlength=len(parts.stats)) > 0
     for part in np.flatnonzero(may_join & beside):
         other = near & (parts.labels == part)
-        opposite = surface & _widened(other, gap_px)
+        opposite = surface & widened(other, gap_px)
         jump = view.depth[other].mean() - view.depth[opposite].mean()
         is_limb[part] = abs(jump) * view.scale_m <= jump_m[part]
     return surface | is_limb[parts.labels]
-
-
-def _widened(mask: Bool, by_px: int) -> Bool:
-    square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
-    return cv2.dilate(mask.view(np.uint8), square).view(bool)
 
 
 def _locate_on(
@@ -441,7 +621,7 @@ def _locate_on(
         palm_m, palm_radius_m = _palm(limb, likely)
         axis = _axis(points_m - palm_m[:, None], area_m2, _arm_end(limb) - palm_m)
     from_palm_m = points_m - palm_m[:, None]
-    exit_m = np.inf if box is None else box_exit_m(limb.view, box, palm_m, axis)
+    exit_m = np.inf if box is None else _box_exit_m(limb.view, box, palm_m, axis)
     wrist_m, wrist_sigma_m = find_wrist_m(
         from_palm_m, area_m2, limb.at_end, palm_m, palm_radius_m, axis, exit_m
     )
@@ -480,7 +660,7 @@ def _hand_end(limb: _Limb, area_m2: Float32) -> tuple[Float32, float, Float32, f
         palm_m, radius_m = _palm(limb, likely.astype(np.float32))
         from_palm_m = points_m - palm_m[:, None]
         axis = _axis(from_palm_m, area_m2, end_m - palm_m)
-        fit = arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
+        fit = _arm_fit(from_palm_m, area_m2, limb.at_end, palm_m, radius_m, axis)
         found.append((palm_m, radius_m, axis))
         scores.append((fit, _THICKER * float(np.log(thickness_m))))
     fits, thicker = np.subtract(scores[0], scores[1]).clip(-_COUNTS, _COUNTS).tolist()

@@ -1,4 +1,4 @@
-"""Parts of a depth image, at full or reduced resolution, with their place in the image."""
+"""Parts of a depth image, with their place in it, and the surfaces that depth jumps separate."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handcal.core.errors import OutOfViewError
 from handcal.core.geometry import camera_matrix
 from handcal.core.types import Bool, Float32, Frame, Intrinsics, UInt16
 
@@ -17,9 +18,6 @@ Box: TypeAlias = tuple[int, int, int, int]
 Pixels: TypeAlias = tuple[NDArray[np.intp], NDArray[np.intp]]
 """Rows and columns."""
 
-
-BEYOND = "the hand is too "
-"""Beginning of the text about a hand beyond the depth gate."""
 _INSIDE_M = 0.05  # from an end of the gate to the middle of a hand that is within it
 
 
@@ -73,8 +71,10 @@ def between(view: DepthView, depth_min_m: float, depth_max_m: float) -> Bool:
     return (view.depth >= round(nearest)) & (view.depth <= round(farthest))
 
 
-def gate_problem(depth_m: NDArray[np.floating], gate_m: tuple[float, float], most: float) -> str:
-    """Return how to move a hand of which more than a share lies beyond the gate; else nothing.
+def gate_problem(
+    depth_m: NDArray[np.floating], gate_m: tuple[float, float], most: float
+) -> OutOfViewError | None:
+    """Return how to move a hand of which more than a share lies beyond the gate; else None.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ def gate_problem(depth_m: NDArray[np.floating], gate_m: tuple[float, float], mos
     near_m, far_m = gate_m
     near, far = float(np.mean(depth_m < near_m)), float(np.mean(depth_m > far_m))
     if max(near, far) <= most:
-        return ""
+        return None
     low_m, hand_m, high_m = np.quantile(depth_m, [0.02, 0.5, 0.98])
     where = f"at {100 * hand_m:.0f} cm"
     if near >= far:
         back_cm = np.ceil(100 * max(near_m + _INSIDE_M - hand_m, near_m - low_m))
-        return f"{BEYOND}near, {where}; move it back by {back_cm:.0f} cm"
+        return OutOfViewError(f"the hand is too near, {where}", f"move it back by {back_cm:.0f} cm")
     nearer_cm = np.ceil(100 * max(hand_m - far_m + _INSIDE_M, high_m - far_m))
-    return f"{BEYOND}far, {where}; bring it nearer by {nearer_cm:.0f} cm"
+    return OutOfViewError(f"the hand is too far, {where}", f"bring it nearer by {nearer_cm:.0f} cm")
 
 
 def deproject(view: DepthView, rows: NDArray[Any], columns: NDArray[Any]) -> Float32:
@@ -123,3 +123,107 @@ def deproject(view: DepthView, rows: NDArray[Any], columns: NDArray[Any]) -> Flo
     else:
         x, y = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
     return np.stack([x * z_m, y * z_m, z_m]).astype(np.float32, copy=False)
+
+
+NEIGHBOURS = np.ones((3, 3), np.uint8)
+_UNMEASURED = np.uint16(65535)
+
+
+def solid_surface(depth: UInt16, jump: int) -> Bool:
+    """Mark the measured pixels that are not on the far side of a depth jump.
+
+    Of two neighbouring pixels of a surface neither is more than `jump` behind the other, so
+    surfaces at different depths never touch. Flying pixels, between a silhouette and its
+    background, are on the far side.
+
+    Parameters
+    ----------
+    depth : (h, w) uint16
+        0 where there is no measurement.
+    jump : int
+        In the units of `depth`.
+
+    Returns
+    -------
+    (h, w) bool
+    """
+    shifted = depth - np.uint16(1)  # unmeasured pixels become the farthest
+    behind = cv2.subtract(shifted, cv2.erode(shifted, NEIGHBOURS))
+    solid: Bool = (behind <= jump) & (depth > 0)
+    return solid
+
+
+def behind_nearest(depth: UInt16, surface: Bool, size_px: int = 3) -> UInt16:
+    """Return the distance of each pixel of `surface` behind the nearest one around it.
+
+    The result is undefined outside the surface.
+
+    Parameters
+    ----------
+    depth : (h, w) uint16
+    surface : (h, w) bool
+    size_px : int
+        Side of the square around each pixel, odd.
+    """
+    on_surface = _only(depth, surface)
+    around = np.ones((size_px, size_px), np.uint8)
+    return np.asarray(cv2.subtract(on_surface, cv2.erode(on_surface, around)), np.uint16)
+
+
+def goes_on(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
+    """Mark the pixels of `surface` at which `other` continues: adjoins or occludes it.
+
+    Parameters
+    ----------
+    surface, other : (h, w) bool
+        Disjoint parts of a solid surface.
+    depth : (h, w) uint16
+    jump : int
+        In the units of `depth`.
+
+    Returns
+    -------
+    (h, w) bool
+    """
+    nearest_other = cv2.erode(_only(depth, other), NEIGHBOURS)
+    not_behind = cv2.subtract(nearest_other, depth) <= jump  # saturates at 0 for nearer pixels
+    beside: Bool = surface & not_behind & (nearest_other != _UNMEASURED)
+    return beside
+
+
+def covered(surface: Bool, other: Bool, depth: UInt16, jump: int) -> Bool:
+    """Mark the pixels of `surface` with one of `other` before them, two pixels away or less.
+
+    Parameters
+    ----------
+    surface, other : (h, w) bool
+        Disjoint parts of a depth image.
+    depth : (h, w) uint16
+    jump : int
+        Least distance in front, in the units of `depth`.
+
+    Returns
+    -------
+    (h, w) bool
+    """
+    nearest_other = cv2.erode(_only(depth, other), np.ones((5, 5), np.uint8))
+    before: Bool = surface & (cv2.subtract(depth, nearest_other) > jump)  # saturates at 0
+    return before
+
+
+def _only(depth: UInt16, mask: Bool) -> UInt16:
+    """Return the depth on a mask, _UNMEASURED elsewhere; five times faster than np.where."""
+    return depth | (mask.astype(np.uint16) - np.uint16(1))
+
+
+def on_border(mask: Bool) -> Bool:
+    """Mark the pixels of `mask` that lie on the border of the image."""
+    inner = np.zeros_like(mask)
+    inner[1:-1, 1:-1] = True
+    return mask & ~inner
+
+
+def widened(mask: Bool, by_px: int) -> Bool:
+    """Dilate a mask by a square with the given half side."""
+    square = np.ones((2 * by_px + 1, 2 * by_px + 1), np.uint8)
+    return cv2.dilate(mask.view(np.uint8), square).view(bool)

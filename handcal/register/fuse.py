@@ -45,7 +45,7 @@ from handcal.core.types import (
     Rig,
     Verification,
 )
-from handcal.hand.edges import edges_of
+from handcal.hand.outline import edges_of
 from handcal.register.benefit import expected_arcmin
 from handcal.register.prior import (
     EyePrior,

@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 
 from handcal.core.geometry import image_points, transform
 from handcal.core.types import DepthEdges, Float64, Frame, Intrinsics, UInt16
-from handcal.hand.color_edge import find_color_edge
-from handcal.hand.outline import inward_normals
-from handcal.hand.surface import solid_surface
-from handcal.hand.view import Box
+from handcal.hand.outline import find_color_edge, inward_normals
+from handcal.hand.view import Box, solid_surface
 from handcal.rig.boards.board import BoardError, BoardView
 from handcal.rig.depth import board_in_depth
 from handcal.rig.displays.display import undistort

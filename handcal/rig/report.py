@@ -21,7 +21,7 @@ from handcal.core.types import (
     Rig,
     RigPart,
 )
-from handcal.hand.edges import edges_of
+from handcal.hand.outline import edges_of
 from handcal.report.cells import signed
 
 _EYE_DISTANCE_M = 0.050, 0.075

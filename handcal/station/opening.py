@@ -33,8 +33,7 @@ from handcal.sim.camera import (
     SyntheticSettings,
     sensor_settings,
 )
-from handcal.sim.process import VirtualHeadset
-from handcal.sim.simulation import Simulation
+from handcal.sim.simulation import Simulation, VirtualHeadset
 from handcal.station.settings import StationSettings
 
 _FIRST_FILES = {"alignments", "rig.yaml", "settings.json", JOURNAL, JOURNAL_END, "lock"}

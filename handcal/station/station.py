@@ -29,8 +29,7 @@ from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import reachable_address
 from handcal.rig.rig_file import read_rig
 from handcal.session.state import Kind
-from handcal.sim.process import VirtualHeadset
-from handcal.sim.simulation import Simulation
+from handcal.sim.simulation import Simulation, VirtualHeadset
 from handcal.station.checks.headset import link_problem
 from handcal.station.eye_views import EyeViews
 from handcal.station.opening import (

@@ -10,7 +10,7 @@ from handcal.core.errors import FileError, HandcalError
 from handcal.core.geometry import rigid
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
-from handcal.sim.acceptance import write_acceptance
+from handcal.sim.photographs import write_acceptance
 
 
 def accept(folder: Path, rig: Path, *more: object) -> None:

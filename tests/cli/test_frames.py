@@ -135,7 +135,7 @@ def test_replay_tells_every_frame(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     pytest.importorskip("pyrealsense2")
-    from handcal.camera.sdk_recorder import record_db3
+    from handcal.camera.recording import record_db3
 
     frames = [
         Frame(20_000 + i, 33_333_333 * i, 0, frame.depth, frame.depth_scale_m, CAMERA)

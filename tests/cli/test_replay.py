@@ -13,7 +13,7 @@ from handcal.cli.replay import replay
 from handcal.core.errors import CameraEndError, CameraTimeoutError
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics
-from handcal.hand.segment import SegmentSettings
+from handcal.hand.settings import SegmentSettings
 from handcal.io.closable import Closable
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.raster import draw_hand

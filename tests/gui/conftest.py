@@ -38,7 +38,8 @@ from handcal.core.types import (
     UInt8,
     Verification,
 )
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.io.closable import Closable
 from handcal.io.settings import settings_json
 from handcal.link.client import HeadsetClient, HeadsetState

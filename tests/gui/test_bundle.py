@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 import pytest
 
-from handcal.sim.process import program_command
+from handcal.sim.simulation import program_command
 from handcal_gui import benchmark, bundle
 
 

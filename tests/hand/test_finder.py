@@ -7,7 +7,8 @@ from handcal.core.errors import HandError
 from handcal.core.types import Frame, HandCloud, UInt8
 from handcal.hand.detect import Detections
 from handcal.hand.finder import HandFinder
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
 
 from .conftest import CAMERA, shoot
@@ -119,6 +120,9 @@ def test_another_thing_is_never_taken_for_the_hand_that_the_detector_sees(frame:
     elsewhere = Eyes((20, 20, 160, 180))
     with pytest.raises(HandError, match="only the background"):
         HandFinder(SETTINGS, elsewhere).find(frame)
+    x0, y0, _, _ = segment_hand(frame, SETTINGS).box_px
+    with pytest.raises(HandError, match="the detector and the depth image disagree"):
+        HandFinder(SETTINGS, Eyes((x0, y0, x0 + 40, y0 + 90))).find(frame)  # one finger
     blind = Eyes((0, 0, 0, 0))
     with pytest.raises(HandError, match=r"no hand is seen|only the background|measures nothing"):
         HandFinder(SETTINGS, blind).find(frame)

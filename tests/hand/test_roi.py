@@ -6,7 +6,7 @@ import pytest
 from handcal.core.geometry import rigid
 from handcal.core.types import Frame, Intrinsics, UInt8
 from handcal.hand.detect import Detections, overlaps
-from handcal.hand.roi import RoiFinder
+from handcal.hand.finder import RoiFinder
 from handcal.hand.settings import Roi, SegmentSettings
 from handcal.hand.view import Box
 

@@ -13,8 +13,7 @@ from handcal.camera.images import read_depth
 from handcal.core.errors import HandError
 from handcal.core.types import Bool, Float64, Frame, Intrinsics, UInt8
 from handcal.hand.detect import Detections, HandDetector, overlaps
-from handcal.hand.finder import HandFinder
-from handcal.hand.roi import RoiFinder
+from handcal.hand.finder import HandFinder, RoiFinder
 from handcal.hand.settings import NEARER_M, SegmentSettings
 from handcal.hand.shipped import load_detector
 from handcal.io.images import read_image

@@ -11,10 +11,10 @@ import pytest
 from handcal.core.errors import HandError
 from handcal.core.geometry import rotation_matrix, rotation_vector
 from handcal.core.types import Float32
+from handcal.hand.locate import find_wrist_m
 from handcal.hand.segment import segment_hand
 from handcal.hand.settings import SegmentSettings
 from handcal.hand.view import Box
-from handcal.hand.wrist import find_wrist_m
 
 from .conftest import Shot, shoot
 
@@ -115,13 +115,6 @@ def test_the_slanted_end_of_an_arm_that_leaves_the_view_is_not_its_wrist() -> No
     whole_m, _ = find(width_m.astype(np.float32), 0.042)
     cut_m, _ = find(slanted_m.astype(np.float32), 0.042, end_m=0.112)
     assert cut_m == pytest.approx(whole_m, abs=0.015)
-
-
-def test_seen_from_its_edge_a_limb_says_less_by_its_width() -> None:
-    width_m = (0.05 + 0.3 * np.abs(PLACE_M - 0.07)).clip(0, 0.085).astype(np.float32)
-    _, front_m = find(width_m, 0.042)
-    _, edge_m = find(width_m, 0.018)
-    assert edge_m > 2.0 * front_m
 
 
 @pytest.mark.parametrize("exit_m", [0.12, 0.14])

@@ -30,7 +30,7 @@ Calibrate = Callable[[DemoSettings], dict[str, Any]]
 @pytest.fixture
 def calibrate(program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calibrate:
     """Return a function that runs the demo with the C# link in the virtual headset."""
-    monkeypatch.setattr("handcal.sim.process.program_command", lambda: command(program))
+    monkeypatch.setattr("handcal.sim.simulation.program_command", lambda: command(program))
     rig = resource_path("example_rig.yaml")
     return lambda settings: run_demo(settings, rig, tmp_path, Progress())
 
@@ -59,7 +59,7 @@ def test_either_side_is_restarted_during_a_calibration(
     monkeypatch: pytest.MonkeyPatch,
     headset_of: Callable[[int], int],
 ) -> None:
-    monkeypatch.setattr("handcal.sim.process.program_command", lambda: command(program))
+    monkeypatch.setattr("handcal.sim.simulation.program_command", lambda: command(program))
     calibration = CalibrationSettings(match_tolerance_s=2.0)
     settings = StationSettings(seed=SEED, sessions=str(tmp_path), calibration=calibration)
     with Station(settings, "Ada") as station:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from handcal.core.types import CameraIdentity, DepthEdges
-from handcal.hand.edges import edges_of
+from handcal.hand.outline import edges_of
 from handcal.rig.example import example_rig
 
 

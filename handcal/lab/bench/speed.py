@@ -13,8 +13,9 @@ from handcal.core.errors import HandError
 from handcal.core.geometry import rigid
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Alignment, Float64, Frame
-from handcal.hand.roi import Detector, RoiFinder
-from handcal.hand.segment import SegmentSettings, segment_hand
+from handcal.hand.finder import Detector, RoiFinder
+from handcal.hand.segment import segment_hand
+from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import load_detector
 from handcal.lab.bench.figure import BenchFigure
 from handcal.lab.bench.settings import BenchSettings

@@ -11,7 +11,7 @@ import numpy as np
 
 from handcal.core.progress import Progress
 from handcal.hand.detect import CANDIDATE_SCORE_MIN, DetectSettings, overlaps
-from handcal.hand.roi import Detector
+from handcal.hand.finder import Detector
 from handcal.lab.evaluate.annotations import Photo
 from handcal.lab.evaluate.conditions import UNCHANGED, Conditions, shown
 from handcal.lab.evaluate.precision import (

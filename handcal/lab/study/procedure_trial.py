@@ -27,7 +27,7 @@ from handcal.core.types import (
     PlanName,
     Verification,
 )
-from handcal.hand.edges import edges_of
+from handcal.hand.outline import edges_of
 from handcal.lab.study.seeing import See, SeenHand
 from handcal.lab.study.wearers import StudyWearer
 from handcal.link.nudges import VerifyRequest

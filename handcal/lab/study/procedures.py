@@ -19,7 +19,7 @@ from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, CameraIdentity, DepthEdges, Eye, Float64
-from handcal.hand.edges import edges_of
+from handcal.hand.outline import edges_of
 from handcal.lab.methods.spaam import solve_spaam
 from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study.procedure_trial import Calibrated, ProcedureModel, lead_through

@@ -17,8 +17,7 @@ from pathlib import Path
 
 from handcal.calibration.states import CalibrationSettings
 from handcal.camera.camera import Camera
-from handcal.camera.sdk_devices import Device, devices_by_child
-from handcal.camera.usb import explain_absence
+from handcal.camera.sdk_devices import Device, devices_by_child, explain_absence
 from handcal.core.errors import CancelledError, HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import CameraIdentity, Intrinsics, Rig
@@ -229,7 +228,7 @@ def _cameras(rig: Path | None) -> list[Finding]:
         advice = "the simulator and recordings work without it"
         if sys.platform == "win32":
             advice += "; a plugged-in camera needs Settings, Privacy, Camera, desktop apps: on"
-        return [Finding("Camera", Health.LIMITED, explain_absence(), advice)]
+        return [Finding("Camera", Health.LIMITED, str(explain_absence()), advice)]
     return [with_rig(examine_camera(device), rig, device.identity) for device in devices]
 
 

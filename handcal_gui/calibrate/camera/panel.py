@@ -21,7 +21,7 @@ from handcal.calibration.states import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.core.errors import FileError
 from handcal.core.types import Frame
-from handcal.hand.overlay import contour_px
+from handcal.hand.outline import contour_px
 from handcal.hand.settings import SegmentSettings
 from handcal.io.files import write_atomic
 from handcal.station.snapshot import Snapshot

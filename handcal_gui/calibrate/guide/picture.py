@@ -7,7 +7,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QStackedLayout, QWidget
 
 from handcal.core.types import EYES, Eye, Frame
-from handcal.hand.overlay import contour_px
+from handcal.hand.outline import contour_px
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr

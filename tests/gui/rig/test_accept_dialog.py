@@ -24,8 +24,7 @@ from pytestqt.qtbot import QtBot
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.types import EYES
 from handcal.rig.formats import write_intrinsics
-from handcal.sim.acceptance import write_acceptance
-from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA
+from handcal.sim.photographs import BOARD, VIEWPOINT_CAMERA, write_acceptance
 from handcal_gui.rig.accept_dialog import AcceptDialog
 from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.project_folder import ProjectFolder, ViewpointEntries

@@ -13,8 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from handcal.camera.sdk_devices import Device
-from handcal.camera.usb import explain_absence
+from handcal.camera.sdk_devices import Device, explain_absence
 from handcal.core.errors import CameraError, FileError, LinkError
 from handcal.core.types import CameraIdentity
 from handcal.link.pairing import KEY_VARIABLE

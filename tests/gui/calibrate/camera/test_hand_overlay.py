@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import UInt8
-from handcal.hand.overlay import contour_px
+from handcal.hand.outline import contour_px
 from handcal_gui.calibrate.camera.hand_overlay import HandOverlay, contour_runs
 from tests.gui.conftest import Shots
 

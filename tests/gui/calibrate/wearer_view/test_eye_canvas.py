@@ -8,7 +8,7 @@ from PySide6.QtGui import QImage
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Float64, UInt8
-from handcal.hand.overlay import contour_px
+from handcal.hand.outline import contour_px
 from handcal.rig.example import example_rig
 from handcal.station.wearer_view import EyeView, render_eye_view
 from handcal_gui.app.theme import colors
