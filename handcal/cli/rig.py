@@ -27,7 +27,7 @@ from handcal.cli.output import console, show_progress, until_interrupted
 from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
 from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder, write_json
-from handcal.rig.boards.print_page import PAPERS
+from handcal.rig.boards.printing import PAPERS
 from handcal.rig.boards.views import MAX_VIEWS
 from handcal.rig.formats import CALIBRATION_FORMATS
 from handcal.rig.lens.camera import LENS_CHOICES
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from handcal.rig.boards.views import WorstView
-    from handcal.rig.verdict import CalibrationVerdict
+    from handcal.rig.lens.fit import CalibrationVerdict
 
 
 _CALIBRATION_OPTIONS = (

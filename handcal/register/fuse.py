@@ -17,7 +17,7 @@ What is wrong in all observations of a sitting alike does not average out, so it
 (`handcal.register.sitting`).
 
 A verification, in which the wearer moves the drawing of the resting hand until it covers the hand
-(`handcal.register.nudge`), is one more observation of one eye's φ, more precise than an alignment.
+(`handcal.register.model`), is one more observation of one eye's φ, more precise than an alignment.
 One in which nothing was moved is none: a wearer who does not look says the same. Verifications of
 one eye that contradict each other count less.
 """

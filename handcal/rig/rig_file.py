@@ -34,7 +34,7 @@ from handcal.core.types import (
     RigPart,
 )
 from handcal.io.files import read_limited, write_atomic
-from handcal.rig.check import MAX_RANGES, check_rig, require
+from handcal.rig.plausible import MAX_RANGES, check_rig, require
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 
 RIG_VERSION = 3

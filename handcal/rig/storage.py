@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from handcal.core.types import Float64
-from handcal.rig.check import require
+from handcal.rig.plausible import require
 
 # OpenCV's parser recurses with the nesting and overflows the stack at 65 kB.
 MAX_STORAGE_BYTES = 2**14

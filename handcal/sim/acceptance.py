@@ -11,9 +11,8 @@ from handcal.core.geometry import invert, rigid
 from handcal.core.types import EYES, Rig
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
-from handcal.rig.boards.tracked_file import write_tracked
 from handcal.rig.displays.grid import Grid, draw_grid
-from handcal.rig.formats import write_intrinsics
+from handcal.rig.formats import write_intrinsics, write_tracked
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.photographs import BOARD, DEPTH_CAMERA, VIEWPOINT_CAMERA
 from handcal.sim.viewpoint import photograph_display

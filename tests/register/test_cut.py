@@ -9,7 +9,7 @@ from scipy.special import chdtri
 from handcal.core.types import Bool, Float64
 from handcal.lab.bench.trials import trial_alignment
 from handcal.lab.study.trials import solve_trial
-from handcal.register.cut import CUT_BAND_M, common_cut
+from handcal.register.consistent import CUT_BAND_M, common_cut
 from handcal.register.surface import clip_surface, describe_surface, nearest
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 

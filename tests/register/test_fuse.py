@@ -23,8 +23,8 @@ from handcal.register.fuse import (
     FuseSettings,
     fuse_alignments,
 )
-from handcal.register.opening import Opening
 from handcal.register.prior import PriorSettings
+from handcal.register.shape import Opening
 from handcal.register.sitting import SittingSettings
 from handcal.register.solve import solve_alignment, with_eye_box
 from handcal.register.surface import describe_surface

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from handcal.core.display import arcmin_from_px, eye_projection
 from handcal.core.geometry import project
-from handcal.register.nudge import nudged_shift_m
+from handcal.register.model import nudged_shift_m
 from handcal.rig.example import example_rig
 
 DISPLAY = example_rig().eyes["left"]

@@ -12,7 +12,7 @@ from handcal.core.types import Bool, EyeShift, Float64
 from handcal.lab.bench.trials import measured_alignment
 from handcal.lab.study.trials import solve_trial
 from handcal.register.consistent import match_hands
-from handcal.register.opening import Opening
+from handcal.register.shape import Opening
 from handcal.sim.alignments import SimulatedAlignment
 
 POINTS = 3000

@@ -3,7 +3,7 @@ import pytest
 
 from handcal.core.geometry import invert, rigid, transform
 from handcal.core.types import Bool, Float64
-from handcal.register.pairs import matched_pairs
+from handcal.register.guard import matched_pairs
 from handcal.sim.hand import make_hand
 from handcal.sim.raster import visible_points
 

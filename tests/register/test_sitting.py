@@ -7,7 +7,7 @@ import pytest
 
 from handcal.core.types import EYES, DepthEdges, Eye, Float64, Verification
 from handcal.register.fuse import Fused, FuseSettings, fuse_alignments
-from handcal.register.nudge import nudged_shift_m
+from handcal.register.model import nudged_shift_m
 from handcal.register.prior import PriorSettings
 from handcal.register.results import SolveSettings, conclude
 from handcal.register.sitting import LearnedSitting, SittingSettings

@@ -4,9 +4,8 @@ import numpy as np
 
 from handcal.core.types import Float64
 from handcal.register.fuse import FuseSettings, verified_observation
-from handcal.register.prior import Observed, eye_prior
+from handcal.register.prior import MIN_SITTINGS, Observed, eye_prior, learn_wearers
 from handcal.register.sitting import SittingSettings, sitting_prior
-from handcal.register.wearers import MIN_SITTINGS, learn_wearers
 from handcal.rig.example import example_rig
 
 RIG = example_rig()

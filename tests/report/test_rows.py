@@ -7,7 +7,7 @@ import io
 
 import pytest
 
-from handcal.report.rows import rows_csv
+from handcal.report.cells import rows_csv
 
 
 def read(content: bytes) -> list[dict[str, str]]:

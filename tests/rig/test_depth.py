@@ -12,7 +12,7 @@ from handcal.core.types import DepthCheck, Float64
 from handcal.rig.boards.board import BoardError
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.depth import DepthView, depth_view, explain_depth, fit_depth
-from handcal.rig.report import depth_finding
+from handcal.rig.findings import depth_finding
 from tests.board_frames import COLOR, T_C_D, frames, poses, seen
 
 MADE = "2026-11-23T02:00:00+00:00"

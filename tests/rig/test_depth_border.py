@@ -10,7 +10,7 @@ import pytest
 from handcal.core.geometry import rigid
 from handcal.core.types import DepthEdges, Float64, Frame
 from handcal.rig.boards.board import BoardError
-from handcal.rig.depth_border import MIN_BORDER_VIEWS, border_outside_px, fit_edges
+from handcal.rig.depth import MIN_BORDER_VIEWS, border_outside_px, fit_edges
 from handcal.sim.boards import BoardPainter
 from tests.board_frames import BOARD, COLOR, SENSOR, frames, poses, seen
 from tests.fat_hands import beside_truth, fat_hand

@@ -8,8 +8,8 @@ from handcal.core.display import projection_matrix
 from handcal.core.geometry import camera_matrix, invert, project, transform
 from handcal.core.types import EYES, EyeDisplay, Float64
 from handcal.io.resources import resource_path
-from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
+from handcal.rig.plausible import check_rig
 from handcal.rig.rig_file import write_rig
 
 

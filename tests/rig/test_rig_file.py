@@ -21,8 +21,8 @@ from handcal.core.types import (
     Origin,
     Rig,
 )
-from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
+from handcal.rig.plausible import check_rig
 from handcal.rig.rig_file import MAX_RIG_BYTES, read_rig, write_rig
 from tests.rig.any_rig import RIGS
 

@@ -7,8 +7,8 @@ from handcal.core.geometry import invert
 from handcal.core.types import EYES, Float64, Intrinsics
 from handcal.io.images import read_image
 from handcal.rig.boards.finder import find_board
-from handcal.rig.boards.tracked_file import read_tracked
 from handcal.rig.example import example_rig
+from handcal.rig.formats import read_tracked
 from handcal.rig.lens.viewpoint import board_pose
 from handcal.sim.photographs import (
     BOARD,

@@ -14,6 +14,7 @@ from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.boards.views import BoardImage, WorstView
 from handcal.rig.formats import camera_json, read_intrinsics
 from handcal.rig.lens.camera import CameraSettings, calibrate_camera, tilt
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.lens import Camera, first_pose
 from handcal.rig.lens.uncertainty import ProjectionUncertainty
 from handcal.rig.steps import (
@@ -24,7 +25,6 @@ from handcal.rig.steps import (
     intrinsics_in,
     pose_in,
 )
-from handcal.rig.verdict import CalibrationVerdict
 from handcal_gui.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.windows.rig.project_folder import (

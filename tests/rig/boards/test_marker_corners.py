@@ -4,7 +4,7 @@ import pytest
 
 from handcal.core.geometry import image_points, rigid, transform
 from handcal.core.types import Float64, Intrinsics, UInt8
-from handcal.rig.cube.cube import Cube, marker_corners_m, refine_corners
+from handcal.rig.cube import Cube, marker_corners_m, refine_corners
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 

@@ -6,7 +6,7 @@ import pytest
 
 from handcal.core.errors import FileError
 from handcal.core.geometry import rigid
-from handcal.rig.boards.tracked_file import read_tracked, write_tracked
+from handcal.rig.formats import read_tracked, write_tracked
 
 
 def test_poses_come_back_exactly(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from handcal.core.geometry import image_points, rigid, transform
 from handcal.core.types import Float64, Intrinsics, UInt8
-from handcal.rig.cube.cube import Cube, CubeError, cube_pose, face_pose, find_cube, marker_corners_m
+from handcal.rig.cube import Cube, CubeError, cube_pose, face_pose, find_cube, marker_corners_m
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 

@@ -4,8 +4,7 @@ import pytest
 
 from handcal.core.errors import FileError
 from handcal.io.files import write_json
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.cube_file import read_cube, write_cube
+from handcal.rig.cube import Cube, read_cube, write_cube
 
 
 def test_a_cube_comes_back(tmp_path: Path) -> None:

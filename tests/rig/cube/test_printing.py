@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from handcal.io.images import read_image
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.printing import net_rectangles_m, write_cube_pdf
+from handcal.rig.cube import Cube, net_rectangles_m, write_cube_pdf
 
 CUBE = Cube(ids=(7, 11, 2, 33, 4, 5))
 

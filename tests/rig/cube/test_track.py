@@ -1,8 +1,7 @@
 import numpy as np
 
 from handcal.core.geometry import rigid, transform
-from handcal.rig.cube.cube import Cube, face_pose
-from handcal.rig.cube.track import CubeFilter, cube_corners_m, facing_corners_m
+from handcal.rig.cube import Cube, CubeFilter, cube_corners_m, face_pose, facing_corners_m
 
 _FRAME_NS = 33_000_000
 

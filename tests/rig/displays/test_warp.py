@@ -5,7 +5,7 @@ import pytest
 
 from handcal.core.geometry import camera_matrix, image_points, project, rigid
 from handcal.core.types import Intrinsics
-from handcal.rig.displays.warp import RotationWarp, rotation_homography
+from handcal.rig.displays.homography import RotationWarp, rotation_homography
 
 CAMERA = Intrinsics(320, 240, 300.0, 302.0, 158.0, 121.0, (-0.1, 0.02, 0.001, -0.001, 0.0))
 R_S_C = rigid([0.03, -0.04, 0.08])[:3, :3]

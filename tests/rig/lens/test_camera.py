@@ -9,8 +9,7 @@ from handcal.core.geometry import camera_matrix, rigid
 from handcal.core.types import Intrinsics
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import BoardImage, ViewsError, board_image, drop, read_views
-from handcal.rig.lens.camera import CameraSettings, calibrate_camera
-from handcal.rig.lens.lens_fit import fit_lens
+from handcal.rig.lens.camera import CameraSettings, calibrate_camera, fit_lens
 from handcal.sim.boards import BoardPainter, board_poses, board_view
 
 BOARD = Board()

@@ -3,8 +3,8 @@ import pytest
 
 from handcal.core.types import Float64, Intrinsics
 from handcal.rig.boards.board import Board
+from handcal.rig.lens.camera import _FOCAL_WIDTHS, _first_camera, best_lens, compare_lenses
 from handcal.rig.lens.lens import Camera, LensModel, predict, to_plane
-from handcal.rig.lens.lens_fit import _FOCAL_WIDTHS, _first_camera, best_lens, compare_lenses
 from handcal.sim.boards import board_poses, board_view
 
 BOARD = Board()

@@ -11,8 +11,7 @@ from handcal.core.geometry import image_points, rigid, transform
 from handcal.core.types import Float64, Intrinsics
 from handcal.rig.boards.board import Board, BoardView, corners_m
 from handcal.rig.boards.views import BoardImage, image_files, read_views
-from handcal.rig.lens.camera import CameraCalibration, CameraSettings, calibrate_camera
-from handcal.rig.lens.lens_fit import fit_lens
+from handcal.rig.lens.camera import CameraCalibration, CameraSettings, calibrate_camera, fit_lens
 from handcal.rig.lens.shape import boards_seen
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.sim.boards import board_poses

@@ -22,8 +22,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.boards.views import WorstView
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.uncertainty import ProjectionUncertainty
-from handcal.rig.verdict import CalibrationVerdict
 from handcal_gui.theme import use_theme
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView

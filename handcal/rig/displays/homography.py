@@ -3,6 +3,10 @@
 The display is a plane S in front of the camera, so a homography takes the camera's pixels to the
 display's. Combined with the camera's lens matrix and its pose in the headset it is the off-axis
 projection K H0 from the viewpoint C0 (Hu et al. 2021, homography-corrected off-axis model).
+
+A camera is never exactly parallel to the display, but objects aligned in its image must also be
+aligned on the display. So frames are undistorted and warped by the rotation between the two
+(`RotationWarp`; Hu et al. 2021, assessment with eye-replacement camera).
 """
 
 from __future__ import annotations
@@ -17,13 +21,12 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.frozen import freeze
 from handcal.core.geometry import camera_matrix, invert
-from handcal.core.types import EyeDisplay, Float64, Intrinsics
+from handcal.core.types import EyeDisplay, Float64, Intrinsics, UInt8
 from handcal.rig.boards.views import ViewsError, require_size
-from handcal.rig.check import MAX_DEVICE_SIDE_PX
 from handcal.rig.displays.grid import GridView
-from handcal.rig.lens.fit import clustered_covariance, rms
+from handcal.rig.lens.fit import CalibrationVerdict, clustered_covariance, rms
 from handcal.rig.lens.viewpoint import ViewpointPose, plane_pose
-from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.plausible import MAX_DEVICE_SIDE_PX
 
 DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")
 """Parameters of `DisplayCalibration.covariance`."""
@@ -315,3 +318,50 @@ def _judge(
     return CalibrationVerdict(
         "good", f"the display's corners are known to {homography.sigma_px:.2f} px; {residual}"
     )
+
+
+def rotation_homography(camera: Intrinsics, R_S_C: Float64) -> Float64:
+    """Return ``H = K R_S_C K⁻¹`` (3, 3): warped pixels from undistorted ones."""
+    K = camera_matrix(camera)
+    H: Float64 = K @ R_S_C @ np.linalg.inv(K)
+    return H
+
+
+class RotationWarp:
+    """Undistorts and rotates frames of one camera; the pixel map is computed once.
+
+    Parameters
+    ----------
+    camera : Intrinsics
+        Intrinsics of the frames; warped frames have the same, without distortion.
+    R_S_C : (3, 3) float64
+        From the camera's axes to the display's.
+    """
+
+    def __init__(self, camera: Intrinsics, R_S_C: Float64) -> None:
+        self._size = camera.height, camera.width
+        K = camera_matrix(camera)
+        self._x, self._y = cv2.initUndistortRectifyMap(
+            K,
+            np.array(camera.distortion),
+            R_S_C,
+            K,
+            (camera.width, camera.height),
+            cv2.CV_16SC2,
+        )
+
+    def warp(self, frame: UInt8) -> UInt8:
+        """Return a frame, (H, W) or (H, W, 3) uint8, as seen along the display's axes.
+
+        Raises
+        ------
+        ValueError
+            If it does not have the camera's size.
+        """
+        if frame.shape[:2] != self._size:
+            height, width = self._size
+            raise ValueError(
+                f"the frame is {frame.shape[1]}×{frame.shape[0]}, the camera {width}×{height}"
+            )
+        warped = cv2.remap(frame, self._x, self._y, cv2.INTER_LINEAR)
+        return warped.astype(np.uint8, copy=False)

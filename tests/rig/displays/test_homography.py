@@ -12,7 +12,8 @@ from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import image_points, invert, project, rigid
 from handcal.core.types import EyeDisplay, Float64
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.displays.display import (
+from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
+from handcal.rig.displays.homography import (
     DisplayCalibration,
     DisplaySettings,
     Screen,
@@ -20,10 +21,9 @@ from handcal.rig.displays.display import (
     fit_homography,
     pixel_size_m,
 )
-from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.viewpoint import ViewpointPose
-from handcal.rig.verdict import CalibrationVerdict
 from handcal.sim.boards import PictureSettings
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA as CAMERA
 from handcal.sim.viewpoint import photograph_display
