@@ -165,10 +165,10 @@ def take(arguments: argparse.Namespace) -> None:
 def camera(arguments: argparse.Namespace) -> None:
     """Calibrate a camera's intrinsics from images of a board."""
     from handcal.rig.formats import camera_json, write_intrinsics
-    from handcal.rig.lens.camera import CameraSettings, calibrate_camera
+    from handcal.rig.lens.camera import calibrate_camera
 
     views = views_of(arguments.images, board_of(arguments), arguments.drop)
-    result = calibrate_camera(views, CameraSettings(lens=arguments.lens))
+    result = calibrate_camera(views, arguments.lens)
     show_views(views, result.residuals_px)
     solved = result.intrinsics
     sigma = result.sigma

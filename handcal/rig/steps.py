@@ -29,8 +29,8 @@ from handcal.rig.formats import (
     read_stereo,
     read_tracked,
 )
-from handcal.rig.lens.camera import CameraSettings, LensChoice
-from handcal.rig.lens.stereo import StereoCalibration, StereoSettings, calibrate_stereo
+from handcal.rig.lens.camera import LensChoice
+from handcal.rig.lens.stereo import StereoCalibration, calibrate_stereo
 from handcal.rig.lens.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
 from handcal.rig.plausible import check_view
 
@@ -79,7 +79,7 @@ def calibrate_depth_camera(
         pairs,
         None if depth_intrinsics is None else read_camera(depth_intrinsics),
         None if headset_intrinsics is None else read_camera(headset_intrinsics),
-        StereoSettings(camera=CameraSettings(lens=lens)),
+        lens,
     )
 
 

@@ -257,25 +257,18 @@ MIN_VIEWS = 3
 _NEAR_BY_SHAPE = 1.15
 
 
-@dataclass(frozen=True, slots=True)
-class CameraSettings:
-    """Settings of the solver for intrinsics, and limits of a good result."""
-
-    lens: LensChoice = "full"
-    """Lens model, or auto: the one that fits best views that are not used to solve it."""
-    good_views: int = 10
-    """With fewer views, the verdict asks for more."""
-    good_coverage: float = 0.6
-    """Minimum share of the image's cells that contain a corner in any view."""
-    good_spread_rad: float = 0.2
-    """Least spread of the boards' normals about their mean, RMS."""
-    max_projection_arcmin: float = 2.0
-    max_projection_px: float = 0.25
-    """Projection uncertainty exceeded in half of the image: good up to the larger of the two."""
-    bad_focal_sigma: float = 0.03
-    """Relative standard deviation of the focal lengths from which they are useless."""
-    max_rms_px: float = 1.0
-    """A larger residual indicates a fault: board, focus or exposure."""
+# With fewer views, the verdict asks for more.
+_GOOD_VIEWS = 10
+# Least share of the image's cells that contain a corner in any view.
+_GOOD_COVERAGE = 0.6
+# Least spread of the boards' normals about their mean, RMS.
+_GOOD_SPREAD_RAD = 0.2
+# Projection uncertainty exceeded in half of the image: good up to the larger of the two.
+_GOOD_ARCMIN, _GOOD_PX = 2.0, 0.25
+# Relative standard deviation of the focal lengths from which they are useless.
+_BAD_FOCAL_SIGMA = 0.03
+# A larger residual indicates a fault: board, focus or exposure.
+_MOST_RMS_PX = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -330,9 +323,7 @@ class CameraCalibration:
         return np.sqrt(np.diag(self.covariance))
 
 
-def calibrate_camera(
-    views: Sequence[BoardImage], settings: CameraSettings | None = None
-) -> CameraCalibration:
+def calibrate_camera(views: Sequence[BoardImage], lens: LensChoice = "full") -> CameraCalibration:
     """Solve a camera's intrinsics from views of a board.
 
     Raises
@@ -341,15 +332,14 @@ def calibrate_camera(
         If fewer than `MIN_VIEWS` show the board, they are of mixed resolutions, or nothing can
         be solved from them.
     """
-    settings = settings or CameraSettings()
     found = used(views, MIN_VIEWS)
     check_moved(found)
-    compared = compare_lenses(tuple(found.values())) if settings.lens == "auto" else ()
-    if settings.lens != "auto":
-        solved = fit_lens(tuple(found.values()), settings.lens)
+    compared = compare_lenses(tuple(found.values())) if lens == "auto" else ()
+    if lens != "auto":
+        solved = fit_lens(tuple(found.values()), lens)
     else:
         solved = best_lens(compared) if compared else None
-    if solved is not None and solved.fit.rms_px <= MOST_BY_SHAPE * settings.max_rms_px:
+    if solved is not None and solved.fit.rms_px <= MOST_BY_SHAPE * _MOST_RMS_PX:
         solved, compared = _shaped(solved, tuple(found.values()), compared)
     if solved is None or not np.isfinite(solved.camera.fx) or not 0 < solved.camera.fx < np.inf:
         raise ViewsError(
@@ -375,7 +365,7 @@ def calibrate_camera(
         dropped=tuple(view.name for view in views if view.dropped),
         coverage=coverage(found.values()),
         worst=worst,
-        verdict=_judge(solved, found, poses, worst, settings),
+        verdict=_judge(solved, found, poses, worst),
         uncertainty=solved.uncertainty,
         board=solved.board,
         compared=compared,
@@ -417,15 +407,14 @@ def _judge(
     found: Mapping[str, BoardView],
     poses: Mapping[str, Float64],
     worst: WorstView,
-    settings: CameraSettings,
 ) -> CalibrationVerdict:
     rms_px, camera = solved.fit.rms_px, solved.camera
     covariance, uncertainty = solved.covariance, solved.uncertainty
     spread_rad = normal_spread(poses)
-    if rms_px > settings.max_rms_px:
+    if rms_px > _MOST_RMS_PX:
         return CalibrationVerdict(
             "bad",
-            f"corners are {rms_px:.2f} px off, more than {settings.max_rms_px:g}: check that the "
+            f"corners are {rms_px:.2f} px off, more than {_MOST_RMS_PX:g}: check that the "
             "board is flat, focus fixed and the lens model the right one; drop the worst image, "
             f"{worst.name}: {worst.why}",
         )
@@ -435,8 +424,8 @@ def _judge(
     if (
         covariance is None
         or uncertainty is None
-        or focal_sigma > settings.bad_focal_sigma
-        or spread_rad < settings.good_spread_rad / 4
+        or focal_sigma > _BAD_FOCAL_SIGMA
+        or spread_rad < _GOOD_SPREAD_RAD / 4
     ):
         return CalibrationVerdict(
             "bad",
@@ -445,17 +434,17 @@ def _judge(
         )
     seen_area = coverage(found.values())
     wanting = []
-    if len(poses) < settings.good_views:
-        wanting.append(f"{len(poses)} views, {max(ASKED_VIEWS, settings.good_views)} are better")
-    if seen_area.share < settings.good_coverage:
+    if len(poses) < _GOOD_VIEWS:
+        wanting.append(f"{len(poses)} views, {ASKED_VIEWS} are better")
+    if seen_area.share < _GOOD_COVERAGE:
         wanting.append(
             f"the board was seen in {100 * seen_area.share:.0f} % of the image only: bring it to "
             "its edges"
         )
-    if spread_rad < settings.good_spread_rad:
+    if spread_rad < _GOOD_SPREAD_RAD:
         wanting.append(f"it was tilted by {np.degrees(spread_rad):.0f}° only: tilt it more")
     arcmin_per_px = float(np.degrees(np.arctan(1 / camera.fx)) * 60)
-    limit_px = max(settings.max_projection_px, settings.max_projection_arcmin / arcmin_per_px)
+    limit_px = max(_GOOD_PX, _GOOD_ARCMIN / arcmin_per_px)
     if uncertainty.middle_px > limit_px:
         wanting.append(
             f"the direction of a pixel is known to ± {uncertainty.middle_px:.2f} px only "
@@ -469,7 +458,7 @@ def _judge(
             covariance,
             largest.points_m,
             rms_px / np.sqrt(2),
-            seen_area.hits if seen_area.share < settings.good_coverage else None,
+            seen_area.hits if seen_area.share < _GOOD_COVERAGE else None,
         )
         if add is not None:
             wanting.append(f"next, the board {add.words}")

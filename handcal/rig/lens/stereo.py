@@ -6,7 +6,7 @@ Each pair alone gives the pose; the one nearest to the others starts a bundle ad
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -28,7 +28,7 @@ from handcal.rig.boards.views import (
 from handcal.rig.lens.bundle import Adjusted, Setup, Sighting, adjust, as_transform, as_vector
 from handcal.rig.lens.camera import (
     CameraCalibration,
-    CameraSettings,
+    LensChoice,
     calibrate_camera,
     normal_spread,
     tilt,
@@ -38,22 +38,14 @@ from handcal.rig.lens.lens import Camera, LensModel, first_pose
 from handcal.rig.lens.shape import FLAT, MOST_BY_SHAPE, BoardShape, solve_shape
 from handcal.rig.lens.uncertainty import next_pair
 
-
-@dataclass(frozen=True, slots=True)
-class StereoSettings:
-    """Limits of a good pose between two cameras."""
-
-    camera: CameraSettings = field(default_factory=CameraSettings)
-    """For intrinsics that are not given."""
-    good_pairs: int = 10
-    good_spread_rad: float = 0.15
-    """Least spread of the boards' normals about their mean, RMS."""
-    max_rms_px: float = 1.0
-    max_angle_sigma_rad: float = 1e-3
-    max_shift_sigma_m: float = 3e-4
-    """Standard deviation of the rotation and the translation, each along its worst axis."""
-    max_shift_m: float = 0.5
-    """Maximum distance between two cameras on one headset."""
+_GOOD_PAIRS = 10
+# Least spread of the boards' normals about their mean, RMS.
+_GOOD_SPREAD_RAD = 0.15
+_MOST_RMS_PX = 1.0
+# Standard deviation of the rotation and the translation, each along its worst axis.
+_GOOD_ANGLE_RAD, _GOOD_SHIFT_M = 1e-3, 3e-4
+# Largest distance between two cameras on one headset.
+_MOST_SHIFT_M = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +95,7 @@ def calibrate_stereo(
     pairs: Sequence[tuple[BoardImage, BoardImage]],
     depth: Camera | None = None,
     headset: Camera | None = None,
-    settings: StereoSettings | None = None,
+    lens: LensChoice = "full",
 ) -> StereoCalibration:
     """Solve T_H_D from pairs of views, taken at the same moments, of one board.
 
@@ -113,7 +105,8 @@ def calibrate_stereo(
         The depth camera's and the headset camera's. A pair with either dropped is left out.
     depth, headset : Camera, optional
         If not given, solved from the same views, which then must be more and better.
-    settings : StereoSettings, optional
+    lens : LensChoice
+        Lens model of intrinsics that are solved.
 
     Raises
     ------
@@ -122,7 +115,6 @@ def calibrate_stereo(
         of the size of given intrinsics, the cameras are swapped, one's images are mirrored, both's
         are the same, the board hardly moved, or nothing can be solved.
     """
-    settings = settings or StereoSettings()
     both = found_by_both(pairs)
     check_sizes(both, depth, headset)
     check_moved({name: pair.depth for name, pair in both.items()})
@@ -130,10 +122,10 @@ def calibrate_stereo(
     are_given = depth is not None and headset is not None
     of_depth = of_headset = None
     if depth is None:
-        of_depth = _solved([first for first, _ in pairs], "depth", settings.camera)
+        of_depth = _solved([first for first, _ in pairs], "depth", lens)
         depth, lenses[0] = of_depth.intrinsics, of_depth.lens
     if headset is None:
-        of_headset = _solved([second for _, second in pairs], "headset", settings.camera)
+        of_headset = _solved([second for _, second in pairs], "headset", lens)
         headset, lenses[1] = of_headset.intrinsics, of_headset.lens
     if of_depth is None or of_headset is None:
         alone = each_alone(both, depth, headset)
@@ -141,7 +133,7 @@ def calibrate_stereo(
         alone = _as_solved(pairs, both, of_depth, of_headset)
     fit = _fit(both, alone, (depth, headset), lenses)
     board, points_m = FLAT, max((pair.depth.points_m for pair in both.values()), key=len)
-    if fit.rms_px <= MOST_BY_SHAPE * settings.max_rms_px:
+    if fit.rms_px <= MOST_BY_SHAPE * _MOST_RMS_PX:
         fit, board = solve_shape(_sightings(both), fit, lenses)
         if board.words:
             both = {
@@ -149,7 +141,7 @@ def calibrate_stereo(
                 for name, pair in both.items()
             }
             alone = each_alone(both, fit.setup.cameras[0], fit.setup.cameras[1], alone)
-    if fit.rms_px > settings.max_rms_px:
+    if fit.rms_px > _MOST_RMS_PX:
         # Pairs that contradict each other bend intrinsics that are free until nothing is sound.
         lenses = [None, None]
         fit = _fit(both, alone, (depth, headset), lenses)
@@ -190,7 +182,6 @@ def calibrate_stereo(
             why_apart(both, alone, np.array(list(residuals_px.values()))),
             worst,
             board,
-            settings,
         ),
         board=board,
         left_out=fit.left_out,
@@ -198,9 +189,9 @@ def calibrate_stereo(
     )
 
 
-def _solved(views: Sequence[BoardImage], which: str, settings: CameraSettings) -> CameraCalibration:
+def _solved(views: Sequence[BoardImage], which: str, lens: LensChoice) -> CameraCalibration:
     try:
-        calibration = calibrate_camera(views, settings)
+        calibration = calibrate_camera(views, lens)
     except ViewsError as error:
         raise ViewsError(f"{which} camera: {error}") from error
     if calibration.verdict.name == "bad":
@@ -329,23 +320,22 @@ def _judge(
     apart: tuple[str, bool],
     worst: WorstView,
     board: BoardShape,
-    settings: StereoSettings,
 ) -> CalibrationVerdict:
     rms_px = fit.rms_px
     why, is_few = apart
-    if rms_px > settings.max_rms_px or (why and not is_few):
+    if rms_px > _MOST_RMS_PX or (why and not is_few):
         trouble = why or f"drop the worst image, {worst.name}: {worst.why}"
-        limit = f", more than {settings.max_rms_px:g}" if rms_px > settings.max_rms_px else ""
+        limit = f", more than {_MOST_RMS_PX:g}" if rms_px > _MOST_RMS_PX else ""
         return CalibrationVerdict("bad", f"corners are {rms_px:.2f} px off{limit}: {trouble}")
     spread_rad = normal_spread(T_D_B)
-    if covariance is None or spread_rad < settings.good_spread_rad / 4:
+    if covariance is None or spread_rad < _GOOD_SPREAD_RAD / 4:
         return CalibrationVerdict(
             "bad",
             "all pairs show the board at nearly one angle: tilt it by 20° to 45° in all directions",
         )
     place = np.zeros(6) if fit.setup.place is None else fit.setup.place
     shift_m = float(np.linalg.norm(place[3:]))
-    if shift_m > settings.max_shift_m:
+    if shift_m > _MOST_SHIFT_M:
         return CalibrationVerdict(
             "bad",
             f"the cameras come out {1e3 * shift_m:.0f} mm apart: is the squares' side right, and "
@@ -361,14 +351,14 @@ def _judge(
         f"{1e3 * square_m(points_m):.2f} mm (1 % more is {10 * shift_m:.1f} mm more)"
     )
     wanting = [why] if why else []
-    if len(T_D_B) < settings.good_pairs:
-        wanting.append(f"{len(T_D_B)} pairs, {max(ASKED_VIEWS, settings.good_pairs)} are better")
-    if spread_rad < settings.good_spread_rad:
+    if len(T_D_B) < _GOOD_PAIRS:
+        wanting.append(f"{len(T_D_B)} pairs, {ASKED_VIEWS} are better")
+    if spread_rad < _GOOD_SPREAD_RAD:
         wanting.append(f"the board was tilted by {np.degrees(spread_rad):.0f}° only")
-    if angle_sigma > settings.max_angle_sigma_rad or shift_sigma > settings.max_shift_sigma_m:
+    if angle_sigma > _GOOD_ANGLE_RAD or shift_sigma > _GOOD_SHIFT_M:
         wanting.append(f"the pose is not known well: {known}")
     if wanting:
-        limits = settings.max_angle_sigma_rad, settings.max_shift_sigma_m
+        limits = _GOOD_ANGLE_RAD, _GOOD_SHIFT_M
         add = next_pair(fit.setup, lenses, covariance, points_m, rms_px / np.sqrt(2), limits)
         if add is not None:
             wanting.append(f"next, the board {add.words} (in the depth camera's image)")

@@ -109,10 +109,10 @@ def test_the_homography_knows_how_well_it_is_known() -> None:
 
 
 def test_the_distance_is_as_measured_with_its_uncertainty() -> None:
-    settings = DisplaySettings(distance_m=1.95, distance_sigma=0.02)
+    settings = DisplaySettings(distance_m=1.95)
     found = calibrate(DISPLAY, R_E_C, settings, noise_px=0.1)
     assert found.display.z_C0_S_m == 1.95
-    assert np.sqrt(found.covariance[3, 3]) == pytest.approx(0.039)
+    assert np.sqrt(found.covariance[3, 3]) == pytest.approx(0.0195)
     variances = np.diag(found.covariance)[:3]
     np.testing.assert_allclose(np.sort(variances), [1e-9, 4e-9, 9e-9], rtol=1e-3)
 

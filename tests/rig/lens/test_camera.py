@@ -9,7 +9,7 @@ from handcal.core.geometry import camera_matrix, rigid
 from handcal.core.types import Intrinsics
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import BoardImage, ViewsError, board_image, drop, read_views
-from handcal.rig.lens.camera import CameraSettings, calibrate_camera, fit_lens
+from handcal.rig.lens.camera import calibrate_camera, fit_lens
 from handcal.sim.boards import BoardPainter, board_poses, board_view
 
 BOARD = Board()
@@ -69,7 +69,7 @@ def test_the_covariance_is_as_opencv_has_it() -> None:
 
 @pytest.mark.parametrize(("lens", "count"), [("none", 0), ("radial", 5), ("rational", 8)])
 def test_each_lens_model_solves_its_coefficients(lens: str, count: int) -> None:
-    result = calibrate_camera(_views(), CameraSettings(lens=lens))  # type: ignore[arg-type]
+    result = calibrate_camera(_views(), lens)  # type: ignore[arg-type]
     assert len(result.intrinsics.distortion) == count
     assert (result.verdict.name == "bad") == (lens == "none")
     if lens == "radial":
