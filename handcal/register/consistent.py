@@ -207,8 +207,8 @@ def match_hands(
         near_cut |= cursor_m @ along > limit_m - CUT_BAND_M - spacing_m
     fine = register_rigid(hand, cursor, _FINE, T_cursor_hand)
     patches = find_patches(hand, fine.T_target_source)
-    opening = measure_opening(hand, cursor, fine, _FINE, patches)
-    shape = measure_shape_change(hand, cursor, fine, _FINE)
+    opening = measure_opening(hand, cursor, fine, patches)
+    shape = measure_shape_change(hand, cursor, fine)
     rest_m = shape.without_opening(1.0).rms_m
     T_cursor_hand = fine.T_target_source
     find = partial(_pairs, tree, near_cut, is_common, spacing_m)

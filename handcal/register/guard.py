@@ -141,7 +141,7 @@ class RotationGuard:
             moved_m = mean_point(hand.points_m) - last_middle_m
             T_start = rigid(translation_m=moved_m) @ last.T_target_source
         fit = register_rigid(cursor, hand, settings, T_start)
-        return measure_shape_change(cursor, hand, fit, settings)
+        return measure_shape_change(cursor, hand, fit)
 
     def _describe(self, hand_m: Float64, hand_cut: Bool | None) -> Surface:
         return describe_surface(hand_m, hand_cut, self._settings.max_points)

@@ -27,6 +27,13 @@ from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes
 
 _OUTLINE_FROM_POINTS = 1500
+# Places to choose from, to the right of the camera's line of sight to the raised hand.
+_ASIDE_M = -0.03, 0.0, 0.03
+# Places to choose from, beyond the nearest. The last tells what the wearer always sees wrongly from
+# the eyes, which pays if the prior of the sitting is wide.
+_BEYOND_M = 0.0, 0.04, 0.08, 0.2
+# Least share of the hand's outline within each display that is used.
+_SHOWN_SHARE = 0.6
 # More observations do not explain what no eye explains.
 _WITH_MISFIT = 2
 # Error of a registration, and its growth with the angle by which the camera sees the moved hand
@@ -44,13 +51,6 @@ class PlacementSettings:
     55 mm and 126 disparities, measures nothing nearer unless a disparity shift is set."""
     farthest_m: float = 0.75
     """Largest such distance."""
-    aside_m: tuple[float, ...] = (-0.03, 0.0, 0.03)
-    """Places to choose from, to the right of the camera's line of sight to the raised hand."""
-    depths_m: tuple[float, ...] = (0.0, 0.04, 0.08, 0.2)
-    """Places to choose from, beyond the nearest. The last tells what the wearer always sees wrongly
-    from the eyes, which pays if the prior of the sitting is wide."""
-    shown_share: float = 0.6
-    """Least share of the hand's outline within each display that is used."""
     fewest: int = 2
     """Alignments of the recommended plan before the eyes are verified."""
     most: int = 6
@@ -223,7 +223,7 @@ def _places(
     # Movement along the line of sight changes the depth before the camera at this rate.
     rate = float((rig.T_H_D[:3, :3].T @ line_m)[2])
     places = []
-    for aside_m, beyond_m in product(settings.aside_m, settings.depths_m):
+    for aside_m, beyond_m in product(_ASIDE_M, _BEYOND_M):
         ratio = 1.0 + (settings.nearest_m + beyond_m - depth_m) / rate
         place = (ratio - 1.0) * line_m + [aside_m, 0.0, 0.0]
         if _is_visible(raised_m + place, outline_m + place, rig, eyes, drawn_shift_m, settings):
@@ -251,7 +251,7 @@ def _is_visible(
     for eye in eyes:
         display = rig.eyes[eye]
         drawn = eye_projection(display, drawn_shift_m[eye]) @ view_of_eye(display, np.eye(4))
-        if is_on_display(display, project(drawn, outline_m)).mean() < settings.shown_share:
+        if is_on_display(display, project(drawn, outline_m)).mean() < _SHOWN_SHARE:
             return False
     return True
 

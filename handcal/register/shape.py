@@ -26,10 +26,10 @@ from handcal.core.geometry import invert, transform
 from handcal.core.types import Float64
 from handcal.register.rcicp import best_rigid
 from handcal.register.rigid import (
+    OUTLIER_M,
     SIGMA_OF_MEDIAN,
     Patches,
     RigidResult,
-    RigidSettings,
     Rows,
     distant,
     moved_about,
@@ -88,7 +88,7 @@ class Opening(NamedTuple):
 
 
 def measure_opening(
-    source: Surface, target: Surface, fit: RigidResult, settings: RigidSettings, patches: Patches
+    source: Surface, target: Surface, fit: RigidResult, patches: Patches
 ) -> Opening:
     """Measure the change of size between registered hands.
 
@@ -97,8 +97,6 @@ def measure_opening(
     source, target : Surface
     fit : RigidResult
         From `register_rigid`, of the source to the target.
-    settings : RigidSettings
-        Of the search for pairs.
     patches : Patches
         Of the source's points.
     """
@@ -107,7 +105,7 @@ def measure_opening(
     grown_m = source.points_m
     for step in range(_SIZE_STEPS):
         if step:
-            rows = registration_rows(source, target, T, settings, grown_m)
+            rows = registration_rows(source, target, T, grown_m)
         x, sigma = _solve(rows, patches)
         log_size += float(x[6]) / (1.0 - _LEFT_AFTER_STEP)
         grown_m = middle_m + np.exp(log_size) * (source.points_m - middle_m)
@@ -205,9 +203,7 @@ class ShapeChange:
         return replace(self, moved_m=self.moved_m - share * growth * out_m)
 
 
-def measure_shape_change(
-    cursor: Surface, hand: Surface, fit: RigidResult, settings: RigidSettings = RigidSettings()
-) -> ShapeChange:
+def measure_shape_change(cursor: Surface, hand: Surface, fit: RigidResult) -> ShapeChange:
     """Measure how the shape of registered hands differs.
 
     Parameters
@@ -215,8 +211,6 @@ def measure_shape_change(
     cursor, hand : Surface
     fit : RigidResult
         From `register_rigid`, of the cursor to the hand.
-    settings : RigidSettings
-        Of the search for pairs.
     """
     points, rows, T_hand_cursor = cursor.points_m, fit.rows, fit.T_target_source
     nodes = cube_means(points, _NODE_CUBE_M)
@@ -232,10 +226,10 @@ def measure_shape_change(
             break
         if step:
             bent = points + point_moved
-            rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
+            rows = registration_rows(cursor, hand, T_hand_cursor, bent)
         toward = T_hand_cursor[:3, :3].T @ rows.toward.T
         before_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - rows.gap_m
-        far_weight = _far_weight(rows, settings)
+        far_weight = _far_weight(rows)
         weight = rows.trust * far_weight
         normal, wanted = _normal_equation(shares, products, rows.index, toward, weight, before_m)
         prior = len(rows.gap_m) / count * stiffness
@@ -264,12 +258,12 @@ def measure_shape_change(
     )
 
 
-def _far_weight(rows: Rows, settings: RigidSettings) -> Float64:
+def _far_weight(rows: Rows) -> Float64:
     """Return the weights of rows, (N,), that decrease with what they are apart."""
     apart = np.ones(len(rows.gap_m))
     outline_m, inner_m = np.split(rows.distance_m, [rows.outlines])
     if len(outline_m):
-        scale_m = max(settings.outlier_m, 3.0 * quantile(outline_m, 0.5))
+        scale_m = max(OUTLIER_M, 3.0 * quantile(outline_m, 0.5))
         apart[: rows.outlines] = (1.0 + (outline_m / scale_m) ** 2) ** 2
     if len(inner_m):
         apart[rows.outlines :] = distant(

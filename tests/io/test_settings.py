@@ -19,11 +19,9 @@ from handcal.core.errors import FileError
 from handcal.core.types import Float64
 from handcal.io.settings import read_settings, settings_json
 from handcal.lab.demo import DemoSettings
-from handcal.register.fuse import FuseSettings
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 PLAUSIBLE = st.floats(1e-3, 1e3)  # what no stage refuses
-SCALES = len(FuseSettings().wearer_scales)
 
 
 @dataclass(frozen=True)
@@ -83,8 +81,6 @@ def any_value(kind: Any) -> st.SearchStrategy[Any]:
         bool: st.booleans(),
         str: st.text(),
         tuple[float, float, float]: st.lists(PLAUSIBLE, min_size=3, max_size=3),
-        # As long as the wearers' default scales and weights, which belong together.
-        tuple[float, ...]: st.lists(PLAUSIBLE, min_size=SCALES, max_size=SCALES),
     }
     return known[kind]
 

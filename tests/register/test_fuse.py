@@ -18,6 +18,7 @@ from handcal.core.types import (
     Verification,
 )
 from handcal.lab.bench.trials import trial_hand
+from handcal.register import fuse
 from handcal.register.fuse import (
     Fused,
     FuseSettings,
@@ -35,12 +36,17 @@ from handcal.sim.raster import visible_points
 
 RIG = replace(example_rig(), depth_edges=DepthEdges(0.0, 1e-9, "measured"))
 SETTINGS = FuseSettings(sitting=SittingSettings(0.0, 0.0))
-USUAL = replace(SETTINGS, wearer_scales=(1.0,), wearer_weights=(1.0,))
-"""A wearer who is known to be as precise as usual; for errors of a sitting see test_sitting.py."""
 # Of the registration, mixed axes.
 _AXES = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 REGISTRATION_M2 = _AXES @ np.diag([0.0003, 0.0005, 0.0010]) ** 2 @ _AXES.T
 DEPTH_M = 0.5
+
+
+@pytest.fixture
+def usual_wearer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take the wearer as known to be as precise as usual."""
+    monkeypatch.setattr(fuse, "_WEARER_SCALES", (1.0,))
+    monkeypatch.setattr(fuse, "_WEARER_WEIGHTS", (1.0,))
 
 
 def _shift(shift_m: Float64, covariance_m2: Float64 = REGISTRATION_M2) -> EyeShift:
@@ -116,6 +122,7 @@ def _check(rng: np.random.Generator, true_m: Float64) -> Verification:
     return Verification((0.0, 0.0, 0.0), (1.0, 0.0), (x, y, z), 0.0, (0.0, 0.0, DEPTH_M))
 
 
+@pytest.mark.usefixtures("usual_wearer")
 @pytest.mark.parametrize("checks", [1, 2])
 def test_checks_alone_give_estimates_with_honest_covariances(checks: int) -> None:
     rng = np.random.default_rng(0)
@@ -126,7 +133,7 @@ def test_checks_alone_give_estimates_with_honest_covariances(checks: int) -> Non
         for eye, true_m in zip(EYES, (drawn_m[:3], drawn_m[3:]), strict=True):
             for _ in range(checks):
                 verified[eye] = _check(rng, true_m).after(verified.get(eye))
-        fused = fuse_alignments([], RIG, USUAL, verified=verified)
+        fused = fuse_alignments([], RIG, SETTINGS, verified=verified)
         for eye, true_m in zip(EYES, (drawn_m[:3], drawn_m[3:]), strict=True):
             error_m = fused.shifts[eye].shift_m - true_m
             errors_m.append(error_m)
@@ -136,6 +143,7 @@ def test_checks_alone_give_estimates_with_honest_covariances(checks: int) -> Non
     assert set(fused.verifiable) == set(EYES)
 
 
+@pytest.mark.usefixtures("usual_wearer")
 def test_a_check_adds_to_an_alignment_and_says_nothing_without_a_place() -> None:
     rng = np.random.default_rng(1)
     true_m = np.array([0.003, -0.002, 0.004])
@@ -145,7 +153,8 @@ def test_a_check_adds_to_an_alignment_and_says_nothing_without_a_place() -> None
         {}, {"left": check}, {"left": replace(check, hand_E_m=None)},
     ]  # fmt: skip
     alone, checked, nowhere = (
-        fuse_alignments([(ONE["left"], seen)], RIG, USUAL, verified=verified) for verified in checks
+        fuse_alignments([(ONE["left"], seen)], RIG, SETTINGS, verified=verified)
+        for verified in checks
     )
     sigma_m = [np.linalg.norm(one.shifts["left"].sigma_m) for one in (alone, checked, nowhere)]
     assert sigma_m[1] < 0.8 * sigma_m[0]
@@ -154,9 +163,10 @@ def test_a_check_adds_to_an_alignment_and_says_nothing_without_a_place() -> None
     np.testing.assert_allclose(foreseen_m2, checked.shifts["left"].covariance_m2, rtol=0.02)
 
 
+@pytest.mark.usefixtures("usual_wearer")
 def test_one_alignment_with_one_eye_is_the_estimate_with_the_prior() -> None:
     seen_m = np.array([0.003, -0.002, 0.004])
-    fused = fuse_alignments([(ONE["left"], {"left": _shift(seen_m)})], RIG, USUAL).shifts
+    fused = fuse_alignments([(ONE["left"], {"left": _shift(seen_m)})], RIG, SETTINGS).shifts
     assert set(fused) == {"left"}
     prior, noise = _prior_m2()[:3, :3], REGISTRATION_M2 + _wearer_m2()
     gain = prior @ np.linalg.inv(prior + noise)
@@ -217,6 +227,7 @@ def test_disagreement_widens_the_covariance() -> None:
     np.testing.assert_allclose(disagreeing.shifts["left"].shift_m, 0.0, atol=1e-12)
 
 
+@pytest.mark.usefixtures("usual_wearer")
 @pytest.mark.parametrize("alignments", [[BOTH], [ONE["left"], ONE["right"]]], ids=["both", "each"])
 @pytest.mark.parametrize("times", [1, 3])
 def test_more_alignments_are_worth_what_repetitions_bring(
@@ -225,7 +236,7 @@ def test_more_alignments_are_worth_what_repetitions_bring(
     once = [(one, {eye: _shift(np.zeros(3)) for eye in one.eyes}) for one in alignments]
     two_more = [once[0]] * 2
     now, after = (
-        fuse_alignments(all_, RIG, USUAL) for all_ in (once * times, once * times + two_more)
+        fuse_alignments(all_, RIG, SETTINGS) for all_ in (once * times, once * times + two_more)
     )
     foreseen_m2 = now.covariance_after_m2(alignments[0].eyes, 2)
     for eye, part in zip(EYES, (slice(0, 3), slice(3, 6)), strict=True):
@@ -367,6 +378,7 @@ def _by_wrong_depth(alignment: Alignment) -> Alignment:
     return replace(alignment, hand_m=transform(invert(T_D_W), wrong_D_m))
 
 
+@pytest.mark.usefixtures("usual_wearer")
 def test_a_bias_of_depth_moves_what_is_observed_as_the_system_says(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -384,19 +396,20 @@ def test_a_bias_of_depth_moves_what_is_observed_as_the_system_says(
         (one, solve_alignment(one, RIG, "consistent"))
         for one in (alignment, _by_wrong_depth(alignment))
     ]
-    right, wrong = (fuse_alignments([one], biased, USUAL) for one in solved)
+    right, wrong = (fuse_alignments([one], biased, SETTINGS) for one in solved)
     seen_m = wrong.observed[0].seen_m - right.observed[0].seen_m
     assert np.linalg.norm(seen_m) > 0.004
     by_depth = right.observed[0].by_sitting[:, 4:]
     np.testing.assert_allclose(by_depth @ [SCALE - 1.0, OFFSET_M], seen_m, atol=1e-3)
     # A bias that the check has found is expected: the estimate follows it less, and within σ.
     moved_m = wrong.shifts["left"].shift_m - right.shifts["left"].shift_m
-    sure, surely_wrong = (fuse_alignments([one], RIG, USUAL).shifts["left"] for one in solved)
+    sure, surely_wrong = (fuse_alignments([one], RIG, SETTINGS).shifts["left"] for one in solved)
     assert abs(moved_m[2]) < 0.5 * abs(surely_wrong.shift_m[2] - sure.shift_m[2])
     assert abs(moved_m[2]) < right.shifts["left"].sigma_m[2]
     assert right.shifts["left"].sigma_m[2] > 1.2 * sure.sigma_m[2]
 
 
+@pytest.mark.usefixtures("usual_wearer")
 def test_an_uncertain_depth_widens_sigma_and_more_alignments_do_not_help() -> None:
     check = _depth_check(np.diag([0.01**2, 0.003**2]))
     checked = replace(RIG, depth_check=check)
@@ -407,7 +420,7 @@ def test_an_uncertain_depth_widens_sigma_and_more_alignments_do_not_help() -> No
     sigmas_m = np.array(
         [
             [
-                fuse_alignments([solved] * count, rig, USUAL).shifts["left"].sigma_m[2]
+                fuse_alignments([solved] * count, rig, SETTINGS).shifts["left"].sigma_m[2]
                 for count in (1, 16)
             ]
             for rig in (RIG, checked)

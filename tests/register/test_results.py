@@ -83,9 +83,9 @@ def test_an_eye_that_took_no_part_has_no_result(left: Alignment) -> None:
 
 
 def test_the_settings_reach_the_verdict(left: Alignment) -> None:
-    lenient = SolveSettings(verdict=VerdictSettings(target_arcmin=60.0, probability_min=0.0))
+    lenient = SolveSettings(verdict=VerdictSettings(target_arcmin=60.0))
     strict = SolveSettings(verdict=VerdictSettings(target_arcmin=0.1))
-    assert solve_session([left], RIG, lenient).verdicts["left"].name == "accept"
+    assert solve_session([left], RIG, lenient).verdicts["left"].name == "keep"
     assert solve_session([left], RIG, strict).verdicts["left"].name == "repeat"
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from handcal.core.types import EYES, DepthEdges, Eye, Float64, Verification
+from handcal.register import fuse
 from handcal.register.fuse import Fused, FuseSettings, fuse_alignments
 from handcal.register.model import nudged_shift_m
 from handcal.register.prior import PriorSettings
@@ -65,10 +66,10 @@ def test_the_derivatives_are_those_of_a_nudge(axis: int, sees: tuple[float, floa
     np.testing.assert_allclose((one.by_sitting @ error)[axis], moved_m[axis], rtol=0.03)
 
 
-def test_near_and_far_tell_a_constant_error_from_the_eyes() -> None:
+def test_near_and_far_tell_a_constant_error_from_the_eyes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuse, "_VERIFIED_SIGMA_ARCMIN", 0.3)
     wide = FuseSettings(
         sitting=SittingSettings(6.0, 0.004),
-        verified_sigma_arcmin=0.3,
         prior=PriorSettings(eye_box_sigma_m=0.01),
     )
     true_m, sees = np.array([0.003, 0.0, 0.0]), (4.0, 0.0, 0.0)

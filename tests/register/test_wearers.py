@@ -3,7 +3,7 @@
 import numpy as np
 
 from handcal.core.types import Float64
-from handcal.register.fuse import FuseSettings, verified_observation
+from handcal.register.fuse import verified_observation
 from handcal.register.prior import MIN_SITTINGS, Observed, eye_prior, learn_wearers
 from handcal.register.sitting import SittingSettings, sitting_prior
 from handcal.rig.example import example_rig
@@ -18,7 +18,7 @@ def sitting(rng: np.random.Generator, error: Float64) -> list[Observed]:
     shift_m = rng.multivariate_normal(np.zeros(6), eye_prior().covariance_m2)
     observed = []
     for depth_m in (0.4, 0.7, 0.4, 0.7):
-        one = verified_observation(RIG, "left", (0, 0, 0), (0.0, 0.0, depth_m), FuseSettings())
+        one = verified_observation(RIG, "left", (0, 0, 0), (0.0, 0.0, depth_m))
         H, _, noise_m2 = one.at(1.0)
         truth = np.concatenate([shift_m, error, np.zeros(3)])
         observed.append((H, rng.multivariate_normal(H @ truth, noise_m2), noise_m2))
