@@ -15,13 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from handcal.core.types import EYES, Eye, EyeShift, PlanName, Rig, Verdict, Verification
-from handcal.register.benefit import (
-    Benefit,
-    benefit,
-    expected_arcmin,
-    foreseen_benefit,
-    percent,
-)
+from handcal.register.benefit import Benefit, benefit, expected_arcmin, foreseen_benefit, percent
 from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_position_m, eye_slice
 

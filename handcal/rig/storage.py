@@ -104,6 +104,10 @@ class Fields:
         """Return a map among the fields."""
         return Fields(self._prefix + name, self._node.getNode(name))
 
+    def part(self, name: str, convert: Callable[[Fields], Value]) -> Value | None:
+        """Return what `convert` makes of a map among the fields; None without it."""
+        return convert(self.section(name)) if self.has(name) else None
+
     def text(self, name: str) -> str:
         """Return a text."""
         node = self._node.getNode(name)

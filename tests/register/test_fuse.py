@@ -19,11 +19,7 @@ from handcal.core.types import (
 )
 from handcal.lab.bench.trials import trial_hand
 from handcal.register import fuse
-from handcal.register.fuse import (
-    Fused,
-    FuseSettings,
-    fuse_alignments,
-)
+from handcal.register.fuse import Fused, FuseSettings, fuse_alignments
 from handcal.register.prior import PriorSettings
 from handcal.register.shape import Opening
 from handcal.register.sitting import SittingSettings

@@ -7,14 +7,7 @@ from handcal.core.errors import HandError
 from handcal.core.geometry import rigid, transform
 from handcal.core.types import Float64
 from handcal.lab.bench.trials import trial_alignment
-from handcal.register.guard import (
-    AXES,
-    Axis,
-    GuardSettings,
-    RotationGuard,
-    TurnAdvice,
-    turn_advice,
-)
+from handcal.register.guard import AXES, Axis, GuardSettings, RotationGuard, TurnAdvice, turn_advice
 from handcal.sim.alignments import AlignmentSettings, SimulatedAlignment
 from handcal.sim.hand import make_hand
 

@@ -6,13 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.display import update_matrix
 from handcal.core.geometry import project, transform
-from handcal.register.model import (
-    balanced_turn,
-    cursor_displacement,
-    design,
-    fit_shift,
-    predict,
-)
+from handcal.register.model import balanced_turn, cursor_displacement, design, fit_shift, predict
 
 SHIFTS = st.tuples(*[st.floats(-0.02, 0.02)] * 3).map(np.array)
 DISTANCES = st.floats(1.0, 5.0)

@@ -317,13 +317,6 @@ def _judge(
     )
 
 
-def rotation_homography(camera: Intrinsics, R_S_C: Float64) -> Float64:
-    """Return ``H = K R_S_C K⁻¹`` (3, 3): warped pixels from undistorted ones."""
-    K = camera_matrix(camera)
-    H: Float64 = K @ R_S_C @ np.linalg.inv(K)
-    return H
-
-
 class RotationWarp:
     """Undistorts and rotates frames of one camera; the pixel map is computed once.
 
