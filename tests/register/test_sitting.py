@@ -145,10 +145,3 @@ def test_an_outline_that_nobody_measured_may_be_wrong_by_more() -> None:
     )
     assert abs(typical.shift_m[2]) < 0.7 * abs(measured.shift_m[2])
     assert typical.sigma_m[2] > 1.1 * measured.sigma_m[2]
-
-
-def test_a_prior_of_wearers_must_be_one() -> None:
-    with pytest.raises(ValueError, match="3 numbers"):
-        LearnedSitting((0.0,), (0.0,), 30)
-    with pytest.raises(ValueError, match="not one"):
-        LearnedSitting((0.0, 0.0, 0.0), (-1.0, 0, 0, 0, 1, 0, 0, 0, 1), 30)
