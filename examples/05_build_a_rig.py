@@ -17,12 +17,12 @@ import handcal
 from handcal.cli.terminal import errors_in_one_line
 from handcal.core.types import EYES
 from handcal.rig.assemble import screen_of, with_display, with_stereo
-from handcal.rig.boards.tracked_file import read_tracked
 from handcal.rig.boards.views import BoardImage, image_files, pair_views, read_views, used
 from handcal.rig.compare import compare_rigs
-from handcal.rig.displays.display import DisplaySettings, calibrate_display, fit_homography
 from handcal.rig.displays.grid import Grid, on_display
+from handcal.rig.displays.homography import DisplaySettings, calibrate_display, fit_homography
 from handcal.rig.example import example_rig
+from handcal.rig.formats import read_tracked
 from handcal.rig.lens.camera import calibrate_camera
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.rig.lens.viewpoint import viewpoint_from_tracked

@@ -128,10 +128,10 @@ MUTANTS = (
     ),
     Mutant(
         "formulas in CSV",
-        "handcal/report/rows.py",
+        "handcal/report/html.py",
         "if isinstance(value, str) and value.startswith(_FORMULA_STARTS):",
         "if False:",
-        "tests/report/test_rows.py",
+        "tests/report/test_document.py",
     ),
     Mutant(
         "mirrored poses accepted",

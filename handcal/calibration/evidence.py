@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.geometry import invert
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics, Rig, UInt16
 from handcal.rig.compare import compare_camera
-from handcal.rig.report import depth_finding, display_finding
+from handcal.rig.findings import depth_finding, display_finding
 
 FROZEN_FRAMES = 4
 """Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""

@@ -45,7 +45,7 @@ class LabPrior:
     """None if there are too few sessions."""
     repeated: tuple[tuple[list[Observed], ...], ...]
     """The observations of each sitting of each person with more than one, from which
-    `handcal.register.wearers` learns."""
+    `handcal.register.prior` learns."""
     used: int
     """Number of sessions that `learned` was, or would be, learned from."""
     left_out: Mapping[str, int]

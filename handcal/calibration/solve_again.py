@@ -9,7 +9,7 @@ from handcal.calibration.states import CalibrationSettings
 from handcal.core.errors import FileError, HandError
 from handcal.core.progress import Progress
 from handcal.core.types import METHODS, EyeDistance, Method
-from handcal.io.settings import read_settings
+from handcal.io.settings import known_settings, read_settings
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.journal import Damage
 from handcal.session.repair import SessionCheck, check_session, without_unsolvable
@@ -75,7 +75,8 @@ def solve(
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:
     """Return the solve settings of a session; FileError if they cannot be read."""
     where = f"{record.path / 'settings.json'}: calibration"
-    return read_settings(CalibrationSettings, record.settings.get("calibration", {}), where).solve
+    stored = known_settings(CalibrationSettings, record.settings.get("calibration", {}))
+    return read_settings(CalibrationSettings, stored, where).solve
 
 
 def solve_again(

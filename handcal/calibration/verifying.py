@@ -21,7 +21,7 @@ from handcal.core.geometry import invert, transform
 from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Rig, Verification
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.server import Nudge
-from handcal.register.nudge import nudged_shift_m
+from handcal.register.model import nudged_shift_m
 from handcal.session.journal import Event
 from handcal.session.state import VERIFYING, SessionEvent
 

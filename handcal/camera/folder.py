@@ -36,7 +36,7 @@ from handcal.core.geometry import is_rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics
 from handcal.io.files import make_folder, read_json, read_limited, write_json
 from handcal.io.images import IMAGE_SUFFIXES
-from handcal.rig.check import identity_from_json
+from handcal.rig.plausible import identity_from_json
 
 DESCRIPTION = "recording.json"
 LIST = "frames.csv"

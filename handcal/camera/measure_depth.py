@@ -13,8 +13,16 @@ from handcal.core.types import DepthCheck, DepthEdges, Frame
 from handcal.rig.boards.board import Board, BoardError, BoardView
 from handcal.rig.boards.choose import ChooseSettings, ViewSelector
 from handcal.rig.boards.views import MAX_VIEWS, ViewsError
-from handcal.rig.depth import MIN_DEPTH_VIEWS, DepthView, depth_view, fit_depth, on_real_board
-from handcal.rig.depth_border import MIN_BORDER_VIEWS, border_outside_px, fit_edges
+from handcal.rig.depth import (
+    MIN_BORDER_VIEWS,
+    MIN_DEPTH_VIEWS,
+    DepthView,
+    border_outside_px,
+    depth_view,
+    fit_depth,
+    fit_edges,
+    on_real_board,
+)
 from handcal.rig.lens.shape import FLAT, BoardShape
 
 _SILENT_S = 5.0

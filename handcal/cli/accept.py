@@ -53,7 +53,7 @@ _HOW: dict[RigPart, str] = {
 )
 def accept(arguments: argparse.Namespace) -> None:
     """Check a rig without a wearer, with a camera in the eye's place; exit code 1 if it fails."""
-    from handcal.rig.acceptance.acceptance import (
+    from handcal.rig.acceptance import (
         AcceptanceSettings,
         passed_words,
         run_acceptance,

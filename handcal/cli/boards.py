@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from handcal.rig.boards.views import BoardImage
     from handcal.rig.displays.grid import Grid
-    from handcal.rig.verdict import CalibrationVerdict
+    from handcal.rig.lens.fit import CalibrationVerdict
 
 _BOARD = Board()
 _SIDE = number(float, 1.0, 1000.0)

@@ -16,8 +16,8 @@ from handcal.core.errors import CameraError, HandcalError
 from handcal.core.types import EYES
 from handcal.io.files import make_folder
 from handcal.lab.evaluate.cube_folder import CapturePlan
-from handcal.rig.boards.print_page import PAPERS
-from handcal.rig.cube.cube import Cube
+from handcal.rig.boards.printing import PAPERS
+from handcal.rig.cube import Cube
 
 if TYPE_CHECKING:
     from handcal.lab.settings import CubeTestSettings
@@ -64,8 +64,7 @@ _CAPTURES = (
 )
 def net(arguments: argparse.Namespace) -> None:
     """Make a cube: its net to print at true size, and the file that describes it."""
-    from handcal.rig.cube.cube_file import write_cube
-    from handcal.rig.cube.printing import write_cube_pdf
+    from handcal.rig.cube import write_cube, write_cube_pdf
 
     try:
         cube = Cube(

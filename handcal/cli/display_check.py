@@ -56,7 +56,7 @@ _MODES = "obeys", "no-override", "one-for-both", "depth", "infinity", "image-pla
 def display_check(arguments: argparse.Namespace) -> None:
     """Check that a connected headset draws what it is sent, and store the check in a rig file."""
     from handcal.core.types import EYES
-    from handcal.rig.report import display_finding
+    from handcal.rig.findings import display_finding
     from handcal.rig.rig_file import read_rig, write_rig
     from handcal.station.checks.display_check import run_display_check
 

@@ -27,7 +27,7 @@ from handcal.cli.output import console, show_progress, until_interrupted
 from handcal.cli.terminal import arg, command, fail, file_option, folder_option, number, value
 from handcal.core.errors import HandcalError
 from handcal.io.files import make_folder, write_json
-from handcal.rig.boards.print_page import PAPERS
+from handcal.rig.boards.printing import PAPERS
 from handcal.rig.boards.views import MAX_VIEWS
 from handcal.rig.formats import CALIBRATION_FORMATS
 from handcal.rig.lens.camera import LENS_CHOICES
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from handcal.rig.boards.views import WorstView
-    from handcal.rig.verdict import CalibrationVerdict
+    from handcal.rig.lens.fit import CalibrationVerdict
 
 
 _CALIBRATION_OPTIONS = (
@@ -165,10 +165,10 @@ def take(arguments: argparse.Namespace) -> None:
 def camera(arguments: argparse.Namespace) -> None:
     """Calibrate a camera's intrinsics from images of a board."""
     from handcal.rig.formats import camera_json, write_intrinsics
-    from handcal.rig.lens.camera import CameraSettings, calibrate_camera
+    from handcal.rig.lens.camera import calibrate_camera
 
     views = views_of(arguments.images, board_of(arguments), arguments.drop)
-    result = calibrate_camera(views, CameraSettings(lens=arguments.lens))
+    result = calibrate_camera(views, arguments.lens)
     show_views(views, result.residuals_px)
     solved = result.intrinsics
     sigma = result.sigma

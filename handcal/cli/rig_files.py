@@ -114,7 +114,7 @@ def depth(arguments: argparse.Namespace) -> None:
     from handcal.camera.measure_depth import STILLS, DepthSettings, run_depth_check
     from handcal.report.cells import signed
     from handcal.rig.depth import explain_depth
-    from handcal.rig.report import depth_finding, edges_finding
+    from handcal.rig.findings import depth_finding, edges_finding
 
     rig, board = rig_or_example(arguments.rig), board_of(arguments)
     with ExitStack() as stack:
@@ -157,7 +157,7 @@ def depth(arguments: argparse.Namespace) -> None:
 @command(arg("input", type=Path, help="rig file"), json=True)
 def check(arguments: argparse.Namespace) -> None:
     """Check a rig file: every field, its plausibility, and how it was calibrated."""
-    from handcal.rig.report import report_rig
+    from handcal.rig.findings import report_rig
 
     rig = rig_or_example(arguments.input)
     findings = report_rig(rig)

@@ -16,7 +16,7 @@ from handcal.export.formats import FORMATS, TOOL_FORMATS
 from handcal.session.record import SessionRecord
 
 if TYPE_CHECKING:
-    from handcal.register.wearers import LearnedWearers
+    from handcal.register.prior import LearnedWearers
 
 _METRES = number(float, 1e-3, 1e6)
 
@@ -196,9 +196,14 @@ def prior(arguments: argparse.Namespace) -> None:
     from handcal.core.errors import FileError
     from handcal.core.types import EYES
     from handcal.io.resources import resource_path
-    from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior, eye_slice
+    from handcal.register.prior import (
+        MIN_SESSIONS,
+        PriorSettings,
+        eye_prior,
+        eye_slice,
+        learn_wearers,
+    )
     from handcal.register.sitting import SittingSettings, sitting_prior
-    from handcal.register.wearers import learn_wearers
     from handcal.rig.rig_file import read_rig
 
     if not arguments.folder.is_dir():
@@ -253,8 +258,8 @@ def _print_wearers(repeated: Sequence[Sequence[object]], wearers: LearnedWearers
     """Print what wearers see wrongly in a whole sitting, beside the default."""
     from math import radians
 
+    from handcal.register.prior import MIN_PEOPLE, MIN_SITTINGS
     from handcal.register.sitting import SittingSettings
-    from handcal.register.wearers import MIN_PEOPLE, MIN_SITTINGS
 
     sittings = sum(map(len, repeated))
     console.print(f"Repeated sittings: {sittings} of {len(repeated)} people")

@@ -12,7 +12,7 @@ from handcal.core.types import EYES, Eye, EyeShift, Float64
 from handcal.export.outcome import SessionOutcome, ShiftOrigin
 from handcal.io.files import write_atomic
 from handcal.register.benefit import expected_error_arcmin
-from handcal.report.rows import rows_csv
+from handcal.report.cells import rows_csv
 from handcal.session.comparison import Comparison, read_comparisons
 from handcal.session.trial import Trial
 

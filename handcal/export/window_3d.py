@@ -27,7 +27,7 @@ from handcal.export.outcome import SessionOutcome
 from handcal.export.scene_3d import Scene3d, make_scenes
 from handcal.io.files import make_folder, read_limited, require_suffix, write_atomic
 from handcal.io.x_display import x_server_answers
-from handcal.register.verdict import VerdictSettings
+from handcal.register.verdict import RMS_MAX_M
 
 _KEYS = "N, P: next, previous alignment; E: other eye; V: view from the eye; O: oblique view"
 _SIZE_PX = 1200, 800
@@ -37,7 +37,7 @@ _NO_WINDOW = 3
 """Exit status of the process if OpenGL opens no window."""
 _NO_CACHE = {"MESA_SHADER_CACHE_DISABLE": "true", "__GL_SHADER_DISK_CACHE": "0"}
 """Keeps Mesa and NVIDIA's driver from writing compiled shaders into the user's folder."""
-_LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
+_LARGEST_MM = 1e3 * RMS_MAX_M
 _COLORS: Mapping[Eye, tuple[float, float, float]] = {
     "left": (0.0, 0.45, 0.70),
     "right": (0.84, 0.37, 0.0),

@@ -19,12 +19,7 @@ from functools import cache, lru_cache
 import numpy as np
 from scipy.special import ndtri
 
-from handcal.core.display import (
-    TARGET_DEPTHS_M,
-    arcmin_from_px,
-    eye_projection,
-    target_corners_m,
-)
+from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
 from handcal.core.geometry import project
 from handcal.core.types import EyeDisplay, EyeShift, Float64
 

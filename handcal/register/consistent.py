@@ -3,6 +3,10 @@
 A rotation of the hand between the two moments is a nuisance parameter of the hand, not of the eye.
 So is a change of its apparent size: bones do not grow, and the prior says so, but exact pairs may
 overrule it (the paper's own simulated data shrink the hand by 1 - φ3φ4).
+
+The segmentation cuts the forearm of each frame where it found the wrist. Points that only one of
+the clouds has, and a centroid that moves with the cut, would become part of φ. So both clouds are
+cut by one plane across the forearm, fixed in the hand.
 """
 
 from __future__ import annotations
@@ -18,9 +22,7 @@ from small_gicp import KdTree
 from handcal.core.display import update_matrix
 from handcal.core.geometry import rotation_matrix, rotation_vector, transform
 from handcal.core.types import Bool, EyeShift, Float64
-from handcal.register.cut import CUT_BAND_M, common_cut
 from handcal.register.model import balance, balanced_turn, design, predict
-from handcal.register.opening import Opening, measure_opening
 from handcal.register.rcicp import best_rotation
 from handcal.register.rigid import (
     RigidResult,
@@ -29,7 +31,7 @@ from handcal.register.rigid import (
     motion_covariance,
     register_rigid,
 )
-from handcal.register.shape import ShapeChange, measure_shape_change
+from handcal.register.shape import Opening, ShapeChange, measure_opening, measure_shape_change
 from handcal.register.surface import (
     Indices,
     clip_surface,
@@ -38,7 +40,69 @@ from handcal.register.surface import (
     near_cut_edge,
     nearest,
     point_spacing_m,
+    quantile,
 )
+
+# Points this near the common cut count as beside it.
+CUT_BAND_M = 0.002
+# Cut edges farther than this from most of them, such as a finger at the image border, are others.
+_ONE_EDGE_M = 0.05
+# A cut edge is not straight: its innermost part counts.
+_INNERMOST, _OUTERMOST = 0.1, 0.99
+# What would cut off more of a cloud than a wrist and some palm is no cut across the forearm.
+_LEAST_KEPT = 0.6
+# The limit is the coordinate of a point; this much beyond it, no rounding leaves that point out.
+_BEYOND_POINT_M = 1e-9
+
+
+def common_cut(
+    cursor_m: Float64,
+    hand_m: Float64,
+    cursor_cut: Bool | None,
+    hand_cut: Bool | None,
+    T_cursor_hand: Float64,
+) -> tuple[Float64, float] | None:
+    """Find one plane across the forearm by which two registered clouds can be cut.
+
+    Parameters
+    ----------
+    cursor_m, hand_m : (M, 3), (N, 3) float64
+    cursor_cut, hand_cut : (M,), (N,) bool or None
+        Points beside a cut edge; None if unknown.
+    T_cursor_hand : (4, 4) float64
+
+    Returns
+    -------
+    tuple of direction and limit, or None
+        The forearm continues along the direction, (3,), of which the limit, m, is the coordinate of
+        the plane, in the cursor's frame; None if neither cloud has a cut edge, or it is not across
+        the forearm.
+    """
+    clouds = cursor_m, transform(T_cursor_hand, hand_m)
+    given = [
+        np.zeros(len(cloud), np.bool_) if cut is None else cut
+        for cloud, cut in zip(clouds, (cursor_cut, hand_cut), strict=True)
+    ]
+    edges = [cloud[cut] for cloud, cut in zip(clouds, given, strict=True)]
+    edge_m = np.concatenate(edges)
+    if not len(edge_m):
+        return None
+    wrist_m = edge_m.mean(axis=0)
+    near = np.linalg.norm(edge_m - wrist_m, axis=1) < _ONE_EDGE_M
+    wrist_m = edge_m[near].mean(axis=0) if near.any() else wrist_m
+    middle_m = np.mean([mean_point(cloud) for cloud in clouds], axis=0)
+    along = (wrist_m - middle_m) / max(float(np.linalg.norm(wrist_m - middle_m)), 1e-9)
+    places = [cloud @ along for cloud in clouds]
+    ends = [quantile(place, _OUTERMOST) for place in places]
+    for edge in edges:
+        at_wrist = edge[np.linalg.norm(edge - wrist_m, axis=1) < _ONE_EDGE_M]
+        if len(at_wrist):
+            ends.append(quantile(at_wrist @ along, _INNERMOST))
+    limit = min(ends) + _BEYOND_POINT_M
+    if min(float(np.mean(place <= limit)) for place in places) < _LEAST_KEPT:
+        return None
+    return along, limit
+
 
 _POINTS = 1000
 # Number of points at which the distance between neighbours of a whole cloud is measured.
@@ -143,8 +207,8 @@ def match_hands(
         near_cut |= cursor_m @ along > limit_m - CUT_BAND_M - spacing_m
     fine = register_rigid(hand, cursor, _FINE, T_cursor_hand)
     patches = find_patches(hand, fine.T_target_source)
-    opening = measure_opening(hand, cursor, fine, _FINE, patches)
-    shape = measure_shape_change(hand, cursor, fine, _FINE)
+    opening = measure_opening(hand, cursor, fine, patches)
+    shape = measure_shape_change(hand, cursor, fine)
     rest_m = shape.without_opening(1.0).rms_m
     T_cursor_hand = fine.T_target_source
     find = partial(_pairs, tree, near_cut, is_common, spacing_m)

@@ -10,14 +10,14 @@ linear system, in which the alignments add up, weighted by their covariances.
 
 Wearers differ in how precisely they align, by more than can be neglected: an estimate that assumes
 a usual wearer is far too certain about a careless one. So the precision is unknown too, one of
-`FuseSettings.wearer_scales`, and the estimate is the mean over them, weighted by how well each
+`_WEARER_SCALES`, and the estimate is the mean over them, weighted by how well each
 explains the alignments. One alignment says little about it, several say much by their scatter.
 
 What is wrong in all observations of a sitting alike does not average out, so it is unknown too
 (`handcal.register.sitting`).
 
 A verification, in which the wearer moves the drawing of the resting hand until it covers the hand
-(`handcal.register.nudge`), is one more observation of one eye's φ, more precise than an alignment.
+(`handcal.register.model`), is one more observation of one eye's φ, more precise than an alignment.
 One in which nothing was moved is none: a wearer who does not look says the same. Verifications of
 one eye that contradict each other count less.
 """
@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import chain, combinations
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -68,6 +68,11 @@ from handcal.register.sitting import (
 )
 from handcal.register.surface import describe_surface
 
+# Standard deviation of a verification by a usual wearer in each of two directions, and of its size,
+# relative: people judge a position better than a size.
+_VERIFIED_SIGMA_ARCMIN, _VERIFIED_DEPTH_SIGMA = 2.0, 0.005
+# Errors of a wearer's overlay, relative to a usual wearer's, and the probability of each.
+_WEARER_SCALES, _WEARER_WEIGHTS = (1.0, 2.0, 3.0, 4.0, 8.0), (0.7, 0.16, 0.08, 0.05, 0.01)
 # The cursor's outline is found in this many of its points.
 _OUTLINE_FROM_POINTS = 1500
 # Far less than that of one point; it keeps the weights defined for a cursor outside the display.
@@ -93,21 +98,7 @@ class FuseSettings:
     depth_sigma: float = 0.004
     """Relative standard deviation of the depth, by matching the size. With these errors,
     the paper's method has the error of the paper's user test."""
-    verified_sigma_arcmin: float = 2.0
-    """Standard deviation of a verification by a usual wearer in each of two directions."""
-    verified_depth_sigma: float = 0.005
-    """Relative standard deviation of its size; people judge a position better than a size."""
-    wearer_scales: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 8.0)
-    """Errors of a wearer's overlay, relative to a usual wearer's."""
-    wearer_weights: tuple[float, ...] = (0.7, 0.16, 0.08, 0.05, 0.01)
-    """Probability of each of `wearer_scales`."""
     sitting: SittingSettings = field(default_factory=SittingSettings)
-
-    def __post_init__(self) -> None:
-        if not self.wearer_scales or len(self.wearer_scales) != len(self.wearer_weights):
-            raise ValueError("wearer_scales and wearer_weights must have the same length")
-        if min(self.wearer_scales) <= 0.0 or min(self.wearer_weights) <= 0.0:
-            raise ValueError("wearer_scales and wearer_weights must be positive")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,7 +125,7 @@ class Fused:
     @property
     def all_observed(self) -> tuple[Observation, ...]:
         """The observations of the alignments, then those of the verifications."""
-        return (*self.observed, *(one for found in self.verified.values() for one in found))
+        return (*self.observed, *chain.from_iterable(self.verified.values()))
 
     def covariance_after_m2(self, eyes: Sequence[Eye], count: int) -> Float64:
         """Return the covariance to expect after more alignments with some eyes open."""
@@ -225,67 +216,70 @@ def fuse_alignments(
     HandError
         If all points of a cursor lie at cut edges.
     """
-    observations = {
-        eye: tuple(
-            verified_observation(
-                rig, eye, one.after_m, one.hand_E_m, settings, one.outline_sigma_px
-            )
-            for one in (*newest.earlier, newest)
-            if one.hand_E_m is not None and one.was_moved
-        )
-        for eye, newest in verified.items()
-    }
     sitting = sitting_prior(rig, settings.sitting)
-    verifications: dict[Eye, tuple[Observation, ...]] = {}
-    apart_arcmin: dict[Eye, float] = {}
-    for eye, moved in observations.items():
-        if moved:
-            verifications[eye], apart_m = _reconciled(moved, sitting)
-            if apart_m is not None:
-                apart_arcmin[eye] = expected_arcmin(rig.eyes[eye], apart_m, np.zeros((3, 3)))
-    if not solved and not verifications:
-        raise ValueError("at least one alignment is needed")
-    observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
     prior = with_sitting(eye_prior(settings.prior), sitting)
     prior = with_eye_distance(prior, rig, eye_distance)
-    known = (*observed, *(one for found in verifications.values() for one in found))
-    cases = _cases(prior, rig, settings)
-    weights = _weights(cases, known)
-    found = [posterior(case.prior, [one.at(case.scale) for one in known]) for case in cases]
-    estimate_m = sum(weight * mean_m for weight, (mean_m, _) in zip(weights, found, strict=True))
-    joint_m2 = sum(
-        weight * (covariance_m2 + np.outer(mean_m - estimate_m, mean_m - estimate_m))
-        for weight, (mean_m, covariance_m2) in zip(weights, found, strict=True)
-    )
-    misfit = Misfit(_surprise(prior, known, 1.0)[0], 3 * len(known))
+    observed = tuple(_observe(alignment, shifts, rig, settings) for alignment, shifts in solved)
+    verifications, apart_arcmin = _observe_verifications(verified, rig, sitting)
+    evidence = (*observed, *chain.from_iterable(verifications.values()))
+    if not evidence:
+        raise ValueError("at least one alignment is needed")
+    cases = _cases(prior, rig)
+    weights = _weights(cases, evidence)
+    posteriors = [posterior(case.prior, [one.at(case.scale) for one in evidence]) for case in cases]
+    mean_m, covariance_m2 = _mixed(weights, posteriors)
+    misfit = Misfit(_surprise(prior, evidence, 1.0)[0], 3 * len(evidence))
     # What nothing explains may be wrong in anything (Birge 1932).
-    joint_m2 = max(1.0, misfit.ratio) * joint_m2
-    wearer_scale = float(np.sqrt(weights @ [case.scale**2 for case in cases]))
+    covariance_m2 = max(1.0, misfit.ratio) * covariance_m2
     outline_scale = float(np.sqrt(weights @ [case.outline_scale**2 for case in cases]))
-    of_eye = {
-        eye: found_shifts
-        for eye in EYES
-        if (found_shifts := [shifts[eye] for _, shifts in solved if eye in shifts])
-        or eye in verifications
-    }
+    alone = {eye: [shifts[eye] for _, shifts in solved if eye in shifts] for eye in EYES}
+    eyes = [eye for eye in EYES if alone[eye] or eye in verifications]
     return Fused(
         shifts={
-            eye: _summarise(
-                shifts, estimate_m[eye_slice(eye)], joint_m2[eye_slice(eye), eye_slice(eye)]
-            )
-            for eye, shifts in of_eye.items()
+            eye: _summarise(alone[eye], mean_m[part], covariance_m2[part, part])
+            for eye, part in zip(eyes, map(eye_slice, eyes), strict=True)
         },
         prior=_with_outline(prior, outline_scale),
         observed=observed,
-        wearer_scale=wearer_scale,
+        wearer_scale=float(np.sqrt(weights @ [case.scale**2 for case in cases])),
         verified=verifications,
         verifiable={
-            eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M, settings)
-            for eye in of_eye
+            eye: verified_observation(rig, eye, (0.0, 0.0, 0.0), _VERIFIED_AT_M) for eye in eyes
         },
         apart_arcmin=apart_arcmin,
         misfit=misfit,
     )
+
+
+def _observe_verifications(
+    verified: Mapping[Eye, Verification], rig: Rig, sitting: SittingPrior
+) -> tuple[dict[Eye, tuple[Observation, ...]], dict[Eye, float]]:
+    """Return what each eye's verifications observed, and how far contradicting ones are apart."""
+    observations: dict[Eye, tuple[Observation, ...]] = {}
+    apart_arcmin: dict[Eye, float] = {}
+    for eye, newest in verified.items():
+        moved = tuple(
+            verified_observation(rig, eye, one.after_m, one.hand_E_m, one.outline_sigma_px)
+            for one in (*newest.earlier, newest)
+            if one.hand_E_m is not None and one.was_moved
+        )
+        if moved:
+            observations[eye], apart_m = _reconciled(moved, sitting)
+            if apart_m is not None:
+                apart_arcmin[eye] = expected_arcmin(rig.eyes[eye], apart_m, np.zeros((3, 3)))
+    return observations, apart_arcmin
+
+
+def _mixed(
+    weights: Float64, posteriors: Sequence[tuple[Float64, Float64]]
+) -> tuple[Float64, Float64]:
+    """Return mean and covariance of a mixture of Gaussians; their scatter adds to the latter."""
+    mean_m = sum(weight * mean for weight, (mean, _) in zip(weights, posteriors, strict=True))
+    covariance_m2 = sum(
+        weight * (covariance + np.outer(mean - mean_m, mean - mean_m))
+        for weight, (mean, covariance) in zip(weights, posteriors, strict=True)
+    )
+    return np.asarray(mean_m), np.asarray(covariance_m2)
 
 
 class _Case(NamedTuple):
@@ -297,13 +291,13 @@ class _Case(NamedTuple):
     prior: EyePrior
 
 
-def _cases(prior: EyePrior, rig: Rig, settings: FuseSettings) -> list[_Case]:
+def _cases(prior: EyePrior, rig: Rig) -> list[_Case]:
     """Return the precisions with their probabilities; a measured outline has one."""
     is_measured = rig.depth_edges is not None
     outlines = [(1.0, 1.0)] if is_measured else [(1.0, 1.0 - _WRONG), (_WRONG_SCALE, _WRONG)]
     return [
         _Case(scale, outline, weight * share, _with_outline(prior, outline))
-        for scale, weight in zip(settings.wearer_scales, settings.wearer_weights, strict=True)
+        for scale, weight in zip(_WEARER_SCALES, _WEARER_WEIGHTS, strict=True)
         for outline, share in outlines
     ]
 
@@ -339,14 +333,14 @@ def _surprise(
 
 
 def _reconciled(
-    found: tuple[Observation, ...], sitting: SittingPrior
+    observed: tuple[Observation, ...], sitting: SittingPrior
 ) -> tuple[tuple[Observation, ...], Float64 | None]:
     """Return the verifications of one eye, and how far apart two are that contradict each other.
 
     Those of a usual wearer contradict each other once in twenty times. They then count as much
     less as they are too far apart (Birge 1932).
     """
-    pairs = list(combinations(found, 2))
+    pairs = list(combinations(observed, 2))
     worst, apart_m = float(chdtri(3, _CONTRADICTING / max(1, len(pairs)))), None
     for one, other in pairs:
         between_m, by = one.seen_m - other.seen_m, one.by_sitting - other.by_sitting
@@ -355,8 +349,8 @@ def _reconciled(
         if chi2 > worst:
             worst, apart_m = chi2, between_m
     if apart_m is None:
-        return found, None
-    return tuple(replace(one, wearer_m2=worst / 3.0 * one.wearer_m2) for one in found), apart_m
+        return observed, None
+    return tuple(replace(one, wearer_m2=worst / 3.0 * one.wearer_m2) for one in observed), apart_m
 
 
 def _observe(
@@ -444,12 +438,11 @@ def verified_observation(
     eye: Eye,
     shift_m: Sequence[float],
     hand_E_m: Sequence[float],
-    settings: FuseSettings,
     outline_sigma_px: float | None = None,
 ) -> Observation:
     """Return the observation of one eye's φ by a verification, with the hand at a place of E."""
     R_A_E = rig.eyes["left"].T_V_H[:3, :3] @ rig.eyes[eye].T_V_H[:3, :3].T
-    sigmas = settings.verified_sigma_arcmin, settings.verified_depth_sigma
+    sigmas = _VERIFIED_SIGMA_ARCMIN, _VERIFIED_DEPTH_SIGMA
     wearer_m2 = _wearer_covariance(hand_E_m[2], rig.eyes[eye].z_C0_S_m, *sigmas)
     H = np.zeros((3, 6))
     H[:, eye_slice(eye)] = R_A_E

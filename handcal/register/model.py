@@ -7,15 +7,21 @@ overlaying it fixes ``κ = 1 - φ3φ4`` (``exact=True``). Both are linear in φ.
     exact   (φ4 s_z - 1) φ1 + φ4 (d_x - s_x) φ3 = b_x      paper   (φ4 s_z - 1) φ1 - φ4 s_x φ3 = b_x
             (φ4 s_z - 1) φ2 + φ4 (d_y - s_y) φ3 = b_y              (φ4 s_z - 1) φ2 - φ4 s_y φ3 = b_y
                               (φ4 d_z - 1) φ3   = b_z                                    - φ3 = b_z
+
+In a verification the wearer moves the drawing of the resting hand until it covers the hand. For a
+hand at one place, the drawing's movement to the right, movement down and growth determine φ, and
+vice versa. So that movement is the remaining error, and the φ that it leads to is one more
+observation, with the precision at which a person sees two outlines coincide (`nudged_shift_m`).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from handcal.core.display import update_matrix
 from handcal.core.geometry import transform
-from handcal.core.types import Float64
+from handcal.core.types import EyeDisplay, Float64
 
 _BALANCE_STEPS = 3
 
@@ -128,3 +134,58 @@ def balanced_turn(outline_m: Float64, R: Float64, about_m: Float64) -> Float64:
         rows = J.reshape(-1, 3)
         moved_m -= np.linalg.solve(rows.T @ rows, rows.T @ (seen - drawn).ravel())
     return moved_m
+
+
+def nudged_shift_m(
+    display: EyeDisplay,
+    shift_m: ArrayLike,
+    hand_E_m: ArrayLike,
+    right_arcmin: float,
+    down_arcmin: float,
+    size: float = 0.0,
+) -> Float64:
+    """Return the φ with which what is drawn at the hand has moved and grown.
+
+    On the focal plane, in units of its distance, a point (x, y, z) of E is drawn at
+    ``((1 - φ3φ4) x - (1 - φ4 z) φ1) / (z - φ3)``, with the scale ``(1 - φ3φ4) / (z - φ3)``, and
+    likewise in y. The scale gives φ3, then the place gives φ1 and φ2.
+
+    Parameters
+    ----------
+    display : EyeDisplay
+    shift_m : (3,) array_like
+        φ of the present drawing.
+    hand_E_m : (3,) array_like
+        Centre of the hand, in E.
+    right_arcmin, down_arcmin : float
+        Movement on the display, as at its centre.
+    size : float
+        Relative growth.
+
+    Raises
+    ------
+    ValueError
+        If the hand is not between the eye and the focal plane, the drawing would vanish or
+        grow without limit, or a number is not finite.
+    """
+    shift, hand = np.asarray(shift_m, dtype=np.float64), np.asarray(hand_E_m, dtype=np.float64)
+    moved_arcmin = np.array([right_arcmin, down_arcmin])
+    if shift.shape != (3,) or hand.shape != (3,):
+        raise ValueError("φ and the hand's centre must be three numbers each")
+    if not np.isfinite([*shift, *hand, *moved_arcmin, size]).all():
+        raise ValueError("φ, the hand's centre and the nudge must be finite")
+    phi_4, depth_m = 1.0 / display.z_C0_S_m, hand[2]
+    if not max(shift[2], 0.0) < depth_m < display.z_C0_S_m:
+        raise ValueError("the hand must be between the eye and the display's focal plane")
+    factor = 1.0 - shift[2] * phi_4
+    scale = (1.0 + size) * factor / (depth_m - shift[2])
+    if scale <= 2.0 * phi_4:
+        raise ValueError("the drawing cannot be made as small as that")
+    drawn = (factor * hand[:2] - (1.0 - phi_4 * depth_m) * shift[:2]) / (depth_m - shift[2])
+    forward_m = (scale * depth_m - 1.0) / (scale - phi_4)
+    K = display.K @ display.H0
+    moved_px = K[0, 0] * np.tan(np.radians(moved_arcmin / 60.0))
+    pixel = K @ [*drawn, 1.0]
+    ray = np.linalg.solve(K, [*(pixel[:2] / pixel[2] + moved_px), 1.0])
+    aside = (scale * hand[:2] - ray[:2] / ray[2]) * (depth_m - forward_m)
+    return np.array([*(aside / (1.0 - phi_4 * depth_m)), forward_m])

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,13 @@ from handcal.register.surface import describe_surface
 from handcal.register.verdict import planned_eyes
 
 _OUTLINE_FROM_POINTS = 1500
+# Places to choose from, to the right of the camera's line of sight to the raised hand.
+_ASIDE_M = -0.03, 0.0, 0.03
+# Places to choose from, beyond the nearest. The last tells what the wearer always sees wrongly from
+# the eyes, which pays if the prior of the sitting is wide.
+_BEYOND_M = 0.0, 0.04, 0.08, 0.2
+# Least share of the hand's outline within each display that is used.
+_SHOWN_SHARE = 0.6
 # More observations do not explain what no eye explains.
 _WITH_MISFIT = 2
 # Error of a registration, and its growth with the angle by which the camera sees the moved hand
@@ -44,13 +52,6 @@ class PlacementSettings:
     55 mm and 126 disparities, measures nothing nearer unless a disparity shift is set."""
     farthest_m: float = 0.75
     """Largest such distance."""
-    aside_m: tuple[float, ...] = (-0.03, 0.0, 0.03)
-    """Places to choose from, to the right of the camera's line of sight to the raised hand."""
-    depths_m: tuple[float, ...] = (0.0, 0.04, 0.08, 0.2)
-    """Places to choose from, beyond the nearest. The last tells what the wearer always sees wrongly
-    from the eyes, which pays if the prior of the sitting is wide."""
-    shown_share: float = 0.6
-    """Least share of the hand's outline within each display that is used."""
     fewest: int = 2
     """Alignments of the recommended plan before the eyes are verified."""
     most: int = 6
@@ -128,14 +129,11 @@ def next_alignment(
         return Planned(eyes, np.zeros(3), "the cursor is where the hand is")
     raised_m = transform(invert(T_W_H), raised_W_m)
     surface = describe_surface(raised_m, raised_is_cut, _OUTLINE_FROM_POINTS)
-    outline_m = surface.points_m[surface.outline]
-    places = _places(raised_m, outline_m, rig, eyes, drawn_shift_m, settings)
+    raised = _Raised(raised_m, surface.points_m[surface.outline], rig, eyes, drawn_shift_m)
+    places = _places(raised, settings)
     if not places:
         return Planned(eyes, np.zeros(3), "no other place is on the displays and in camera range")
-    errors = [
-        _expected_arcmin(raised_m, outline_m, place, rig, eyes, drawn_shift_m, results, solve)
-        for place in places
-    ]
+    errors = [_expected_arcmin(raised, place, results, solve) for place in places]
     best = int(np.argmin(errors))
     which = "both eyes" if len(eyes) > 1 else f"the {eyes[0]} eye"
     return Planned(
@@ -204,93 +202,80 @@ def _is_enough(
     return bool(_to_verify(results, counts, usable_eyes, settings)) or not is_worthwhile
 
 
-def _places(
-    raised_m: Float64,
-    outline_m: Float64,
-    rig: Rig,
-    eyes: Sequence[Eye],
-    drawn_shift_m: Mapping[Eye, Float64],
-    settings: PlacementSettings,
-) -> list[Float64]:
+class _Raised(NamedTuple):
+    """The raised hand in H, with its outline, and what its cursor is seen with."""
+
+    hand_m: Float64
+    outline_m: Float64
+    rig: Rig
+    eyes: Sequence[Eye]
+    drawn_shift_m: Mapping[Eye, Float64]
+
+    @property
+    def line_m(self) -> Float64:
+        """(3,); the camera's line of sight to the middle of the hand."""
+        line_m: Float64 = self.hand_m.mean(axis=0) - self.rig.T_H_D[:3, 3]
+        return line_m
+
+
+def _places(raised: _Raised, settings: PlacementSettings) -> list[Float64]:
     """Return displacements of the raised hand, in H, to places that displays and camera allow.
 
     The hand moves along the camera's line of sight, so that the camera sees the same side of it,
     and a little sideways.
     """
-    camera_m = rig.T_H_D[:3, 3]
-    line_m = raised_m.mean(axis=0) - camera_m
-    depth_m = transform(invert(rig.T_H_D), raised_m)[:, 2].min()
+    T_H_D, line_m = raised.rig.T_H_D, raised.line_m
+    depth_m = transform(invert(T_H_D), raised.hand_m)[:, 2].min()
     # Movement along the line of sight changes the depth before the camera at this rate.
-    rate = float((rig.T_H_D[:3, :3].T @ line_m)[2])
+    rate = float((T_H_D[:3, :3].T @ line_m)[2])
     places = []
-    for aside_m, beyond_m in product(settings.aside_m, settings.depths_m):
+    for aside_m, beyond_m in product(_ASIDE_M, _BEYOND_M):
         ratio = 1.0 + (settings.nearest_m + beyond_m - depth_m) / rate
-        place = (ratio - 1.0) * line_m + [aside_m, 0.0, 0.0]
-        if _is_visible(raised_m + place, outline_m + place, rig, eyes, drawn_shift_m, settings):
-            places.append(place)
-    return places
+        places.append((ratio - 1.0) * line_m + [aside_m, 0.0, 0.0])
+    return [place for place in places if _is_visible(raised, place, settings)]
 
 
-def _is_visible(
-    hand_m: Float64,
-    outline_m: Float64,
-    rig: Rig,
-    eyes: Sequence[Eye],
-    drawn_shift_m: Mapping[Eye, Float64],
-    settings: PlacementSettings,
-) -> bool:
-    """Return whether a hand in H is in the camera's range and view, and on the displays."""
-    hand_D_m = transform(invert(rig.T_H_D), hand_m)
+def _is_visible(raised: _Raised, place: Float64, settings: PlacementSettings) -> bool:
+    """Return whether the displaced hand is in the camera's range and view, and on the displays."""
+    rig, camera = raised.rig, raised.rig.depth_intrinsics
+    hand_D_m = transform(invert(rig.T_H_D), raised.hand_m + place)
     low_m, high_m = hand_D_m[:, 2].min(), hand_D_m[:, 2].max()
+    # The nearest place is computed to be just at the limit, so rounding must not exclude it.
     if low_m < settings.nearest_m - 1e-3 or high_m > settings.farthest_m:
         return False
-    camera = rig.depth_intrinsics
     pixels = image_points(hand_D_m, camera)
     if not ((pixels >= 0.0) & (pixels <= [camera.width - 1, camera.height - 1])).all():
         return False
-    for eye in eyes:
+    for eye in raised.eyes:
         display = rig.eyes[eye]
-        drawn = eye_projection(display, drawn_shift_m[eye]) @ view_of_eye(display, np.eye(4))
-        if is_on_display(display, project(drawn, outline_m)).mean() < settings.shown_share:
+        drawn = eye_projection(display, raised.drawn_shift_m[eye]) @ view_of_eye(display, np.eye(4))
+        outline_px = project(drawn, raised.outline_m + place)
+        if is_on_display(display, outline_px).mean() < _SHOWN_SHARE:
             return False
     return True
 
 
 def _expected_arcmin(
-    raised_m: Float64,
-    outline_m: Float64,
-    place: Float64,
-    rig: Rig,
-    eyes: Sequence[Eye],
-    drawn_shift_m: Mapping[Eye, Float64],
-    results: Results | None,
-    solve: SolveSettings,
+    raised: _Raised, place: Float64, results: Results | None, solve: SolveSettings
 ) -> float:
     """Return the mean expected error of both eyes after an alignment at a displacement."""
+    rig = raised.rig
     T_E_H = {eye: view_of_eye(rig.eyes[eye], np.eye(4)) for eye in EYES}
+    hand_m, outline_m = raised.hand_m + place, raised.outline_m + place
     H, wearer_m2, by_sitting = seen_by(
-        raised_m + place, outline_m + place, T_E_H, drawn_shift_m, eyes, rig, solve.fuse
+        hand_m, outline_m, T_E_H, raised.drawn_shift_m, raised.eyes, rig, solve.fuse
     )
-    prior = with_sitting(eye_prior(solve.fuse.prior), sitting_prior(rig, solve.fuse.sitting))
-    known: list[Observation] = []
-    scale = 1.0
-    line_m = raised_m.mean(axis=0) - rig.T_H_D[:3, 3]
-    before, now = (ray / np.linalg.norm(ray) for ray in (line_m, line_m + place))
-    turned_rad = float(np.linalg.norm(now - before))
+    rays = (line_m / np.linalg.norm(line_m) for line_m in (raised.line_m, raised.line_m + place))
+    turned_rad = float(np.linalg.norm(np.subtract(*rays)))
     registration_m2 = (_REGISTRATION_SIGMA_M**2 + (_RIM_M * turned_rad) ** 2) * np.eye(3)
-    if results is not None:
+    if results is None:
+        prior = with_sitting(eye_prior(solve.fuse.prior), sitting_prior(rig, solve.fuse.sitting))
+        observed, scale = [], 1.0
+    else:
         fused = results.fused
-        prior, scale = fused.prior, fused.wearer_scale
-        known = list(fused.all_observed)
-    known.append(Observation(H, np.zeros(3), registration_m2, wearer_m2, by_sitting))
-    _, covariance_m2 = posterior(prior, [one.at(scale) for one in known])
-    return float(
-        np.mean(
-            [
-                expected_arcmin(
-                    rig.eyes[eye], np.zeros(3), covariance_m2[eye_slice(eye), eye_slice(eye)]
-                )
-                for eye in EYES
-            ]
-        )
-    )
+        prior, observed, scale = fused.prior, list(fused.all_observed), fused.wearer_scale
+    observed.append(Observation(H, np.zeros(3), registration_m2, wearer_m2, by_sitting))
+    _, covariance_m2 = posterior(prior, [one.at(scale) for one in observed])
+    parts = {eye: covariance_m2[eye_slice(eye), eye_slice(eye)] for eye in EYES}
+    errors = [expected_arcmin(rig.eyes[eye], np.zeros(3), part) for eye, part in parts.items()]
+    return float(np.mean(errors))

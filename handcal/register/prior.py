@@ -1,4 +1,4 @@
-"""The prior of a wearer's eye positions: the default, or one learned from earlier sessions.
+"""The priors of a wearer's eyes and of what wearers see wrongly: default, or learned.
 
 [φ_left; φ_right] is Gaussian. By default its mean is zero, each φ lies in the eye box, and the two
 eyes differ little. A lab's finished sessions with one rig show more: how far its headset sits from
@@ -7,6 +7,12 @@ expectation maximisation, as every session measures φ with an error of its own,
 alignment with both eyes open measures three of the six numbers. The default prior takes part as
 if it were `_DEFAULT_WEIGHT` sessions (an inverse Wishart prior of the covariance), so that few
 sessions change little (empirical Bayes: Efron & Morris 1975; Dempster, Laird & Rubin 1977).
+
+Nothing inside one sitting can tell an error of φ from one that the wearer always makes: an error
+of φ falls with the distance of the hand, and a sitting has few distances. Many sittings tell the
+size of such errors, which are Gaussian among sittings like φ and learned in the same way. People
+differ more than one person's sittings do, so the interval is by resampling people (Efron &
+Tibshirani 1993).
 """
 
 from __future__ import annotations
@@ -20,8 +26,9 @@ from scipy.linalg import block_diag
 
 from handcal.core.display import view_of_eye
 from handcal.core.geometry import invert, transform
+from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye, EyeDisplay, EyeDistance, Float64, Rig
-from handcal.register.sitting import SittingPrior
+from handcal.register.sitting import LearnedSitting, SittingPrior
 
 FAR_M = 0.004
 """A learned prior whose mean for an eye is farther from C0 than this is not used unasked: wearers
@@ -311,3 +318,101 @@ def shift_by_depth(point_E_m: Float64, display: EyeDisplay, rig: Rig) -> Float64
     gain = 1.0 / (1.0 - point_E_m[2] / display.z_C0_S_m)
     moved: Float64 = gain * np.outer(ray_E, [point_D_m[2], 1.0])
     return moved
+
+
+MIN_SITTINGS, MIN_PEOPLE = 30, 5
+"""Fewer than these do not make a prior of wearers."""
+_SITTING_ITERATIONS = 200
+_RESAMPLED = 40
+_WEARER = slice(6, 9)
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedWearers:
+    """The prior of what wearers see wrongly, with its interval."""
+
+    learned: LearnedSitting
+    people: int
+    sigma: tuple[float, float, float]
+    """Right and down, rad, and relative size: root mean square about zero."""
+    sigma_low: tuple[float, float, float]
+    sigma_high: tuple[float, float, float]
+    """Its 95 % interval over people."""
+
+
+def fit_wearers(
+    people: Sequence[Sequence[Sequence[Observed]]], sitting: SittingPrior
+) -> LearnedSitting | None:
+    """Learn the prior from repeated sittings of several people.
+
+    Parameters
+    ----------
+    people : sequence of sequence of sequence of (H, seen, covariance)
+        The observations of each sitting of each person, as `Fused.all_observed` has them.
+    sitting : SittingPrior
+        The default prior, which takes part as a few sittings.
+
+    Returns
+    -------
+    LearnedSitting or None
+        None for fewer than `MIN_SITTINGS` sittings or `MIN_PEOPLE` people.
+    """
+    count = sum(map(len, people))
+    if count < MIN_SITTINGS or len(people) < MIN_PEOPLE:
+        return None
+    known = [_information(observed, sitting) for person in people for observed in person]
+    mean, covariance = _fit(known, sitting)
+    return LearnedSitting(
+        tuple(mean[_WEARER].tolist()), tuple(covariance[_WEARER, _WEARER].ravel().tolist()), count
+    )
+
+
+def learn_wearers(
+    people: Sequence[Sequence[Sequence[Observed]]],
+    sitting: SittingPrior,
+    progress: Progress = Progress(),
+) -> LearnedWearers | None:
+    """Learn the prior as `fit_wearers` does, with its interval, which takes 40 times as long.
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled.
+    """
+    learned = fit_wearers(people, sitting)
+    if learned is None:
+        return None
+    known = [[_information(observed, sitting) for observed in person] for person in people]
+    rng = np.random.default_rng(0)
+    sizes = []
+    for done in range(_RESAMPLED):
+        progress.at(done / _RESAMPLED, "Learning what wearers see wrongly")
+        drawn = rng.integers(len(known), size=len(known))
+        mean, covariance = _fit([one for k in drawn for one in known[k]], sitting)
+        sizes.append(_size(mean[_WEARER], covariance[_WEARER, _WEARER]))
+    low, high = np.quantile(sizes, [0.025, 0.975], axis=0)
+    size = _size(np.array(learned.mean), np.reshape(learned.covariance, (3, 3)))
+    return LearnedWearers(learned, len(people), _three(size), _three(low), _three(high))
+
+
+def _information(observed: Sequence[Observed], sitting: SittingPrior) -> tuple[Float64, Float64]:
+    """Return what a sitting says on φ of both eyes and the wearer's errors: (9, 9) and (9,)."""
+    return information_of(observed, 9, sitting.mean[3:], sitting.covariance[3:, 3:])
+
+
+def _fit(
+    known: Sequence[tuple[Float64, Float64]], sitting: SittingPrior
+) -> tuple[Float64, Float64]:
+    """Return mean (9,) and covariance (9, 9), in which eyes and wearer are independent."""
+    default = block_diag(eye_prior(PriorSettings()).covariance_m2, sitting.covariance[:3, :3])
+    start = np.concatenate([np.zeros(6), sitting.mean[:3]])
+    return fit_population(known, start, default, _SITTING_ITERATIONS, independent=6)
+
+
+def _size(mean: Float64, covariance: Float64) -> Float64:
+    return np.sqrt(np.diag(covariance) + mean**2)
+
+
+def _three(values: Float64) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

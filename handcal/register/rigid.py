@@ -30,6 +30,12 @@ _PATCH_M = 0.022
 # Unknown place of a patch of outline, in distances between the points of both clouds: the outline
 # is known no better than it is sampled, and edges grow fat.
 _OUTLINE_GAPS = 0.1
+# So many interior points of each cloud are used until no point of the hand moves by more than this
+# in a step, and then all; with a known start all at once, with a tolerance as large never.
+_START_INTERIOR, _NEAR_M = 150, 1e-3
+# Distance at which an outline pair has a weight of one quarter (Geman-McClure), once the nearest
+# quarter of the pairs are closer than half of it.
+OUTLIER_M = 0.004
 # After this many steps they become shorter, so that pairs that alternate come to rest.
 _FULL_STEPS = 12
 # Each step is about a quarter of the one before, as the pairs slide. The last one is made longer by
@@ -56,18 +62,9 @@ class RigidSettings:
 
     max_points: int = 1500
     """Number of points to which each cloud is thinned."""
-    start_interior: int = 150
-    """Interior points used from each cloud until a step is below `near_m`, and then all. With a
-    known start all are used at once."""
-    near_m: float = 1e-3
-    """Largest step of a hand point below which all interior points are used. With a tolerance as
-    large they never are."""
     max_iterations: int = 40
     tolerance_m: float = 1e-4
     """The iteration stops when a step moves no point of the hand by more than this."""
-    outlier_m: float = 0.004
-    """Distance at which an outline pair has a weight of one quarter (Geman-McClure), once the
-    nearest quarter of the pairs are closer than half of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,10 +151,10 @@ def register_rigid(
     information = np.eye(6)
     reason = None
     is_near = T_start is not None
-    needs_all = settings.tolerance_m < settings.near_m
+    needs_all = settings.tolerance_m < _NEAR_M
     for _ in range(settings.max_iterations):
-        most = None if is_near else settings.start_interior
-        rows = registration_rows(source, target, T_target_source, settings, max_interior=most)
+        most = None if is_near else _START_INTERIOR
+        rows = registration_rows(source, target, T_target_source, max_interior=most)
         share = 1.0 / max(len(history) - _FULL_STEPS, 1)
         step, information = _step(rows, share)
         length_m = np.linalg.norm(step[:3]) * reach_m + np.linalg.norm(step[3:])
@@ -170,7 +167,7 @@ def register_rigid(
         history.append(float(rows.weight @ rows.gap_m**2 / rows.weight.sum()))
         if is_last:
             break
-        is_near = is_near or bool(length_m < settings.near_m)
+        is_near = is_near or bool(length_m < _NEAR_M)
     return RigidResult(
         T_target_source,
         information,
@@ -190,7 +187,6 @@ def registration_rows(
     source: Surface,
     target: Surface,
     T_target_source: Float64,
-    settings: RigidSettings,
     bent_m: Float64 | None = None,
     max_interior: int | None = None,
 ) -> Rows:
@@ -200,7 +196,6 @@ def registration_rows(
     ----------
     source, target : Surface
     T_target_source : (4, 4) float64
-    settings : RigidSettings
     bent_m : (N, 3) float64, optional
         Places of the source's points, if its shape is changed.
     max_interior : int, optional
@@ -229,7 +224,7 @@ def registration_rows(
     weight = np.ones(len(first))
     share = _FAR_SHARE if max_interior else _NEAR_SHARE
     if len(outline):
-        weight[: len(outline)] = trust * _outline_weight(outline_m, share, settings)
+        weight[: len(outline)] = trust * _outline_weight(outline_m, share)
     if max_interior is None:
         weight[len(outline) :] = _inner_weight(gap_m[len(outline) :], inner_m)
     return Rows(
@@ -390,9 +385,9 @@ def _interior_pairs(
     return first, second, normals, np.concatenate([apart_m[keep_1], apart_2_m[keep_2]]), apart_m
 
 
-def _outline_weight(distance_m: Float64, share: float, settings: RigidSettings) -> Float64:
+def _outline_weight(distance_m: Float64, share: float) -> Float64:
     """Return the weights of outline pairs (N,), of which this share is right (Geman-McClure)."""
-    scale_m = max(settings.outlier_m, 2.0 * quantile(distance_m, share))
+    scale_m = max(OUTLIER_M, 2.0 * quantile(distance_m, share))
     return np.asarray(1.0 / (1.0 + (distance_m / scale_m) ** 2) ** 2)
 
 

@@ -1,4 +1,8 @@
-"""Change of the hand's shape between the cursor and the hand.
+"""Change of the hand's size and shape between the cursor and the hand.
+
+A wearer covers the outline of a hand that has opened by 1 % by holding it 1 % farther away, so that
+φ3 moves by 1 % of the distance. But both clouds are metric: their sizes differ. So the size is
+measured like the motion, by one more unknown of the registration's rows.
 
 After the rigid registration, what is left is noise, which changes from point to point, and the
 change of shape, which changes from finger to finger. The second is found as a smooth displacement
@@ -10,6 +14,7 @@ rigid motion of the nodes is no change of shape and is removed.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import lapack
@@ -21,15 +26,112 @@ from handcal.core.geometry import invert, transform
 from handcal.core.types import Float64
 from handcal.register.rcicp import best_rigid
 from handcal.register.rigid import (
+    OUTLIER_M,
     SIGMA_OF_MEDIAN,
+    Patches,
     RigidResult,
-    RigidSettings,
     Rows,
     distant,
+    moved_about,
     registration_rows,
+    solve_rows,
     sums,
 )
 from handcal.register.surface import Indices, Surface, cube_means, mean_point, quantile
+
+# Edges grow fat, and the thinner of two clouds has the narrower outline; standard deviation of the
+# difference. Both sides of a finger tell it from a change of size.
+_FAT_SIGMA_M = 0.0005
+# Pairs slide, as in a step of the registration: this share is left after one.
+_LEFT_AFTER_STEP = 0.2
+# Rows that count as one independent measurement of noise.
+_ROWS_PER_PAIR = 7.0
+# While a step changes the size by more than this many standard deviations, pairs are searched again
+# on a hand of that size; at most so many times.
+_LARGE_AT_FIRST, _LARGE, _SIZE_STEPS = 2.0, 0.5, 4
+# Probability that a hand has opened or closed, and by how much, standard deviation. Assumptions.
+_OPEN, _USUAL = 0.3, 0.015
+# Least standard deviation: differences of two frames' depth scale and edges. And for each metre of
+# the change of shape, as bent fingers look shorter, 1 over some 0.08 m of hand.
+_LEAST_SIGMA = 0.0025
+_PER_SHAPE_M = 12.0
+
+
+class Opening(NamedTuple):
+    """Change of the hand's size from the source to the target."""
+
+    log_size: float
+    """Natural logarithm of the target's size over the source's."""
+    sigma: float
+    """Its standard deviation, of noise and samples."""
+    T_target_source: Float64
+    """(4, 4); the similarity that takes the source to the target."""
+
+    def known(self, shape_rms_m: float) -> tuple[float, float]:
+        """Return the share of the change to expect, 0 to 1, and σ of what is left of it.
+
+        Most hands do not open at all, so a change that noise may explain is little believed.
+
+        Parameters
+        ----------
+        shape_rms_m : float
+            Another change of shape, rms.
+        """
+        noise = self.sigma**2 + _LEAST_SIGMA**2 + (_PER_SHAPE_M * shape_rms_m) ** 2
+        kept = 1.0 / (1.0 + noise / _USUAL**2)
+        fit = 0.5 * self.log_size**2 * kept / noise
+        odds = _OPEN / (1.0 - _OPEN) * np.sqrt(1.0 - kept) * np.exp(min(fit, 50.0))
+        believed = float(odds / (1.0 + odds))
+        expected = kept * self.log_size
+        left = believed * (kept * noise + (1.0 - believed) * expected**2)
+        return believed * kept, float(np.sqrt(left))
+
+
+def measure_opening(
+    source: Surface, target: Surface, fit: RigidResult, patches: Patches
+) -> Opening:
+    """Measure the change of size between registered hands.
+
+    Parameters
+    ----------
+    source, target : Surface
+    fit : RigidResult
+        From `register_rigid`, of the source to the target.
+    patches : Patches
+        Of the source's points.
+    """
+    middle_m = mean_point(source.points_m)
+    rows, T, log_size = fit.rows, fit.T_target_source, 0.0
+    grown_m = source.points_m
+    for step in range(_SIZE_STEPS):
+        if step:
+            rows = registration_rows(source, target, T, grown_m)
+        x, sigma = _solve(rows, patches)
+        log_size += float(x[6]) / (1.0 - _LEFT_AFTER_STEP)
+        grown_m = middle_m + np.exp(log_size) * (source.points_m - middle_m)
+        T = moved_about(rows.centre_m, x[:6]) @ T
+        if abs(x[6]) < (_LARGE if step else _LARGE_AT_FIRST) * sigma:
+            break
+    growth = np.eye(4)
+    growth[:3, :3] *= np.exp(log_size)
+    growth[:3, 3] = middle_m - growth[:3, :3] @ middle_m
+    return Opening(log_size, sigma, T @ growth)
+
+
+def _solve(rows: Rows, patches: Patches) -> tuple[Float64, float]:
+    """Return the motion and the logarithm of the change of size, (7,), and σ of the latter."""
+    # At the middle of a pair, as the noise of its source would multiply itself.
+    at_m = rows.at_m - rows.centre_m
+    along_m = np.einsum("nd,nd->n", at_m, rows.toward) - 0.5 * rows.gap_m
+    is_outline = np.zeros(len(along_m))
+    is_outline[: rows.outlines] = 1.0
+    jacobian = np.vstack([rows.jacobian, along_m, is_outline])
+    variance_m2 = float(rows.weight @ rows.gap_m**2 / rows.weight.sum())
+    prior = np.zeros(8)
+    prior[7] = _ROWS_PER_PAIR * variance_m2 / _FAT_SIGMA_M**2
+    solution, covariance = solve_rows(rows, jacobian, patches, prior)
+    return solution[:7], float(np.sqrt(covariance[6, 6]))
+
 
 _NODE_SPACING_M = 0.018
 _NODE_CUBE_M = 0.030
@@ -101,9 +203,7 @@ class ShapeChange:
         return replace(self, moved_m=self.moved_m - share * growth * out_m)
 
 
-def measure_shape_change(
-    cursor: Surface, hand: Surface, fit: RigidResult, settings: RigidSettings = RigidSettings()
-) -> ShapeChange:
+def measure_shape_change(cursor: Surface, hand: Surface, fit: RigidResult) -> ShapeChange:
     """Measure how the shape of registered hands differs.
 
     Parameters
@@ -111,8 +211,6 @@ def measure_shape_change(
     cursor, hand : Surface
     fit : RigidResult
         From `register_rigid`, of the cursor to the hand.
-    settings : RigidSettings
-        Of the search for pairs.
     """
     points, rows, T_hand_cursor = cursor.points_m, fit.rows, fit.T_target_source
     nodes = cube_means(points, _NODE_CUBE_M)
@@ -128,10 +226,10 @@ def measure_shape_change(
             break
         if step:
             bent = points + point_moved
-            rows = registration_rows(cursor, hand, T_hand_cursor, settings, bent)
+            rows = registration_rows(cursor, hand, T_hand_cursor, bent)
         toward = T_hand_cursor[:3, :3].T @ rows.toward.T
         before_m = np.einsum("dn,nd->n", toward, point_moved.take(rows.index, axis=0)) - rows.gap_m
-        far_weight = _far_weight(rows, settings)
+        far_weight = _far_weight(rows)
         weight = rows.trust * far_weight
         normal, wanted = _normal_equation(shares, products, rows.index, toward, weight, before_m)
         prior = len(rows.gap_m) / count * stiffness
@@ -160,12 +258,12 @@ def measure_shape_change(
     )
 
 
-def _far_weight(rows: Rows, settings: RigidSettings) -> Float64:
+def _far_weight(rows: Rows) -> Float64:
     """Return the weights of rows, (N,), that decrease with what they are apart."""
     apart = np.ones(len(rows.gap_m))
     outline_m, inner_m = np.split(rows.distance_m, [rows.outlines])
     if len(outline_m):
-        scale_m = max(settings.outlier_m, 3.0 * quantile(outline_m, 0.5))
+        scale_m = max(OUTLIER_M, 3.0 * quantile(outline_m, 0.5))
         apart[: rows.outlines] = (1.0 + (outline_m / scale_m) ** 2) ** 2
     if len(inner_m):
         apart[rows.outlines :] = distant(

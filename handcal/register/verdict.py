@@ -15,19 +15,23 @@ from types import MappingProxyType
 import numpy as np
 
 from handcal.core.types import EYES, Eye, EyeShift, PlanName, Rig, Verdict, Verification
-from handcal.register.benefit import (
-    Benefit,
-    benefit,
-    expected_arcmin,
-    foreseen_benefit,
-    percent,
-)
+from handcal.register.benefit import Benefit, benefit, expected_arcmin, foreseen_benefit, percent
 from handcal.register.fuse import Fused, Observation
 from handcal.register.prior import eye_position_m, eye_slice
 
 MOST_ALIGNMENTS = 10
 MISFIT = "drawing and hand differ in a way that no eye explains: check the rig's depth edges"
 """Said of observations beyond what 95 % of usual wearers make."""
+RMS_MAX_M = 0.005
+"""Largest distance of hand and cursor, root mean square, that is not to be repeated."""
+# Least probability that the calibration is better than none. High, as a careless wearer whose few
+# observations happen to agree passes for a usual one.
+_PROBABILITY_MIN = 0.99
+# Longest plausible φ.
+_EYE_BOX_M = 0.020
+# Plausible distances between the eyes (adults, ANSUR II: 52 to 78 mm).
+_EYE_DISTANCES_M = 0.050, 0.080
+_INLIER_RATIO_MIN = 0.6
 # An eye whose calibration is as probably better as this is drawn with it, although not accepted.
 _LIKELY = 0.8
 # More than this are not worth it where the offline calibration is within the target.
@@ -42,16 +46,6 @@ class VerdictSettings:
 
     target_arcmin: float = 8.0
     """Largest expected error in the display that the lab accepts."""
-    probability_min: float = 0.99
-    """Least probability that the calibration is better than none. High, as a careless wearer whose
-    few observations happen to agree passes for a usual one."""
-    eye_box_m: float = 0.020
-    """Longest plausible φ."""
-    eye_distance_min_m: float = 0.050
-    eye_distance_max_m: float = 0.080
-    """Plausible distances between the eyes (adults, ANSUR II: 52 to 78 mm)."""
-    rms_max_m: float = 0.005
-    inlier_ratio_min: float = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +211,7 @@ def judge(
             for eye in fused.shifts
         }
     verdicts = {
-        eye: _fault(shift, apart_m, settings)
+        eye: _fault(shift, apart_m)
         or _judge_benefit(
             eye_benefit(rig, fused, eye),
             advice[eye],
@@ -255,18 +249,16 @@ def _with_evidence(verdict: Verdict, fused: Fused, eye: Eye, verified: Verified 
     return replace(verdict, reason="; ".join([*reasons, verdict.reason]))
 
 
-def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) -> Verdict | None:
+def _fault(shift: EyeShift, apart_m: float | None) -> Verdict | None:
     """Return the verdict on a result that is wrong in itself, else None."""
     length_m = float(np.linalg.norm(shift.shift_m))
-    if length_m > settings.eye_box_m:
+    if length_m > _EYE_BOX_M:
         return Verdict(
             "implausible",
             f"the eye would lie {1e3 * length_m:.0f} mm from the rig's viewpoint, beyond the "
-            f"{1e3 * settings.eye_box_m:.0f} mm eye box; check how the headset sits and the rig",
+            f"{1e3 * _EYE_BOX_M:.0f} mm eye box; check how the headset sits and the rig",
         )
-    if apart_m is not None and not (
-        settings.eye_distance_min_m <= apart_m <= settings.eye_distance_max_m
-    ):
+    if apart_m is not None and not (_EYE_DISTANCES_M[0] <= apart_m <= _EYE_DISTANCES_M[1]):
         return Verdict(
             "implausible",
             f"the eyes would lie {1e3 * apart_m:.0f} mm apart; "
@@ -274,13 +266,13 @@ def _fault(shift: EyeShift, apart_m: float | None, settings: VerdictSettings) ->
         )
     if not shift.converged:
         return Verdict("repeat", f"the registration did not converge ({shift.stop_reason})")
-    if shift.inlier_ratio < settings.inlier_ratio_min:
+    if shift.inlier_ratio < _INLIER_RATIO_MIN:
         return Verdict(
             "repeat",
             f"only {100 * shift.inlier_ratio:.0f} % of the hand found its place on the cursor; "
             "hold the hand in the cursor's shape",
         )
-    if shift.rms_m > settings.rms_max_m:
+    if shift.rms_m > RMS_MAX_M:
         return Verdict(
             "repeat",
             f"hand and cursor differ by {1e3 * shift.rms_m:.1f} mm; "
@@ -310,8 +302,8 @@ def _judge_benefit(gain: Benefit, advice: Advice, more: str, settings: VerdictSe
             "better",
         )
     now = f"expected error {gain.after_arcmin:.1f}′, {sure} sure to be better than none"
-    if gain.probability_better < settings.probability_min:
-        now += f" ({percent(settings.probability_min)} needed)"
+    if gain.probability_better < _PROBABILITY_MIN:
+        now += f" ({percent(_PROBABILITY_MIN)} needed)"
     then = f"{advice.after_arcmin:.1f}′ expected after {more}"
     if not advice.meets_target:
         return Verdict("repeat", f"{now}; only {then}: enter the eye distance, or verify each eye")
@@ -333,4 +325,4 @@ def _further_text(fused: Fused, advice: Advice, eye: Eye) -> str:
 
 
 def _is_enough(after_arcmin: float, probability_better: float, settings: VerdictSettings) -> bool:
-    return probability_better >= settings.probability_min and after_arcmin <= settings.target_arcmin
+    return probability_better >= _PROBABILITY_MIN and after_arcmin <= settings.target_arcmin

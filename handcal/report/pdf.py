@@ -6,7 +6,7 @@ import io
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.backends.backend_pdf import PdfPages
@@ -16,9 +16,6 @@ from handcal.core.progress import Progress
 from handcal.io.files import write_atomic
 from handcal.report.document import Figure, Item, Report, Table
 from handcal.report.page import Document, plain
-
-if TYPE_CHECKING:
-    from typing_extensions import Buffer
 
 # Space needed by a heading, and by the content that must follow it.
 _HEADING_MM, _PARAGRAPH_MM, _TABLE_MM = 15.0, 12.0, 25.0
@@ -32,17 +29,17 @@ def write_pdf(path: Path, report: Report, progress: Progress) -> None:
     path : Path
     report : Report
     progress : Progress
-        Reports the share done many times per second.
+        Told the share done before each item and page.
     """
     pages = compose(report, progress.part(0.0, 0.4))
-    stream = _CheckedStream(progress, 0.4)
+    stream = io.BytesIO()
     # TrueType, as publishers refuse Type 3; images at 200 dots per inch.
     with rc_context({"pdf.fonttype": 42, "savefig.dpi": 200}):
         pdf: Any = PdfPages(stream, metadata=_metadata(report))
         for done, page in enumerate(pages):
-            stream.share = 0.4 + 0.5 * done / len(pages)
+            progress.at(0.4 + 0.5 * done / len(pages))
             pdf.savefig(page)
-        stream.share = 0.9
+        progress.at(0.9)
         pdf.close()  # not after an error, when it would continue writing
     write_atomic(path, stream.getvalue())
 
@@ -65,19 +62,6 @@ def compose(report: Report, progress: Progress) -> list[Page]:
             done += 1
             _set(document, item)
     return document.finish()
-
-
-class _CheckedStream(io.BytesIO):
-    """A buffer that checks the progress on every write, as matplotlib is slow between pages."""
-
-    def __init__(self, progress: Progress, share: float) -> None:
-        super().__init__()
-        self.share = share
-        self._progress = progress
-
-    def write(self, data: Buffer, /) -> int:
-        self._progress.at(self.share)
-        return super().write(data)
 
 
 def _set(document: Document, item: Item) -> None:

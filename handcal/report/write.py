@@ -22,7 +22,7 @@ def write_report(
         Created if needed.
     report : Report
     progress : Progress
-        Reports the share done many times per second.
+        Told the share done before each item, page and figure.
 
     Returns
     -------

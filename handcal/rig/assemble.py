@@ -14,11 +14,11 @@ import numpy as np
 
 from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics, Origin, Rig, RigPart
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.check import MAX_TEXT
-from handcal.rig.displays.display import DISPLAY_PARAMETERS, DisplayCalibration, Screen
+from handcal.rig.displays.homography import DISPLAY_PARAMETERS, DisplayCalibration, Screen
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.lens import as_pinhole
 from handcal.rig.lens.stereo import StereoCalibration
-from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.plausible import MAX_TEXT
 
 STEREO_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m")
 """Parameters of the covariance of T_H_D."""

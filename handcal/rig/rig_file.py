@@ -9,10 +9,10 @@ Unknown fields are ignored.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -34,7 +34,7 @@ from handcal.core.types import (
     RigPart,
 )
 from handcal.io.files import read_limited, write_atomic
-from handcal.rig.check import MAX_RANGES, check_rig, require
+from handcal.rig.plausible import MAX_RANGES, check_rig, require
 from handcal.rig.storage import MAX_STORAGE_BYTES, Fields, parse_storage
 
 RIG_VERSION = 3
@@ -42,7 +42,9 @@ _CHECK_TEXTS = "made", "observer", "device_id", "runtime", "app"
 DISPLAY_MODEL = "homography"
 """The display model of `EyeDisplay`, the only one so far: ``K H0 UQ`` and its parameters."""
 MAX_RIG_BYTES = MAX_STORAGE_BYTES  # a rig takes 3 kB, and 10 kB with all that may be known
-_CAMERA_TEXTS = ("model", "serial_number", "firmware")
+_CAMERA_TEXTS = "model", "serial_number", "firmware"
+_ORIGIN_TEXTS = "method", "made", "verdict", "reason"
+_ORIGIN = (*_ORIGIN_TEXTS, "views", "rms_px", "parameters", "covariance")
 
 
 def write_rig(path: str | PathLike[str], rig: Rig) -> None:
@@ -77,17 +79,7 @@ def write_rig(path: str | PathLike[str], rig: Rig) -> None:
     path = Path(path)
     check_rig(rig)
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
-    storage.write("handcal_rig", RIG_VERSION)
-    storage.write("name", quoted(rig.name))
-    for eye in EYES:
-        _write_display(storage, eye, rig.eyes[eye])
-    storage.write("T_H_D", rig.T_H_D)
-    _write_depth_camera(storage, rig.depth_intrinsics, rig.depth_camera)
-    _write_depth_check(storage, rig.depth_check)
-    _write_depth_edges(storage, rig.depth_edges)
-    _write_headset(storage, rig.headset)
-    _write_display_check(storage, rig.display_check)
-    _write_origins(storage, rig.origins)
+    _write_fields(storage, _fields_of(rig))
     data = storage.releaseAndGetString().encode()
     require(len(data) <= MAX_RIG_BYTES, f"the rig takes more than {MAX_RIG_BYTES:,} bytes")
     write_atomic(path, data)
@@ -139,111 +131,85 @@ def quoted(text: str) -> str:
     return f'"{escaped}"'
 
 
-@contextmanager
-def _map(storage: cv2.FileStorage, name: str) -> Iterator[None]:
-    """Write the fields written inside ``with`` as a map."""
-    storage.startWriteStruct(name, cv2.FileNode_MAP)
-    yield
-    storage.endWriteStruct()
-
-
-def _write_texts(storage: cv2.FileStorage, source: object, names: tuple[str, ...]) -> None:
-    for name in names:
-        storage.write(name, quoted(getattr(source, name)))
-
-
-def _write_display(storage: cv2.FileStorage, eye: str, display: EyeDisplay) -> None:
-    with _map(storage, eye):
-        storage.write("width_px", display.width_px)
-        storage.write("height_px", display.height_px)
-        storage.write("T_V_H", display.T_V_H)
-        with _map(storage, "model"):
-            storage.write("name", quoted(DISPLAY_MODEL))
-            storage.write("K", display.K)
-            storage.write("H0", display.H0)
-            storage.write("t_C0_V_m", display.t_C0_V_m[:, None])
-            storage.write("z_C0_S_m", display.z_C0_S_m)
-
-
-def _write_depth_camera(
-    storage: cv2.FileStorage, intrinsics: Intrinsics, identity: CameraIdentity
-) -> None:
-    with _map(storage, "depth_camera"):
-        _write_texts(storage, identity, _CAMERA_TEXTS)
-        storage.write("width_px", intrinsics.width)
-        storage.write("height_px", intrinsics.height)
-        for name in ("fx", "fy", "cx", "cy"):
-            storage.write(name, getattr(intrinsics, name))
-        storage.startWriteStruct("distortion", cv2.FileNode_SEQ | cv2.FileNode_FLOW)
-        for coefficient in intrinsics.distortion:
-            storage.write("", coefficient)
-        storage.endWriteStruct()
-
-
-def _write_depth_check(storage: cv2.FileStorage, check: DepthCheck | None) -> None:
-    if check is None:
-        return
-    with _map(storage, "depth_check"):
-        storage.write("made", quoted(check.made))
-        storage.write("views", check.views)
-        storage.write("scale", check.scale)
-        storage.write("offset_m", check.offset_m)
-        storage.write("covariance", check.covariance)
-        rows = [check.ranges_m, check.flatness_m[:, None], check.flatness_sigma_m[:, None]]
-        storage.write("flatness", np.hstack(rows))
-
-
-def _write_depth_edges(storage: cv2.FileStorage, edges: DepthEdges | None) -> None:
-    if edges is None:
-        return
-    with _map(storage, "depth_edges"):
-        storage.write("made", quoted(edges.made))
-        storage.write("views", edges.views)
-        storage.write("fatten_px", edges.fatten_px)
-        storage.write("sigma_px", edges.sigma_px)
-
-
-def _write_headset(storage: cv2.FileStorage, headset: HeadsetIdentity | None) -> None:
-    if headset is None:
-        return
-    with _map(storage, "headset"):
-        _write_texts(storage, headset, ("device_id", "name", "runtime", "app"))
-        storage.write("protocol", headset.protocol)
-        if headset.eye_distance_m is not None:
-            storage.write("eye_distance_m", headset.eye_distance_m)
-        if headset.moves_views:
-            storage.write("moves_views", 1)
-        for eye, view in headset.views.items():
-            with _map(storage, eye):
-                storage.write("width_px", view.width_px)
-                storage.write("height_px", view.height_px)
-                storage.write("tangents", view.tangents[:, None])
-                storage.write("T_V_H", view.T_V_H)
-
-
-def _write_display_check(storage: cv2.FileStorage, check: DisplayCheck | None) -> None:
-    if check is None:
-        return
-    with _map(storage, "display_check"):
-        _write_texts(storage, check, _CHECK_TEXTS)
-        for eye, problem in check.problems.items():
-            storage.write(eye, quoted(problem))
-
-
-def _write_origins(storage: cv2.FileStorage, origins: Mapping[RigPart, Origin]) -> None:
-    if not origins:
-        return
-    with _map(storage, "origins"):
-        for part, origin in origins.items():
-            with _map(storage, part):
-                _write_texts(storage, origin, ("method", "made", "verdict", "reason"))
-                storage.write("views", origin.views)
-                storage.write("rms_px", origin.rms_px)
-                storage.startWriteStruct("parameters", cv2.FileNode_SEQ | cv2.FileNode_FLOW)
-                for parameter in origin.parameters:
-                    storage.write("", quoted(parameter))
+def _write_fields(storage: cv2.FileStorage, fields: Mapping[str, Any]) -> None:
+    """Write fields in their order: maps, lists, texts, numbers and matrices; None is left out."""
+    for name, value in fields.items():
+        match value:
+            case None:
+                pass
+            case Mapping():
+                storage.startWriteStruct(name, cv2.FileNode_MAP)
+                _write_fields(storage, value)
                 storage.endWriteStruct()
-                storage.write("covariance", origin.covariance)
+            case tuple():
+                storage.startWriteStruct(name, cv2.FileNode_SEQ | cv2.FileNode_FLOW)
+                for item in value:
+                    storage.write("", quoted(item) if isinstance(item, str) else item)
+                storage.endWriteStruct()
+            case str():
+                storage.write(name, quoted(value))
+            case _:
+                storage.write(name, value)
+
+
+def _fields_of(rig: Rig) -> dict[str, Any]:
+    camera = rig.depth_intrinsics
+    return {
+        "handcal_rig": RIG_VERSION,
+        "name": rig.name,
+        **{eye: _fields_of_display(rig.eyes[eye]) for eye in EYES},
+        "T_H_D": rig.T_H_D,
+        "depth_camera": {
+            **_attributes(rig.depth_camera, *_CAMERA_TEXTS),
+            "width_px": camera.width,
+            "height_px": camera.height,
+            **_attributes(camera, "fx", "fy", "cx", "cy", "distortion"),
+        },
+        "depth_check": rig.depth_check and _fields_of_depth_check(rig.depth_check),
+        "depth_edges": rig.depth_edges
+        and _attributes(rig.depth_edges, "made", "views", "fatten_px", "sigma_px"),
+        "headset": rig.headset and _fields_of_headset(rig.headset),
+        "display_check": rig.display_check
+        and {**_attributes(rig.display_check, *_CHECK_TEXTS), **rig.display_check.problems},
+        "origins": {part: _attributes(one, *_ORIGIN) for part, one in rig.origins.items()} or None,
+    }
+
+
+def _attributes(source: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(source, name) for name in names}
+
+
+def _fields_of_display(display: EyeDisplay) -> dict[str, Any]:
+    model = {
+        "name": DISPLAY_MODEL,
+        "K": display.K,
+        "H0": display.H0,
+        "t_C0_V_m": display.t_C0_V_m[:, None],
+        "z_C0_S_m": display.z_C0_S_m,
+    }
+    return {**_attributes(display, "width_px", "height_px", "T_V_H"), "model": model}
+
+
+def _fields_of_depth_check(check: DepthCheck) -> dict[str, Any]:
+    rows = [check.ranges_m, check.flatness_m[:, None], check.flatness_sigma_m[:, None]]
+    named = _attributes(check, "made", "views", "scale", "offset_m", "covariance")
+    return {**named, "flatness": np.hstack(rows)}
+
+
+def _fields_of_headset(headset: HeadsetIdentity) -> dict[str, Any]:
+    names = "device_id", "name", "runtime", "app", "protocol", "eye_distance_m"
+    return {
+        **_attributes(headset, *names),
+        "moves_views": 1 if headset.moves_views else None,
+        **{
+            eye: {
+                **_attributes(view, "width_px", "height_px"),
+                "tangents": view.tangents[:, None],
+                "T_V_H": view.T_V_H,
+            }
+            for eye, view in headset.views.items()
+        },
+    }
 
 
 def _parse(root: Fields) -> Rig:
@@ -259,12 +225,12 @@ def _parse(root: Fields) -> Rig:
         eyes={eye: _parse_display(root.section(eye)) for eye in EYES},
         T_H_D=root.matrix("T_H_D", 4, 4),
         depth_intrinsics=_parse_intrinsics(depth_camera),
-        origins=_parse_origins(root),
+        origins=root.part("origins", _parse_origins) or {},
         depth_camera=CameraIdentity(*map(depth_camera.text, _CAMERA_TEXTS)),
-        headset=_parse_headset(root),
-        depth_check=_parse_depth_check(root),
-        depth_edges=_parse_depth_edges(root),
-        display_check=_parse_display_check(root),
+        headset=root.part("headset", _parse_headset),
+        depth_check=root.part("depth_check", _parse_depth_check),
+        depth_edges=root.part("depth_edges", _parse_depth_edges),
+        display_check=root.part("display_check", _parse_display_check),
     )
     check_rig(rig)
     return rig
@@ -293,18 +259,12 @@ def _parse_intrinsics(fields: Fields) -> Intrinsics:
     return Intrinsics(
         width=fields.integer("width_px"),
         height=fields.integer("height_px"),
-        fx=fields.number("fx"),
-        fy=fields.number("fy"),
-        cx=fields.number("cx"),
-        cy=fields.number("cy"),
+        **{name: fields.number(name) for name in ("fx", "fy", "cx", "cy")},
         distortion=fields.numbers("distortion"),
     )
 
 
-def _parse_depth_check(root: Fields) -> DepthCheck | None:
-    if not root.has("depth_check"):
-        return None
-    fields = root.section("depth_check")
+def _parse_depth_check(fields: Fields) -> DepthCheck:
     flatness = fields.rows("flatness", 4, MAX_RANGES)
     return DepthCheck(
         made=fields.text("made"),
@@ -318,10 +278,7 @@ def _parse_depth_check(root: Fields) -> DepthCheck | None:
     )
 
 
-def _parse_depth_edges(root: Fields) -> DepthEdges | None:
-    if not root.has("depth_edges"):
-        return None
-    fields = root.section("depth_edges")
+def _parse_depth_edges(fields: Fields) -> DepthEdges:
     return DepthEdges(
         fatten_px=fields.number("fatten_px"),
         sigma_px=fields.number("sigma_px"),
@@ -331,10 +288,7 @@ def _parse_depth_edges(root: Fields) -> DepthEdges | None:
     )
 
 
-def _parse_display_check(root: Fields) -> DisplayCheck | None:
-    if not root.has("display_check"):
-        return None
-    fields = root.section("display_check")
+def _parse_display_check(fields: Fields) -> DisplayCheck:
     made, observer, device_id, runtime, app = map(fields.text, _CHECK_TEXTS)
     is_wearer = observer == "wearer"
     require(is_wearer or observer == "camera", "display_check.observer must be camera or wearer")
@@ -344,15 +298,9 @@ def _parse_display_check(root: Fields) -> DisplayCheck | None:
     )
 
 
-def _parse_headset(root: Fields) -> HeadsetIdentity | None:
-    if not root.has("headset"):
-        return None
-    fields = root.section("headset")
+def _parse_headset(fields: Fields) -> HeadsetIdentity:
     return HeadsetIdentity(
-        device_id=fields.text("device_id"),
-        name=fields.text("name"),
-        runtime=fields.text("runtime"),
-        app=fields.text("app"),
+        **{name: fields.text(name) for name in ("device_id", "name", "runtime", "app")},
         protocol=fields.integer("protocol"),
         views={eye: _parse_view(fields.section(eye)) for eye in EYES if fields.has(eye)},
         eye_distance_m=fields.number("eye_distance_m") if fields.has("eye_distance_m") else None,
@@ -369,22 +317,16 @@ def _parse_view(fields: Fields) -> HeadsetView:
     )
 
 
-def _parse_origins(root: Fields) -> dict[RigPart, Origin]:
-    if not root.has("origins"):
-        return {}
-    origins = root.section("origins")
+def _parse_origins(origins: Fields) -> dict[RigPart, Origin]:
     return {part: _parse_origin(origins.section(part)) for part in RIG_PARTS if origins.has(part)}
 
 
 def _parse_origin(fields: Fields) -> Origin:
     parameters = fields.texts("parameters")
     return Origin(
-        method=fields.text("method"),
-        made=fields.text("made"),
+        **{name: fields.text(name) for name in _ORIGIN_TEXTS},
         views=fields.integer("views"),
         rms_px=fields.number("rms_px"),
-        verdict=fields.text("verdict"),
-        reason=fields.text("reason"),
         parameters=parameters,
         covariance=fields.matrix("covariance", len(parameters), len(parameters)),
     )

@@ -11,10 +11,9 @@ import numpy as np
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import CameraIdentity, Eye, Float64, Intrinsics, Rig
 from handcal.rig.assemble import screen_of
-from handcal.rig.boards.tracked_file import read_tracked
 from handcal.rig.boards.views import BoardImage, used
-from handcal.rig.check import check_view
-from handcal.rig.displays.display import (
+from handcal.rig.displays.grid import GridView, grid_on, on_display
+from handcal.rig.displays.homography import (
     DisplayCalibration,
     DisplaySettings,
     Screen,
@@ -22,11 +21,18 @@ from handcal.rig.displays.display import (
     fit_homography,
     pixel_size_m,
 )
-from handcal.rig.displays.grid import GridView, grid_on, on_display
-from handcal.rig.formats import read_camera, read_identity, read_intrinsics, read_pose, read_stereo
-from handcal.rig.lens.camera import CameraSettings, LensChoice
-from handcal.rig.lens.stereo import StereoCalibration, StereoSettings, calibrate_stereo
+from handcal.rig.formats import (
+    read_camera,
+    read_identity,
+    read_intrinsics,
+    read_pose,
+    read_stereo,
+    read_tracked,
+)
+from handcal.rig.lens.camera import LensChoice
+from handcal.rig.lens.stereo import StereoCalibration, calibrate_stereo
 from handcal.rig.lens.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
+from handcal.rig.plausible import check_view
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +79,7 @@ def calibrate_depth_camera(
         pairs,
         None if depth_intrinsics is None else read_camera(depth_intrinsics),
         None if headset_intrinsics is None else read_camera(headset_intrinsics),
-        StereoSettings(camera=CameraSettings(lens=lens)),
+        lens,
     )
 
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from handcal.core.types import Float64
-from handcal.rig.check import require
+from handcal.rig.plausible import require
 
 # OpenCV's parser recurses with the nesting and overflows the stack at 65 kB.
 MAX_STORAGE_BYTES = 2**14
@@ -103,6 +103,10 @@ class Fields:
     def section(self, name: str) -> Fields:
         """Return a map among the fields."""
         return Fields(self._prefix + name, self._node.getNode(name))
+
+    def part(self, name: str, convert: Callable[[Fields], Value]) -> Value | None:
+        """Return what `convert` makes of a map among the fields; None without it."""
+        return convert(self.section(name)) if self.has(name) else None
 
     def text(self, name: str) -> str:
         """Return a text."""

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from handcal.core.display import eye_projection
 from handcal.core.geometry import rigid
 from handcal.core.types import EyeDisplay, Float32, Float64, Intrinsics, UInt8
-from handcal.rig.cube.cube import Cube, face_pose
+from handcal.rig.cube import Cube, face_pose
 from handcal.sim.boards import BLACK, WALL, WHITE, PictureSettings, expose, pixel_rays
 
 _CELL_PX = 24  # of the texture

@@ -18,8 +18,7 @@ from handcal.io.closable import Closable
 from handcal.link.client import HeadsetClient
 from handcal.link.pairing import new_device_id, new_pairing_key
 from handcal.link.server import HeadsetServer
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.track import cube_corners_m
+from handcal.rig.cube import Cube, cube_corners_m
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter
 from handcal.sim.cube_captures import some_cube_pose

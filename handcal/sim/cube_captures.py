@@ -28,8 +28,7 @@ from handcal.io.images import write_png
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.register.results import SolveSettings, solve_session
-from handcal.rig.cube.cube import Cube, CubeError, cube_pose, find_cube
-from handcal.rig.cube.cube_file import write_cube
+from handcal.rig.cube import Cube, CubeError, cube_pose, find_cube, write_cube
 from handcal.rig.displays.grid import Grid, draw_grid
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.boards import PictureSettings

@@ -12,9 +12,8 @@ from handcal.core.types import EYES, Intrinsics, Rig, UInt8
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.rig.boards.board import Board
-from handcal.rig.boards.tracked_file import write_tracked
 from handcal.rig.displays.grid import Grid, draw_grid
-from handcal.rig.formats import write_intrinsics
+from handcal.rig.formats import write_intrinsics, write_tracked
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses
 from handcal.sim.viewpoint import photograph_display
 

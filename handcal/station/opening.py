@@ -19,8 +19,8 @@ from handcal.core.errors import CameraError, FileError
 from handcal.core.types import EYES, PlanName, Rig
 from handcal.io.settings import settings_json
 from handcal.register.fuse import FuseSettings
+from handcal.register.prior import fit_wearers
 from handcal.register.sitting import sitting_prior
-from handcal.register.wearers import fit_wearers
 from handcal.rig.rig_file import read_rig
 from handcal.session.in_force import end_at_begin
 from handcal.session.journal import JOURNAL, JOURNAL_END

@@ -21,9 +21,9 @@ from handcal.io.files import user_path
 from handcal.lab.evaluate.cube_capture import RestWatch, instruction, keep_capture
 from handcal.lab.evaluate.cube_folder import GRID, CapturePlan, PlannedCapture, missing_captures
 from handcal.lab.evaluate.run import cube_and_grid, position_warp
-from handcal.rig.cube.cube import Cube
+from handcal.rig.cube import Cube
 from handcal.rig.displays.grid import Grid
-from handcal.rig.displays.warp import RotationWarp
+from handcal.rig.displays.homography import RotationWarp
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr

@@ -13,8 +13,9 @@ from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye
 from handcal.io.images import IMAGE_SUFFIXES
-from handcal.rig.acceptance.accept import FEWEST_VIEWS, LIMIT_ARCMIN
-from handcal.rig.acceptance.acceptance import (
+from handcal.rig.acceptance import (
+    FEWEST_VIEWS,
+    LIMIT_ARCMIN,
     Acceptance,
     AcceptanceSettings,
     passed_words,

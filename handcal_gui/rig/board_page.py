@@ -19,8 +19,7 @@ from handcal.core.types import PART_NAMES, Rig, UInt8
 from handcal.io.images import write_png
 from handcal.io.resources import resource_path
 from handcal.rig.boards.board import DICTIONARIES, Board, BoardKind
-from handcal.rig.boards.print_page import Paper
-from handcal.rig.boards.printing import draw_board, write_board_pdf
+from handcal.rig.boards.printing import Paper, draw_board, write_board_pdf
 from handcal.rig.compare import compare_rigs
 from handcal.rig.rig_file import read_rig
 from handcal.station.checks.doctor import Finding, Health

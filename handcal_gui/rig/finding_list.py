@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.rig.report import RigFinding
+from handcal.rig.findings import RigFinding
 from handcal_gui.app.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.sentence import sentence

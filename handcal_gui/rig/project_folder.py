@@ -15,7 +15,7 @@ from handcal.io.files import make_folder, read_json, user_path, write_json
 from handcal.io.resources import resource_path
 from handcal.io.settings import read_settings, settings_json
 from handcal.rig.boards.board import Board
-from handcal.rig.boards.print_page import Paper
+from handcal.rig.boards.printing import Paper
 from handcal.rig.lens.camera import LensChoice
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.rig.steps import DisplayInputs

@@ -21,8 +21,8 @@ from PySide6.QtWidgets import (
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.types import PART_NAMES, RIG_PARTS, Rig
 from handcal.io.files import user_path
-from handcal.rig.check import MAX_NAME
-from handcal.rig.report import RigFinding, report_rig
+from handcal.rig.findings import RigFinding, report_rig
+from handcal.rig.plausible import MAX_NAME
 from handcal.rig.rig_file import read_rig
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.rig.assemble import STEREO_PARAMETERS
 from handcal.rig.compare import compare_rigs
-from handcal.rig.displays.display import DISPLAY_PARAMETERS, DisplayCalibration
+from handcal.rig.displays.homography import DISPLAY_PARAMETERS, DisplayCalibration
 from handcal.rig.lens.camera import CameraCalibration
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal_gui.app.translation import tr

@@ -13,7 +13,8 @@ from handcal.io.files import write_json
 from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.boards.views import BoardImage, WorstView
 from handcal.rig.formats import camera_json, read_intrinsics
-from handcal.rig.lens.camera import CameraSettings, calibrate_camera, tilt
+from handcal.rig.lens.camera import calibrate_camera, tilt
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.lens import Camera, first_pose
 from handcal.rig.lens.uncertainty import ProjectionUncertainty
 from handcal.rig.steps import (
@@ -24,7 +25,6 @@ from handcal.rig.steps import (
     intrinsics_in,
     pose_in,
 )
-from handcal.rig.verdict import CalibrationVerdict
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.project_folder import (
     DisplayEntries,
@@ -94,7 +94,7 @@ def solve_stereo(shots: Sequence[Shot], entries: StereoEntries) -> SolvedPart:
 def solve_viewpoint(shots: Sequence[Shot], entries: ViewpointEntries, output: Path) -> SolvedPart:
     """Solve the viewpoint camera's intrinsics, and write them to a file unless bad."""
     views = [view for (view,) in excluding(shots, entries.dropped)]
-    result = calibrate_camera(views, CameraSettings(lens=entries.lens))
+    result = calibrate_camera(views, entries.lens)
     if result.verdict.name != "bad":
         write_json(output, camera_json(result))
     return SolvedPart(

@@ -12,11 +12,17 @@ import pytest
 from handcal.calibration.former import Former
 from handcal.calibration.lab_prior import run_learn_prior
 from handcal.core.types import EYES, Verification
-from handcal.register.nudge import nudged_shift_m
-from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
+from handcal.register.model import nudged_shift_m
+from handcal.register.prior import (
+    MIN_PEOPLE,
+    MIN_SESSIONS,
+    MIN_SITTINGS,
+    PriorSettings,
+    eye_prior,
+    learn_wearers,
+)
 from handcal.register.results import SolveSettings, conclude, results_json
 from handcal.register.sitting import SittingSettings, sitting_prior
-from handcal.register.wearers import MIN_PEOPLE, MIN_SITTINGS, learn_wearers
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.session.session import Session

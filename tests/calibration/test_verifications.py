@@ -21,7 +21,7 @@ from handcal.core.types import EYES, Eye, EyeDistance, Float64
 from handcal.link.client import HeadsetClient
 from handcal.link.nudges import MAX_NUDGE_ARCMIN, NudgeSum
 from handcal.link.server import HeadsetServer
-from handcal.register.nudge import nudged_shift_m
+from handcal.register.model import nudged_shift_m
 from handcal.session.session import Session
 from tests.calibration.stage import (
     HEADSET_AHEAD_NS,

@@ -18,7 +18,7 @@ from handcal.hand.settings import SegmentSettings
 from handcal.hand.shipped import make_finder
 from handcal.lab.evaluate.masked_frames import read_masked_frames, read_masked_names
 from handcal.rig.boards.board import Board, corners_m
-from handcal.rig.report import depth_finding
+from handcal.rig.findings import depth_finding
 from handcal.sim.ahat import AhatSettings, ahat_rays, sense_distance
 from handcal.sim.boards import BoardPainter, PictureSettings, pixel_rays
 from tests.camera.hl2ss_server import Hl2ssServer, ahat_payload, calibration_of, packet_of

@@ -8,8 +8,7 @@ from handcal.cli.main import main
 from handcal.core.geometry import rigid
 from handcal.core.types import Intrinsics
 from handcal.io.images import write_png
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.cube_file import read_cube, write_cube
+from handcal.rig.cube import Cube, read_cube, write_cube
 from handcal.rig.formats import write_intrinsics
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter

@@ -10,7 +10,7 @@ from handcal.cli.main import parse
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
 from handcal.core.types import Frame, Intrinsics
-from handcal.rig.cube.cube import Cube
+from handcal.rig.cube import Cube
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter

@@ -15,11 +15,10 @@ from handcal.core.errors import FileError, HandcalError
 from handcal.core.geometry import invert, rigid
 from handcal.core.types import Intrinsics
 from handcal.rig.boards.board import Board
-from handcal.rig.boards.tracked_file import write_tracked
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.compare import compare_rigs
 from handcal.rig.example import FOCAL_PX, example_rig
-from handcal.rig.formats import write_intrinsics
+from handcal.rig.formats import write_intrinsics, write_tracked
 from handcal.rig.rig_file import read_rig
 from handcal.sim.boards import BoardPainter, PictureSettings, board_poses, pixel_rays
 from handcal.sim.viewpoint import photograph_display

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,32 +36,6 @@ def left(simulated: Callable[..., Alignment]) -> Alignment:
     return simulated(2, ("left",))
 
 
-def test_the_json_says_everything_once(both: Alignment, left: Alignment) -> None:
-    results = solve_session([left, both], RIG, SolveSettings())
-    data = json.loads(json.dumps(results_json(results), allow_nan=False))
-    assert set(data) == {
-        "version", "method", "eyes", "eye_distance_m", "measured_eye_distance", "alignments",
-        "observed", "evidence", "prior_warning",
-    }  # fmt: skip
-    assert (data["version"], data["method"]) == (3, "consistent")
-    assert list(data["eyes"]) == list(EYES)
-    solved = {
-        "shift_m", "covariance_m2", "rms_m", "inlier_ratio", "iterations", "converged",
-        "stop_reason",
-    }  # fmt: skip
-    for eye in EYES:
-        judged = {"verdict", "reason", "benefit", "depth", "advice"}
-        assert set(data["eyes"][eye]) == solved | judged
-        assert data["eyes"][eye]["depth"] == asdict(results.benefits[eye].depth)
-        assert data["eyes"][eye]["shift_m"] == results.eyes[eye].shift_m.tolist()
-        assert np.shape(data["eyes"][eye]["covariance_m2"]) == (3, 3)
-        assert data["eyes"][eye]["verdict"] == results.verdicts[eye].name
-        assert data["eyes"][eye]["reason"] == results.verdicts[eye].reason
-    assert [list(alone) for alone in data["alignments"]] == [["left"], ["left", "right"]]
-    assert set(data["alignments"][1]["right"]) == solved
-    assert data["eye_distance_m"] == pytest.approx(0.063, abs=0.010)
-
-
 def test_what_another_alignment_would_buy_is_what_it_buys(left: Alignment) -> None:
     once, twice = (solve_session([left] * count, RIG, SolveSettings()) for count in (1, 2))
     now, after = (
@@ -76,16 +48,10 @@ def test_what_another_alignment_would_buy_is_what_it_buys(left: Alignment) -> No
     assert predicted < 0.9 * now
 
 
-def test_an_eye_that_took_no_part_has_no_result(left: Alignment) -> None:
-    results = solve_session([left], RIG, SolveSettings())
-    assert set(results.eyes) == set(results.verdicts) == {"left"}
-    assert results.eye_distance_m is None
-
-
 def test_the_settings_reach_the_verdict(left: Alignment) -> None:
-    lenient = SolveSettings(verdict=VerdictSettings(target_arcmin=60.0, probability_min=0.0))
+    lenient = SolveSettings(verdict=VerdictSettings(target_arcmin=60.0))
     strict = SolveSettings(verdict=VerdictSettings(target_arcmin=0.1))
-    assert solve_session([left], RIG, lenient).verdicts["left"].name == "accept"
+    assert solve_session([left], RIG, lenient).verdicts["left"].name == "keep"
     assert solve_session([left], RIG, strict).verdicts["left"].name == "repeat"
 
 
@@ -166,11 +132,3 @@ def test_a_stored_session_is_solved_alike_to_the_last_bit(
         tmp_path / "again.json", results_json(solve_session(record.alignments, record.rig, solve))
     )
     assert (tmp_path / "again.json").read_bytes() == (session.path / "results.json").read_bytes()
-
-
-def test_another_method_gives_another_result(left: Alignment) -> None:
-    shifts_m = [
-        solve_session([left], RIG, replace(SolveSettings(), method=method)).eyes["left"].shift_m
-        for method in ("consistent", "linear", "icp")
-    ]
-    assert len({tuple(shift_m) for shift_m in shifts_m}) == 3

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from handcal.core.types import EYES, DepthEdges, Eye, Float64, Verification
+from handcal.register import fuse
 from handcal.register.fuse import Fused, FuseSettings, fuse_alignments
-from handcal.register.nudge import nudged_shift_m
+from handcal.register.model import nudged_shift_m
 from handcal.register.prior import PriorSettings
 from handcal.register.results import SolveSettings, conclude
 from handcal.register.sitting import LearnedSitting, SittingSettings
@@ -65,10 +66,10 @@ def test_the_derivatives_are_those_of_a_nudge(axis: int, sees: tuple[float, floa
     np.testing.assert_allclose((one.by_sitting @ error)[axis], moved_m[axis], rtol=0.03)
 
 
-def test_near_and_far_tell_a_constant_error_from_the_eyes() -> None:
+def test_near_and_far_tell_a_constant_error_from_the_eyes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuse, "_VERIFIED_SIGMA_ARCMIN", 0.3)
     wide = FuseSettings(
         sitting=SittingSettings(6.0, 0.004),
-        verified_sigma_arcmin=0.3,
         prior=PriorSettings(eye_box_sigma_m=0.01),
     )
     true_m, sees = np.array([0.003, 0.0, 0.0]), (4.0, 0.0, 0.0)
@@ -144,10 +145,3 @@ def test_an_outline_that_nobody_measured_may_be_wrong_by_more() -> None:
     )
     assert abs(typical.shift_m[2]) < 0.7 * abs(measured.shift_m[2])
     assert typical.sigma_m[2] > 1.1 * measured.sigma_m[2]
-
-
-def test_a_prior_of_wearers_must_be_one() -> None:
-    with pytest.raises(ValueError, match="3 numbers"):
-        LearnedSitting((0.0,), (0.0,), 30)
-    with pytest.raises(ValueError, match="not one"):
-        LearnedSitting((0.0, 0.0, 0.0), (-1.0, 0, 0, 0, 1, 0, 0, 0, 1), 30)

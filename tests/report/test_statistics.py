@@ -87,11 +87,6 @@ def test_without_skewness_it_is_students_interval() -> None:
     assert [found.low, found.high] == pytest.approx([3.0 - half, 3.0 + half])
 
 
-def test_a_long_tail_widens_its_side() -> None:
-    found = mean_interval([*np.linspace(1.0, 1.5, 11), 4.0])
-    assert found.high - found.mean > 1.5 * (found.mean - found.low) > 0.0
-
-
 def test_each_wearer_counts_once() -> None:
     found = mean_interval([1.0, 1.0, 1.0, 4.0], ["a", "a", "a", "b"])
     assert found.mean == 2.5
@@ -111,11 +106,6 @@ def test_the_interval_holds_the_mean_and_moves_with_the_unit(
     assert [other.low, other.high] == pytest.approx(
         [scale * one.low + shift, scale * one.high + shift], rel=1e-3, abs=1e-3
     )
-
-
-def test_equal_values_leave_no_doubt() -> None:
-    found = mean_interval([2.0] * 6)
-    assert (found.low, found.mean, found.high) == (2.0, 2.0, 2.0)
 
 
 def test_the_spread_is_as_by_hand() -> None:

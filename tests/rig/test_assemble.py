@@ -6,13 +6,13 @@ import pytest
 
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, DepthCheck, Intrinsics
-from handcal.rig.assemble import screen_of, with_display, with_stereo
+from handcal.rig.assemble import with_display, with_stereo
 from handcal.rig.boards.views import ViewsError, WorstView
-from handcal.rig.displays.display import DisplayCalibration, DisplayHomography
+from handcal.rig.displays.homography import DisplayCalibration, DisplayHomography
 from handcal.rig.example import example_rig
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.rig_file import read_rig, write_rig
-from handcal.rig.verdict import CalibrationVerdict
 
 RIG = example_rig()
 MADE = "2026-11-21T16:00:00+00:00"
@@ -87,12 +87,6 @@ def test_the_rig_s_camera_is_the_one_that_took_the_images() -> None:
 def test_a_pose_that_is_not_determined_makes_no_rig() -> None:
     with pytest.raises(ViewsError, match="add others"):
         with_stereo(RIG, replace(STEREO, covariance=None), MADE)
-
-
-def test_what_the_headset_tells_is_kept() -> None:
-    screen = screen_of(RIG, "right")
-    assert (screen.width_px, screen.height_px) == (1268, 720)
-    np.testing.assert_array_equal(screen.T_V_H, RIG.eyes["right"].T_V_H)
 
 
 def test_a_long_reason_is_shortened_to_what_the_file_takes(tmp_path: Path) -> None:

@@ -14,15 +14,20 @@ from handcal.rig.formats import (
     CALIBRATION_FORMATS,
     CalibrationFormat,
     camera_json,
+    has_pose,
+    read_camera,
     read_identity,
     read_intrinsics,
     read_pose,
     read_stereo,
+    read_tracked,
     stereo_json,
     write_intrinsics,
     write_pose,
+    write_tracked,
 )
 from handcal.rig.lens.camera import calibrate_camera
+from handcal.rig.lens.lens import Camera, FisheyeIntrinsics
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.rig.storage import MAX_STORAGE_BYTES
 from handcal.sim.boards import board_poses, board_view
@@ -227,3 +232,247 @@ def test_a_pose_is_read_from_a_plain_matrix(tmp_path: Path, separator: str) -> N
     path.write_text("1 2 3")
     with pytest.raises(FileError, match="4 rows of 4 numbers"):
         read_pose(path)
+
+
+D455 = (0.01192, 0.7232, 0.00036, -0.00038, -2.467)
+ONE = Intrinsics(1280, 720, 898.29, 901.07, 649.37, 362.53, D455)
+KALIBR = Intrinsics(
+    2064, 1544, 1307.1793378428877, 1301.0605358699895, 1038.7247645586372, 810.1779283469755,
+    (-0.19324774955872565, 0.0658473291152598, 0.00029907018930053344, -0.0001662129018857859),
+)  # fmt: skip
+AZURE = (0.41, -2.5, -0.0002, 0.0004, 1.4, 0.29, -2.3, 1.36)
+ECHOED = (-0.05624309927225113, 0.06353731453418732, -0.0007865713560022414,
+          0.0005391784361563623, -0.020239178091287613)  # fmt: skip
+T265 = (-0.000712347915396094, 0.0346902199089527, -0.0326500199735165, 0.00464539602)
+EUROC = (-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05)
+ECHO_1 = (383.15728759765625, 383.15728759765625, 319.8735046386719, 241.6318359375)
+ECHO_2 = (642.4718627929688, 641.7909545898438, 640.6505126953125, 363.3234558105469)
+
+
+@pytest.fixture
+def rigfiles(shared_data: Path) -> Path:
+    return shared_data / "field" / "rigfiles"
+
+
+@pytest.mark.parametrize(
+    ("name", "camera"),
+    [
+        ("opencv_sample.xml", ONE),
+        ("opencv_sample.yml", ONE),
+        ("opencv_old_header.yml", ONE),
+        ("opencv_calib_sample_names.yml", ONE),
+        ("ros_crlf.yaml", ONE),
+        ("rs_intrinsics.json", ONE),
+        ("open3d.json", Intrinsics(1280, 720, 898.29, 901.07, 649.37, 362.53)),
+        ("kalibr_camchain.yaml", KALIBR),
+        ("euroc_sensor.yaml", Intrinsics(752, 480, 458.654, 457.296, 367.215, 248.375, EUROC)),
+        ("ros_echo.yaml", Intrinsics(640, 480, *ECHO_1, (0.0,) * 5)),
+        ("ros2_echo.yaml", Intrinsics(1280, 720, *ECHO_2, ECHOED)),
+        ("ros_equi.yaml", FisheyeIntrinsics(848, 800, 284.77, 285.84, 427.82, 405.81, T265)),
+        ("k4a.json", Intrinsics(4096, 3072, 2015.232, 2015.232, 2059.788, 1557.004, AZURE)),
+    ],
+)
+def test_cameras_by_other_programs(rigfiles: Path, name: str, camera: Camera) -> None:
+    found = read_camera(rigfiles / name)
+    assert type(found) is type(camera)
+    assert (found.width, found.height) == (camera.width, camera.height)
+    numbers = [found.fx, found.fy, found.cx, found.cy, *found.distortion]
+    assert numbers == pytest.approx(
+        [camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion], rel=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    "name", ["opencv_KD.yml", "opencv_cameraMatrix.yml", "pycalib.json", "stereo_intrinsics.yml"]
+)
+def test_files_without_the_size_of_the_images(rigfiles: Path, name: str) -> None:
+    with pytest.raises(FileError, match="not the size of the images: add image_width"):
+        read_camera(rigfiles / name)
+    assert read_camera(rigfiles / name, size=(1280, 720)) == ONE
+
+
+def test_one_of_several_cameras(rigfiles: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert read_camera(rigfiles / "kalibr_camchain.yaml") == KALIBR
+    assert "camera cam0 is used, of cam0, cam1" in caplog.text
+    assert read_camera(rigfiles / "kalibr_camchain.yaml", "cam1").fx == 1313.9722271268822
+    with pytest.raises(FileError, match="no camera cam2, but cam0, cam1"):
+        read_camera(rigfiles / "kalibr_camchain.yaml", "cam2")
+    assert read_camera(rigfiles / "stereo_intrinsics.yml", "2", (1280, 720)) == ONE
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("colmap_cameras.txt", "seems to be COLMAP's cameras.txt; handcal reads .* OpenCV"),
+        ("np.npz", "seems to be a NumPy archive; handcal reads"),
+        ("stereo_extrinsics.yml", "a pose, but no camera"),
+        ("view_unity.txt", "no camera; handcal reads"),
+    ],
+)
+def test_what_holds_no_camera_is_named(rigfiles: Path, name: str, said: str) -> None:
+    with pytest.raises(FileError, match=said):
+        read_camera(rigfiles / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("% Intrinsic Camera Parameters\nfc = [ 657.3 ; 657.7 ];\n", "a MATLAB file"),
+        (' Intrinsic of "Depth" / 640x480 / {Z16}\n  PPX: 320\n', "rs-enumerate-devices"),
+    ],
+)
+def test_texts_without_fields_are_named(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "camera.txt"
+    path.write_text(text)
+    with pytest.raises(FileError, match=said):
+        read_camera(path)
+
+
+def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
+    path = tmp_path / "pose.txt"
+    path.touch()
+    with pytest.raises(FileError, match="the file is empty"):
+        read_pose(path)
+
+
+def test_poses_by_other_programs(rigfiles: Path) -> None:
+    assert has_pose(rigfiles / "stereo_extrinsics.yml")
+    T = read_pose(rigfiles / "stereo_extrinsics.yml")
+    assert T[:3, 3].tolist() == [-0.0751, 0.0012, -0.0007]
+    assert T[0, :3].tolist() == [0.99935007582979452, -0.029893012156105903, 0.020145316160805754]
+    assert has_pose(rigfiles / "stereo_extrinsics_mm.yml")
+    with pytest.raises(FileError, match=r"75.11 m long.*in millimetres, divide it by 1000"):
+        read_pose(rigfiles / "stereo_extrinsics_mm.yml")
+    with pytest.raises(FileError, match="mirrored one, as with the axes of Unity or OpenGL"):
+        read_pose(rigfiles / "view_unity.txt")
+
+
+K = [[500, 0, 320], [0, 501, 240], [0, 0, 1]]
+PLAIN = Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0)
+SIZE = {"image_width": 640, "image_height": 480}
+
+
+@pytest.mark.parametrize(
+    ("values", "camera"),
+    [
+        ({"size": [640, 480], "mtx": K, "dist": []}, PLAIN),
+        ({"imageSize": [640, 480], "intrinsics": np.transpose(K).ravel().tolist()}, PLAIN),
+        ({"depth": {"width": 640, "height": 480, "fx": 500, "fy": 501, "ppx": 320, "ppy": 240,
+                    "model": "distortion.none", "coeffs": []}}, PLAIN),
+        (SIZE | {"right": {"camera_matrix": K}, "left": {"camera_matrix": K}}, PLAIN),
+        (SIZE | {"camera_matrix_left": K, "dist_coeffs_left": [0.1, 0.2, 0, 0, 0]},
+         Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
+        ({"Camera.width": 640, "Camera.height": 480, "Camera.type": "PinHole", "Camera.fx": 500,
+          "Camera.fy": 501, "Camera.cx": 320, "Camera.cy": 240, "Camera.k1": 0.1,
+          "Camera.k2": 0.2, "Camera.p1": 0.3, "Camera.p2": 0.4},
+         Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.3, 0.4, 0.0))),
+        (SIZE | {"intrinsics": {"fx": 500, "fy": 501, "cx": 320, "cy": 240},
+                 "distortion": {"k1": 0.1, "k2": 0.2, "p1": 0, "p2": 0}},
+         Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
+        (SIZE | {"model_type": "PINHOLE", "distortion_parameters": {"k1": 0.1, "k2": 0.2},
+                 "projection_parameters": {"fx": 500, "fy": 501, "cx": 320, "cy": 240}},
+         Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
+        ({"intrinsics": {"color": {"width": 640, "height": 480, "fx": 500, "fy": 501, "ppx": 320,
+          "ppy": 240, "model": "RS2_DISTORTION_BROWN_CONRADY", "coeffs": [0.1, 0.2, 0, 0, 0]}}},
+         Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
+        (SIZE | {"model": "fisheye", "fx": 500, "fy": 501, "cx": 320, "cy": 240, "k1": 0.1,
+                 "k4": 0.4},
+         FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.0, 0.0, 0.4))),
+        (SIZE | {"K": K, "D": T265, "distortion_model": "equidistant", "P1": [[1.0] * 4] * 3},
+         FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, T265)),
+        ({"camera_model": "OPENCV", "fl_x": 500, "fl_y": 501, "cx": 320, "cy": 240, "w": 640,
+          "h": 480, "k1": 0.1, "k2": 0.2, "p1": 0, "p2": 0, "H": [[1, 0, 0]] * 3},
+         Intrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, (0.1, 0.2, 0.0, 0.0, 0.0))),
+        ({"resolution": [640, 480], "camera_model": "pinhole", "distortion_model": "equidistant",
+          "distortion_coeffs": T265, "intrinsics": [500, 501, 320, 240]},
+         FisheyeIntrinsics(640, 480, 500.0, 501.0, 320.0, 240.0, T265)),
+    ],
+)  # fmt: skip
+def test_names_of_fields_vary(tmp_path: Path, values: dict[str, object], camera: Camera) -> None:
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(values))
+    assert read_camera(path) == camera
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"resolution": [640, 480], "camera_model": "omni", "intrinsics": [1, 500, 501, 3, 2]},
+         "lens model omni is not known"),
+        (SIZE | {"K": K, "D": [0.1] * 3}, "0, 4, 5, 8, 12 or 14"),
+        (SIZE | {"K": K, "D": [0.1] * 5, "model": "fisheye"}, "a fisheye has 4 coefficients"),
+        (SIZE | {"K": [500, 0, 0, 501, 3]}, "3×3"),
+        (SIZE | {"K": [["a"] * 3] * 3}, "finite numbers"),
+        ({"size": 640, "K": K}, "not the size of the images"),
+        (SIZE | {"K": [[500, 0], [1]]}, "no camera"),
+        (SIZE | {"K": K, "D": [[0.1], [1, 2]]}, "distortion must be finite numbers"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named(tmp_path: Path, values: dict[str, object], said: str) -> None:
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(values))
+    with pytest.raises(FileError, match=said):
+        read_camera(path)
+
+
+def test_a_message_of_ros_with_empty_fields_and_a_second_message(tmp_path: Path) -> None:
+    path = tmp_path / "info.yaml"
+    text = "header: \n  frame_id: ''\nheight: 480\nwidth: 640\ndistortion_model: ''\nd: []\nk:\n"
+    text += "".join(f"- {one}\n" for one in np.ravel(K)) + "roi:\n  do_rectify: false\n---\n"
+    path.write_text(text + text.replace("640", "641"))
+    assert read_camera(path) == PLAIN
+
+
+def test_a_large_file_of_opencv_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "out_camera_data.xml"
+    numbers = " ".join(f"{one}." for one in np.ravel(K))
+    points = "<points><rows>1</rows><cols>20000</cols><dt>d</dt><data>" + "12.5 " * 20000
+    path.write_text(
+        '<?xml version="1.0"?>\n<opencv_storage>\n<image_width>640</image_width>\n'
+        "<image_height>480</image_height>\n<camera_matrix><rows>3</rows><cols>3</cols><dt>d</dt>"
+        f"<data>{numbers}</data></camera_matrix>\n{points}</data></points>\n</opencv_storage>\n"
+    )
+    assert read_camera(path) == PLAIN
+
+
+@pytest.mark.parametrize("kind", ["opencv", "ros", "json"])
+def test_a_fisheye_survives(tmp_path: Path, kind: str) -> None:
+    camera = FisheyeIntrinsics(848, 800, 284.77, 285.84, 427.82, 405.81, T265)
+    write_intrinsics(tmp_path / "camera", camera, kind)  # type: ignore[arg-type]
+    assert read_camera(tmp_path / "camera") == camera
+
+
+def test_poses_come_back_exactly(tmp_path: Path) -> None:
+    poses = {"a.png": rigid([0.1, 0.2, 0.3], [0.1, 0.2, 0.5]), "b.png": np.eye(4)}
+    write_tracked(tmp_path / "poses.json", poses)
+    found = read_tracked(tmp_path / "poses.json")
+    assert list(found) == ["a.png", "b.png"]
+    for name, T in poses.items():
+        np.testing.assert_array_equal(found[name], T)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ({}, "handcal_tracked must be 1"),
+        ({"handcal_tracked": 2, "T_H_B": {}}, "handcal_tracked must be 1"),
+        ({"handcal_tracked": 1, "T_H_B": []}, "T_H_B must hold"),
+        ({"handcal_tracked": 1, "T_H_B": {}}, "1 to 500 poses"),
+        ({"handcal_tracked": 1, "T_H_B": {"a": "x"}}, "T_H_B of a must be a rigid"),
+        ({"handcal_tracked": 1, "T_H_B": {"a": [[1], [2, 3]]}}, "T_H_B of a"),
+        ({"handcal_tracked": 1, "T_H_B": {"a": np.zeros((4, 4)).tolist()}}, "T_H_B of a"),
+        ({"handcal_tracked": 1, "T_H_B": {"a": np.eye(3).tolist()}}, "T_H_B of a"),
+    ],
+)
+def test_what_is_no_set_of_poses_is_named(tmp_path: Path, content: object, problem: str) -> None:
+    path = tmp_path / "poses.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(FileError, match=problem):
+        read_tracked(path)
+
+
+@pytest.mark.parametrize("text", ["", "{}"])
+def test_another_file_says_which_to_choose(tmp_path: Path, text: str) -> None:
+    (tmp_path / "depth.json").write_text(text)
+    with pytest.raises(FileError, match="; choose the file of tracked poses"):
+        read_tracked(tmp_path / "depth.json")

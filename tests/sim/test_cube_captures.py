@@ -16,9 +16,7 @@ from handcal.lab.evaluate.cube_test import judge_captures
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import eye_prior
 from handcal.register.results import SolveSettings, solve_session
-from handcal.rig.cube.cube import Cube, CubeError
-from handcal.rig.cube.cube_file import read_cube
-from handcal.rig.cube.track import cube_corners_m
+from handcal.rig.cube import Cube, CubeError, cube_corners_m, read_cube
 from handcal.rig.displays.grid import Grid
 from handcal.rig.example import example_rig
 from handcal.rig.formats import read_intrinsics

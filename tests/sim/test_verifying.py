@@ -11,7 +11,7 @@ from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import invert, rigid, transform
 from handcal.core.types import EYES, Eye, Float64
 from handcal.link.nudges import NudgeSum, VerifyRequest
-from handcal.register.nudge import nudged_shift_m
+from handcal.register.model import nudged_shift_m
 from handcal.rig.example import example_rig
 from handcal.sim.hand import HandModel, make_hand
 from handcal.sim.verifying import (

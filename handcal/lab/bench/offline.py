@@ -20,7 +20,8 @@ from handcal.report.statistics import MeanInterval
 from handcal.rig.assemble import screen_of, with_display, with_stereo
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import BoardImage, board_image
-from handcal.rig.displays.display import (
+from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
+from handcal.rig.displays.homography import (
     DisplayHomography,
     DisplaySettings,
     calibrate_display,
@@ -28,7 +29,6 @@ from handcal.rig.displays.display import (
     pixel_size_m,
     undistort,
 )
-from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
 from handcal.rig.lens.camera import calibrate_camera
 from handcal.rig.lens.stereo import calibrate_stereo

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from handcal.core.frozen import freeze
 from handcal.core.geometry import camera_matrix, transform
 from handcal.core.types import Float64, Intrinsics
-from handcal.rig.cube.cube import MIN_FACES, Cube, CubeError, cube_pose, marker_corners_m
+from handcal.rig.cube import MIN_FACES, Cube, CubeError, cube_pose, marker_corners_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)

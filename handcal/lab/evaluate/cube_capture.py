@@ -24,7 +24,7 @@ from handcal.lab.evaluate.cube_folder import (
 )
 from handcal.rig.boards.board import BoardError
 from handcal.rig.boards.finder import find_board
-from handcal.rig.cube.cube import Cube, CubeError, find_cube
+from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.displays.grid import Grid
 
 # Images buffered by the camera were taken before the operator was ready.

@@ -18,7 +18,7 @@ from handcal.report.cells import interval_ends, mean_sd
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
 from handcal.report.statistics import INTERVAL_METHOD
-from handcal.rig.cube.cube import Cube
+from handcal.rig.cube import Cube
 
 _METHOD = (
     "A camera in the eye's place captures the real cube with the display off, and the drawn cube "

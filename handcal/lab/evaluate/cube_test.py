@@ -19,10 +19,9 @@ from handcal.lab.evaluate.cube import CubeMisalignment, compare_cubes
 from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
 from handcal.rig.boards.board import BoardError
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.cube.cube import Cube, CubeError, find_cube
-from handcal.rig.displays.display import fit_homography, pose_before
+from handcal.rig.cube import Cube, CubeError, find_cube
 from handcal.rig.displays.grid import Grid, find_grid
-from handcal.rig.displays.warp import RotationWarp
+from handcal.rig.displays.homography import RotationWarp, fit_homography, pose_before
 
 CubeRow: TypeAlias = dict[str, float | int | str]
 """Errors of one pair of captures; units are in the names."""

@@ -34,10 +34,9 @@ from handcal.lab.settings import (
 from handcal.lab.study.store import free_of_studies
 from handcal.report.document import Report
 from handcal.report.write import write_report
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.cube_file import read_cube
+from handcal.rig.cube import Cube, read_cube
 from handcal.rig.displays.grid import Grid, grid_on
-from handcal.rig.displays.warp import RotationWarp
+from handcal.rig.displays.homography import RotationWarp
 from handcal.rig.formats import read_intrinsics
 from handcal.rig.rig_file import read_rig
 from handcal.sim.cube_captures import CaptureSettings, write_captures

@@ -30,9 +30,8 @@ from handcal.lab.study.trials import study_hand
 from handcal.lab.study.wearers import StudyWearer, align_points, draw_wearer
 from handcal.register.benefit import depth_error_m
 from handcal.register.placement import PlacementSettings
-from handcal.register.prior import LearnedPrior, Observed, learn_prior
+from handcal.register.prior import LearnedPrior, Observed, fit_wearers, learn_prior
 from handcal.register.sitting import LearnedSitting, SittingSettings, sitting_prior
-from handcal.register.wearers import fit_wearers
 from handcal.rig.example import example_rig
 from handcal.sim.people import VARIANTS, Variant, begin_sitting
 from handcal.sim.raster import D415

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 
 from handcal.core.errors import FileError
 from handcal.io.files import make_folder, read_json, write_atomic, write_json
-from handcal.report.rows import rows_csv
+from handcal.report.cells import rows_csv
 
 StudyRow: TypeAlias = dict[str, float | int | str | bool | None]
 """One row of a study's table; None for an empty cell."""

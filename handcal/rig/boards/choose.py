@@ -15,6 +15,8 @@ from handcal.rig.boards.views import moved
 
 _NEAR_SHARE, _FAR_SHARE = 1 / 2, 1 / 3
 _TILTED_RAD = np.radians(20.0)
+# Width of the squares' edges.
+_MOST_BLUR_PX = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +31,6 @@ class ChooseSettings:
     is a still image."""
     apart_share: float = 0.06
     """Minimum difference from every view kept before; 0 keeps similar views as well."""
-    most_blur_px: float = 4.0
-    """Width of the squares' edges."""
 
 
 ALIKE = ChooseSettings(most=5, apart_share=0.0)
@@ -77,7 +77,7 @@ class ViewSelector:
         rest_share = settings.rest_share
         if rest_share is not None and (before is None or _moved_share(before, first) > rest_share):
             return "the board moves: hold it still for a moment"
-        if max(one.blur_px for one in found) > settings.most_blur_px:
+        if max(one.blur_px for one in found) > _MOST_BLUR_PX:
             return "the image is blurred: hold the board still, and see to focus and light"
         if any(_moved_share(one, first) < settings.apart_share for one in self._kept):
             return "the board was seen like this before: tilt it, or move it elsewhere"

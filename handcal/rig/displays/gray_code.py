@@ -20,8 +20,8 @@ from handcal.core.geometry import camera_matrix
 from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.io.images import image_named, read_image
 from handcal.rig.boards.board import BoardError
-from handcal.rig.displays.display import undistort
 from handcal.rig.displays.grid import GridView
+from handcal.rig.displays.homography import undistort
 
 STRIPE_PX = 8
 """Width of the narrowest stripe, in pixels of the display."""

@@ -11,7 +11,7 @@ from handcal.core.frozen import freeze
 from handcal.core.types import Float64, UInt8
 from handcal.rig.boards.board import Board, BoardView, charuco
 from handcal.rig.boards.finder import find_board
-from handcal.rig.check import MAX_DEVICE_SIDE_PX
+from handcal.rig.plausible import MAX_DEVICE_SIDE_PX
 
 # Boards are described in metres, grids in pixels: any constant scale works.
 _BOARD_M = 1e-4

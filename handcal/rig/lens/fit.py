@@ -1,8 +1,10 @@
-"""Residuals and covariances of least-squares fits."""
+"""Residuals and covariances of least-squares fits, and the verdict on what was fitted."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,3 +81,14 @@ def clustered_covariance(J: Float64, residuals: Float64, group: NDArray[np.integ
         moves[number] = np.linalg.pinv(rest, hermitian=True) @ (J[inside].T @ residuals[inside])
     covariance: Float64 = moves.T @ moves * (count - 1) / count
     return 0.5 * (covariance + covariance.T)
+
+
+CalibrationVerdictName: TypeAlias = Literal["good", "needs more views", "bad"]
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationVerdict:
+    """A verdict on a part of the offline calibration, with its reason; a bad part is not used."""
+
+    name: CalibrationVerdictName
+    reason: str

@@ -129,8 +129,6 @@ def pixels_of(points_m: Float64, pose: Float64, camera: Camera) -> Float64:
 def derivatives_at(points_m: Float64, camera: Camera) -> tuple[Float64, Float64, Float64]:
     """Return pixels of points in the camera's frame, and their derivatives.
 
-    Up to eight coefficients it takes a fraction of the time of `predict`; otherwise it is that.
-
     Returns
     -------
     pixels : (N, 2) float64
@@ -138,46 +136,8 @@ def derivatives_at(points_m: Float64, camera: Camera) -> tuple[Float64, Float64,
     by_parameters : (2 N, parameters) float64
         In the order of `parameters`.
     """
-    count = len(camera.distortion)
-    if isinstance(camera, FisheyeIntrinsics) or count > 8:
-        pixels, by = predict(points_m, np.zeros(6), camera)
-        return pixels, by[:, 3:6], by[:, 6:]
-    k1, k2, p1, p2, k3, k4, k5, k6 = [*camera.distortion, *[0.0] * (8 - count)]
-    depth_m = points_m[:, 2]
-    x, y = points_m[:, 0] / depth_m, points_m[:, 1] / depth_m
-    xx, yy, xy = x * x, y * y, x * y
-    r2 = xx + yy
-    r4, r6 = r2 * r2, r2 * r2 * r2
-    below = 1.0 / (1.0 + k4 * r2 + k5 * r4 + k6 * r6)
-    radial = (1.0 + k1 * r2 + k2 * r4 + k3 * r6) * below
-    by_r2 = (k1 + 2.0 * k2 * r2 + 3.0 * k3 * r4) * below
-    by_r2 -= radial * below * (k4 + 2.0 * k5 * r2 + 3.0 * k6 * r4)
-    bent_x, bent_y = r2 + 2.0 * xx, r2 + 2.0 * yy
-    seen_x = x * radial + 2.0 * p1 * xy + p2 * bent_x
-    seen_y = y * radial + p1 * bent_y + 2.0 * p2 * xy
-    # Derivatives of the distorted place by the undistorted one; the mixed ones are equal.
-    xx_by = camera.fx * (radial + 2.0 * xx * by_r2 + 2.0 * p1 * y + 6.0 * p2 * x)
-    yy_by = camera.fy * (radial + 2.0 * yy * by_r2 + 6.0 * p1 * y + 2.0 * p2 * x)
-    mixed = 2.0 * (xy * by_r2 + p1 * x + p2 * y)
-    by_point = np.empty((len(x), 2, 3))
-    for row, by_x, by_y in ((0, xx_by, camera.fx * mixed), (1, camera.fy * mixed, yy_by)):
-        by_point[:, row, 0] = by_x / depth_m
-        by_point[:, row, 1] = by_y / depth_m
-        by_point[:, row, 2] = -(by_x * x + by_y * y) / depth_m
-    by_parameters = np.zeros((len(x), 2, 4 + count))
-    for row, focal, along, seen, tangential in (
-        (0, camera.fx, x, seen_x, (2.0 * xy, bent_x)),
-        (1, camera.fy, y, seen_y, (bent_y, 2.0 * xy)),
-    ):
-        by_parameters[:, row, row] = seen
-        by_parameters[:, row, 2 + row] = 1.0
-        above = focal * along * below
-        radially = (above * r2, above * r4, focal * tangential[0], focal * tangential[1])
-        beyond = (above * r6, *(-radial * above * power for power in (r2, r4, r6)))
-        for number, column in enumerate((*radially, *beyond)[:count]):
-            by_parameters[:, row, 4 + number] = column
-    pixels = np.column_stack([camera.fx * seen_x + camera.cx, camera.fy * seen_y + camera.cy])
-    return pixels, by_point.reshape(-1, 3), by_parameters.reshape(-1, 4 + count)
+    pixels, by = predict(points_m, np.zeros(6), camera)
+    return pixels, by[:, 3:6], by[:, 6:]
 
 
 def camera_matrix_of(camera: Camera) -> Float64:

@@ -17,9 +17,18 @@ from scipy.special import chdtri
 from handcal.core.types import Float64
 from handcal.rig.boards.board import BoardView, square_m
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.lens.bundle import Adjusted, adjust, kept_by_all, kept_only
+from handcal.rig.lens.bundle import (
+    Adjusted,
+    Problem,
+    Setup,
+    Sighting,
+    adjust,
+    as_transform,
+    as_vector,
+    kept_by_all,
+    kept_only,
+)
 from handcal.rig.lens.lens import Camera, LensModel, first_pose
-from handcal.rig.lens.reprojection import Problem, Setup, Sighting, as_transform, as_vector
 
 # Priors of boards in labs, one standard deviation: the height of a bend or a twist as a share of
 # the board's width, the stretch in one direction, the shear, and a corner in squares.

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from handcal.core.frozen import freeze
 from handcal.core.geometry import rigid
 from handcal.core.types import Float64
-from handcal.rig.lens.bundle import foreseen
+from handcal.rig.lens.bundle import Setup, foreseen
 from handcal.rig.lens.lens import Camera, LensModel, pixels_of, predict, to_plane
-from handcal.rig.lens.reprojection import Setup
 
 GRID = (12, 9)
 """Columns and rows of places in the image at which the uncertainty is known."""

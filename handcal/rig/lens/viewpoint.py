@@ -15,10 +15,9 @@ from handcal.core.geometry import camera_matrix, image_points, invert, rigid, tr
 from handcal.core.types import Float64, Intrinsics
 from handcal.rig.boards.board import BoardView, square_m
 from handcal.rig.boards.views import BoardImage, ViewsError, require_size, used
-from handcal.rig.lens.fit import clustered_covariance, rms
+from handcal.rig.lens.fit import CalibrationVerdict, clustered_covariance, rms
 from handcal.rig.lens.shape import BoardShape, boards_seen
 from handcal.rig.lens.stereo import StereoCalibration
-from handcal.rig.verdict import CalibrationVerdict
 
 MIN_TRACKED_VIEWS = 3
 _GOOD_PX, _BAD_PX = 1.5, 5.0

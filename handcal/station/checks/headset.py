@@ -24,7 +24,7 @@ from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
 from handcal.link.statistics import LinkStatistics
 from handcal.link.wire import VERSION, Rejection
-from handcal.rig.check import check_headset
+from handcal.rig.plausible import check_headset
 
 _LEAST_RATE_HZ = 55.0
 _MOST_LOST = 0.1

@@ -29,9 +29,16 @@ from handcal.core.progress import Progress
 from handcal.core.types import EYES, Float64, Frame, UInt8
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
-from handcal.rig.cube.cube import Cube, CubeError, cube_pose, find_cube
-from handcal.rig.cube.cube_file import read_cube
-from handcal.rig.cube.track import CubeFilter, TrackedCube, cube_corners_m
+from handcal.rig.cube import (
+    Cube,
+    CubeError,
+    CubeFilter,
+    TrackedCube,
+    cube_corners_m,
+    cube_pose,
+    find_cube,
+    read_cube,
+)
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig
 from handcal.sim.cube_bench import simulated_wearer

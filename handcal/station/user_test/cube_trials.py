@@ -25,9 +25,7 @@ from handcal.core.types import EYES, Eye, Float64, Rig
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
 from handcal.register.results import read_rendered_shift_m
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.cube_file import read_cube
-from handcal.rig.cube.track import TrackedCube, facing_corners_m
+from handcal.rig.cube import Cube, TrackedCube, facing_corners_m, read_cube
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import Trial, make_trial
 from handcal.sim.cube_bench import simulated_wearer

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QToolButton, QWidget
 from handcal.calibration.hands import PlacedHand
 from handcal.core.geometry import invert, transform
 from handcal.core.types import Alignment, Float64, UInt8
-from handcal.register.pairs import matched_pairs
+from handcal.register.guard import matched_pairs
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
 from handcal_gui.app.preferences import HIDDEN_LAYERS

@@ -8,12 +8,12 @@ from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.core.types import Float64, UInt8
-from handcal.register.verdict import VerdictSettings
+from handcal.register.verdict import RMS_MAX_M
 from handcal_gui.app.theme import SPACING_PX, is_dark
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.parts.splat import rgb
 
-LARGEST_MM = 1e3 * VerdictSettings().rms_max_m
+LARGEST_MM = 1e3 * RMS_MAX_M
 """End of the colour scale: the RMS that the verdict rejects. Fixed, so that views compare."""
 _VIRIDIS = (
     *("#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b"),

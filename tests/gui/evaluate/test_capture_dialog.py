@@ -19,8 +19,7 @@ from pytestqt.qtbot import QtBot
 from handcal.core.errors import CameraError
 from handcal.core.geometry import rigid
 from handcal.core.types import Intrinsics, UInt8
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.cube_file import write_cube
+from handcal.rig.cube import Cube, write_cube
 from handcal.rig.displays.grid import Grid, draw_grid
 from handcal.rig.example import example_rig
 from handcal.rig.formats import write_intrinsics

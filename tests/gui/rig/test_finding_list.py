@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.boards.views import WorstView
-from handcal.rig.report import RigFinding
-from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.findings import RigFinding
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal_gui.rig.finding_list import FindingList
 from handcal_gui.rig.solve import SolvedPart
 from handcal_gui.rig.solve_box import SolveBox

@@ -22,8 +22,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.boards.views import WorstView
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.uncertainty import ProjectionUncertainty
-from handcal.rig.verdict import CalibrationVerdict
 from handcal_gui.app.theme import use_theme
 from handcal_gui.rig.coverage_map import CoverageMap
 from handcal_gui.rig.images_panel import ImagesPanel

@@ -18,14 +18,19 @@ from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, rigid
 from handcal.io.files import write_json
 from handcal.rig.assemble import screen_of
-from handcal.rig.boards.tracked_file import read_tracked, write_tracked
 from handcal.rig.boards.views import ViewsError, WorstView
 from handcal.rig.displays.grid import grid_on
 from handcal.rig.example import example_rig
-from handcal.rig.formats import read_intrinsics, stereo_json, write_intrinsics
+from handcal.rig.formats import (
+    read_intrinsics,
+    read_tracked,
+    stereo_json,
+    write_intrinsics,
+    write_tracked,
+)
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.stereo import StereoCalibration
 from handcal.rig.rig_file import read_rig, write_rig
-from handcal.rig.verdict import CalibrationVerdict
 from handcal.sim.photographs import BOARD
 from handcal_gui.rig.project_folder import DisplayEntries
 from handcal_gui.rig.shots import Shot, look

@@ -23,7 +23,7 @@ from handcal.lab.evaluate.cube_folder import (
     images_in,
     missing_captures,
 )
-from handcal.rig.cube.cube import Cube, CubeError
+from handcal.rig.cube import Cube, CubeError
 from handcal.rig.displays.grid import Grid, draw_grid
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter

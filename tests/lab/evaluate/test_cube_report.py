@@ -7,8 +7,8 @@ from handcal.lab.evaluate.cube_report import cube_report
 from handcal.lab.evaluate.cube_summary import cube_summary
 from handcal.lab.evaluate.cube_test import CubeTest, cube_row
 from handcal.report.document import Table
-from handcal.report.figures import draw_figure
-from handcal.rig.cube.cube import Cube
+from handcal.report.html import draw_figure
+from handcal.rig.cube import Cube
 
 CAMERA = Intrinsics(640, 360, 900.0, 900.0, 320.0, 180.0)
 

@@ -17,9 +17,9 @@ from handcal.io.files import make_folder
 from handcal.io.images import write_png
 from handcal.lab.evaluate.cube import CubeMisalignment
 from handcal.lab.evaluate.cube_test import cube_row, display_warp, judge_captures
-from handcal.rig.cube.cube import Cube, find_cube, marker_corners_m
+from handcal.rig.cube import Cube, find_cube, marker_corners_m
 from handcal.rig.displays.grid import Grid, draw_grid
-from handcal.rig.displays.warp import RotationWarp
+from handcal.rig.displays.homography import RotationWarp
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.cube import CubePainter

@@ -15,8 +15,7 @@ from handcal.io.images import write_png
 from handcal.lab.evaluate.run import run_cube_test, run_user_test
 from handcal.lab.settings import CubeTestSettings, NoiseStudySettings, UserTestSettings
 from handcal.lab.study.studies import run_noise_study
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.cube_file import write_cube
+from handcal.rig.cube import Cube, write_cube
 from handcal.rig.example import example_rig
 from handcal.rig.formats import write_intrinsics
 from handcal.session.session import Session

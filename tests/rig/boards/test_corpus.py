@@ -14,12 +14,9 @@ from scipy.spatial.transform import Rotation
 from handcal.core.geometry import rigid
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import BoardImage, ViewsError, image_files, pair_views, read_views
-from handcal.rig.lens.camera import CameraSettings, calibrate_camera
+from handcal.rig.lens.camera import calibrate_camera
 from handcal.rig.lens.lens import FisheyeIntrinsics
-from handcal.rig.lens.stereo import StereoSettings, calibrate_stereo
-
-AUTO = StereoSettings(camera=CameraSettings(lens="auto"))
-FULL = StereoSettings(camera=CameraSettings(lens="full"))
+from handcal.rig.lens.stereo import calibrate_stereo
 
 
 @pytest.mark.campaign
@@ -36,7 +33,7 @@ def test_a_wide_lens_has_the_published_pose(shared_data: Path) -> None:
         read_views(sorted(folder.glob(f"{side}_*.png")), board) for side in ("left", "right")
     )
     assert all(view.found for view in (*left, *right))
-    result = calibrate_stereo(pair_views(left, right), settings=AUTO)
+    result = calibrate_stereo(pair_views(left, right), lens="auto")
     published = json.loads((folder / "authors_results.json").read_text())
     truth = rigid(np.array(published["rot"]), np.array(published["trans"]).ravel())
     turn = Rotation.from_matrix(truth[:3, :3].T @ result.T_H_D[:3, :3]).magnitude()
@@ -55,7 +52,7 @@ def test_a_fisheye_is_recognised(shared_data: Path) -> None:
     left, right = (
         read_views(sorted(folder.glob(f"{side}*.jpg")), board) for side in ("left", "right")
     )
-    result = calibrate_stereo(pair_views(left, right), settings=AUTO)
+    result = calibrate_stereo(pair_views(left, right), lens="auto")
     assert isinstance(result.depth, FisheyeIntrinsics)
     assert isinstance(result.headset, FisheyeIntrinsics)
     # OpenCV's fisheye over 26 pairs: 0.59 px, (-111.0, -0.5, 4.3) mm.
@@ -108,7 +105,7 @@ def test_real_pairs_that_do_not_belong_together_are_refused(
     sample_pairs: Pairs, order: list[int], reason: str
 ) -> None:
     """The intrinsics are solved with them: contradictions once bent these, and were not named."""
-    result = calibrate_stereo(with_right(sample_pairs, order), settings=FULL)
+    result = calibrate_stereo(with_right(sample_pairs, order))
     assert result.verdict.name == "bad"
     assert re.search(reason, result.verdict.reason), result.verdict.reason
     assert "(to 0." in result.verdict.reason or "sound" not in result.verdict.reason
@@ -125,31 +122,31 @@ def test_a_real_board_that_hardly_moved_is_refused(sample_pairs: Pairs) -> None:
     left, right = sample_pairs[3]
     alike = [(again(left, number), again(right, number)) for number in range(10)]
     with pytest.raises(ViewsError, match="the board hardly moved"):
-        calibrate_stereo(alike, settings=FULL)
+        calibrate_stereo(alike)
 
 
 def test_the_same_real_images_for_both_cameras_are_refused(sample_pairs: Pairs) -> None:
     with pytest.raises(ViewsError, match="both cameras' images are the same"):
-        calibrate_stereo([(left, left) for left, _ in sample_pairs], settings=FULL)
+        calibrate_stereo([(left, left) for left, _ in sample_pairs])
 
 
 def test_opencvs_sample_is_solved_as_well_as_by_opencv_with_the_same_lens(
     sample_pairs: Pairs,
 ) -> None:
-    assert calibrate_stereo(sample_pairs, settings=FULL).rms_px < 1.002 * 0.194
+    assert calibrate_stereo(sample_pairs).rms_px < 1.002 * 0.194
 
 
 def test_opencvs_sample_is_solved_as_well_with_the_lens_chosen_by_held_out_error(
     sample_pairs: Pairs,
 ) -> None:
-    assert calibrate_stereo(sample_pairs, settings=AUTO).rms_px < 1.02 * 0.194
+    assert calibrate_stereo(sample_pairs, lens="auto").rms_px < 1.02 * 0.194
 
 
 def test_the_lens_of_opencvs_sample_is_a_pinhole(shared_data: Path) -> None:
     folder = shared_data / "boards" / "opencv_stereo"
     board = Board(kind="checkerboard", squares=(10, 7))
     views = read_views(sorted(folder.glob("left*.jpg")), board)
-    result = calibrate_camera(views, CameraSettings(lens="auto"))
+    result = calibrate_camera(views, "auto")
     storage = cv2.FileStorage(str(folder / "left_intrinsics.yml"), cv2.FILE_STORAGE_READ)
     published = storage.getNode("camera_matrix").mat()
     assert abs(result.pinhole.fx / published[0, 0] - 1) < 0.01

@@ -12,13 +12,13 @@ from handcal.core.geometry import camera_matrix, rigid
 from handcal.core.types import UInt8
 from handcal.io.images import write_png
 from handcal.rig.boards.board import BoardError
-from handcal.rig.displays.display import fit_homography
 from handcal.rig.displays.gray_code import (
     decode_gray_code,
     flatness_arcmin,
     gray_patterns,
     read_gray_code,
 )
+from handcal.rig.displays.homography import fit_homography
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings
 from handcal.sim.photographs import VIEWPOINT_CAMERA

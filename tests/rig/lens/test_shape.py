@@ -11,8 +11,7 @@ from handcal.core.geometry import image_points, rigid, transform
 from handcal.core.types import Float64, Intrinsics
 from handcal.rig.boards.board import Board, BoardView, corners_m
 from handcal.rig.boards.views import BoardImage, image_files, read_views
-from handcal.rig.lens.camera import CameraCalibration, CameraSettings, calibrate_camera
-from handcal.rig.lens.lens_fit import fit_lens
+from handcal.rig.lens.camera import CameraCalibration, calibrate_camera, fit_lens
 from handcal.rig.lens.shape import boards_seen
 from handcal.rig.lens.stereo import calibrate_stereo
 from handcal.sim.boards import board_poses
@@ -145,7 +144,7 @@ def test_images_of_boards_as_in_the_field(shared_data: Path, name: str, words: s
         pytest.skip(f"{folder} is absent")
     board = Board(kind="checkerboard", squares=(11, 8), square_m=0.02)
     views = read_views(image_files([folder]), board)
-    result = calibrate_camera(views, CameraSettings(lens="auto"))
+    result = calibrate_camera(views, "auto")
     true = Intrinsics(640, 400, 450.0, 450.0, 322.5, 197.5)
     assert off_sigmas(result, true).max() < 3.0
     assert result.sigma[:2].max() < 0.1

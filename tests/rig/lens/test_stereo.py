@@ -128,12 +128,6 @@ def test_swapped_cameras_are_named() -> None:
         calibrate_stereo(swapped, DEPTH, alike)
 
 
-def test_intrinsics_of_another_resolution_are_named() -> None:
-    other = dataclasses.replace(DEPTH, width=1280)
-    with pytest.raises(ViewsError, match="are for 1280x480 pixels, its images have 640x480"):
-        calibrate_stereo(_pairs(), other, HEADSET)
-
-
 @pytest.mark.parametrize("given", [True, False])
 @pytest.mark.parametrize("which", [0, 1])
 def test_one_mirrored_camera_is_named(which: int, given: bool) -> None:

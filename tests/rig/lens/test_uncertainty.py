@@ -5,7 +5,7 @@ from handcal.core.geometry import image_points, rigid
 from handcal.core.types import Float64, Intrinsics
 from handcal.rig.boards.board import Board, corners_m
 from handcal.rig.boards.views import BoardImage
-from handcal.rig.lens.bundle import foreseen
+from handcal.rig.lens.bundle import Setup, as_transform, as_vector, foreseen
 from handcal.rig.lens.camera import CameraCalibration, calibrate_camera
 from handcal.rig.lens.lens import (
     parameters,
@@ -14,7 +14,6 @@ from handcal.rig.lens.lens import (
     to_plane,
     with_parameters,
 )
-from handcal.rig.lens.reprojection import Setup, as_transform, as_vector
 from handcal.rig.lens.uncertainty import candidate_views, next_view
 from handcal.sim.boards import board_poses, board_view
 

@@ -17,7 +17,7 @@ from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.rig.displays.display_check import Probe
 from handcal.rig.example import example_rig
-from handcal.rig.report import display_finding, report_rig
+from handcal.rig.findings import display_finding, report_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.sim.display import DISPLAY_MODES, DisplayMode, SimulatedDisplay
 from handcal.station.checks.display_check import (

@@ -14,8 +14,7 @@ from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
 from handcal.register.results import SolveSettings, solve_session
-from handcal.rig.cube.cube import Cube
-from handcal.rig.cube.track import TrackedCube, cube_corners_m
+from handcal.rig.cube import Cube, TrackedCube, cube_corners_m
 from handcal.session.session import Session
 from handcal.sim.cube_bench import CubeBench, simulated_wearer
 from handcal.sim.hand import make_hand

@@ -10,20 +10,21 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import image_points, invert, project, rigid
-from handcal.core.types import EyeDisplay, Float64
+from handcal.core.types import EyeDisplay, Float64, Intrinsics
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.displays.display import (
+from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
+from handcal.rig.displays.homography import (
     DisplayCalibration,
     DisplaySettings,
+    RotationWarp,
     Screen,
     calibrate_display,
     fit_homography,
     pixel_size_m,
 )
-from handcal.rig.displays.grid import Grid, GridView, draw_grid, find_grid
 from handcal.rig.example import FOCAL_PX, Z_E_S_M, example_rig
+from handcal.rig.lens.fit import CalibrationVerdict
 from handcal.rig.lens.viewpoint import ViewpointPose
-from handcal.rig.verdict import CalibrationVerdict
 from handcal.sim.boards import PictureSettings
 from handcal.sim.viewpoint import VIEWPOINT_CAMERA as CAMERA
 from handcal.sim.viewpoint import photograph_display
@@ -109,10 +110,10 @@ def test_the_homography_knows_how_well_it_is_known() -> None:
 
 
 def test_the_distance_is_as_measured_with_its_uncertainty() -> None:
-    settings = DisplaySettings(distance_m=1.95, distance_sigma=0.02)
+    settings = DisplaySettings(distance_m=1.95)
     found = calibrate(DISPLAY, R_E_C, settings, noise_px=0.1)
     assert found.display.z_C0_S_m == 1.95
-    assert np.sqrt(found.covariance[3, 3]) == pytest.approx(0.039)
+    assert np.sqrt(found.covariance[3, 3]) == pytest.approx(0.0195)
     variances = np.diag(found.covariance)[:3]
     np.testing.assert_allclose(np.sort(variances), [1e-9, 4e-9, 9e-9], rtol=1e-3)
 
@@ -197,3 +198,26 @@ def test_a_rendered_display_is_found_to_a_tenth_of_a_pixel() -> None:
     corners = np.array([[0.0, 0.0, 1.0], [SIZE[0] - 1.0, SIZE[1] - 1.0, 1.0]])
     back = corners @ (np.linalg.inv(truth.H_C_S) @ homography.H_C_S).T
     np.testing.assert_allclose(back[:, :2] / back[:, 2:], corners[:, :2], atol=0.1)
+
+
+WARPED = Intrinsics(320, 240, 300.0, 302.0, 158.0, 121.0, (-0.1, 0.02, 0.001, -0.001, 0.0))
+R_S_WARPED = rigid([0.03, -0.04, 0.08])[:3, :3]
+DIRECTIONS = np.array([[0.1, 0.05, 1.0], [-0.2, -0.1, 1.0], [0.0, 0.2, 1.0]])
+
+
+def test_a_frame_is_undistorted_and_turned() -> None:
+    warp = RotationWarp(WARPED, R_S_WARPED)
+    y, x = np.indices((240, 320))
+    straight = replace(WARPED, distortion=())
+    for direction in DIRECTIONS:
+        u, v = image_points(direction[None], WARPED)[0]
+        spot = 200.0 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / 18.0)
+        warped = warp.warp(spot.astype(np.uint8)).astype(float)
+        found = [float((axis * warped).sum() / warped.sum()) for axis in (x, y)]
+        expected = image_points((R_S_WARPED @ direction)[None], straight)[0]
+        np.testing.assert_allclose(found, expected, atol=0.2)
+
+
+def test_a_frame_of_another_size_is_refused() -> None:
+    with pytest.raises(ValueError, match="100×50, the camera 320×240"):
+        RotationWarp(WARPED, R_S_WARPED).warp(np.zeros((50, 100, 3), np.uint8))

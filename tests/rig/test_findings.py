@@ -17,7 +17,7 @@ from handcal.core.types import (
     Rig,
 )
 from handcal.rig.example import example_rig
-from handcal.rig.report import RigFinding, display_finding, report_rig
+from handcal.rig.findings import RigFinding, display_finding, report_rig
 
 RIG = example_rig()
 

@@ -7,7 +7,7 @@ import pytest
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.geometry import invert, rigid
 from handcal.core.types import EYES, Eye, Float64, Rig
-from handcal.rig.acceptance.accept import (
+from handcal.rig.acceptance import (
     CameraMove,
     EyeAcceptance,
     accept_eye,
@@ -16,7 +16,7 @@ from handcal.rig.acceptance.accept import (
     problem,
 )
 from handcal.rig.boards.views import ViewsError
-from handcal.rig.displays.display import DisplayHomography
+from handcal.rig.displays.homography import DisplayHomography
 from handcal.rig.example import example_rig
 from handcal.rig.lens.viewpoint import TrackedView
 from handcal.sim.boards import board_poses, board_view

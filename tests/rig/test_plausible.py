@@ -6,8 +6,8 @@ import pytest
 
 from handcal.core.geometry import rigid
 from handcal.core.types import Float64, HeadsetIdentity, HeadsetView, Rig
-from handcal.rig.check import check_rig
 from handcal.rig.example import example_rig
+from handcal.rig.plausible import check_rig
 
 LEFT = example_rig().eyes["left"]
 

@@ -1,20 +1,29 @@
-"""A cube with an ArUco marker on every face: its description and its detection in an image."""
+"""A cube with an ArUco marker on every face: description, file, detection, tracking, net to print.
+
+As a file it is JSON with ``handcal_cube`` 1 and the fields of `Cube`.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from types import MappingProxyType
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from handcal.core.errors import HandcalError
-from handcal.core.geometry import camera_matrix, image_points, rigid, transform
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.frozen import freeze
+from handcal.core.geometry import camera_matrix, image_points, interpolate_pose, rigid, transform
 from handcal.core.types import Float32, Float64, Intrinsics, UInt8
+from handcal.io.files import read_json, write_json
+from handcal.io.settings import read_settings
 from handcal.rig.boards.board import DICTIONARIES
-from handcal.rig.boards.diagnosis import light_trouble
-from handcal.rig.boards.finder import shades_at
+from handcal.rig.boards.finder import light_trouble, shades_at
+from handcal.rig.boards.printing import Paper, marker_cells_m, write_page
 from handcal.rig.lens.fit import rms
 
 FACES = ("front", "right", "back", "left", "top", "bottom")
@@ -213,3 +222,185 @@ def _line(gray: Float32, corners_px: Float64, cells: int) -> Float64:
     middle = points.mean(axis=0)
     normal = np.linalg.svd(points - middle)[2][1]
     return np.array([*normal, -normal @ middle])
+
+
+CUBE_VERSION = 1
+
+
+def read_cube(path: Path) -> Cube:
+    """Read a cube's description.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read, is not a cube description, or a field is unknown or wrong.
+    """
+    values = read_json(path)
+    if values.pop("handcal_cube", None) != CUBE_VERSION:
+        raise FileError(f"{path}: handcal_cube must be {CUBE_VERSION}, the version known")
+    return read_settings(Cube, values, str(path))
+
+
+def write_cube(path: Path, cube: Cube) -> None:
+    """Write a cube's description, atomically; FileError if it cannot be written."""
+    write_json(path, {"handcal_cube": CUBE_VERSION, **asdict(cube)})
+
+
+# Column and row of each face in the net.
+_PLACES = {
+    "left": (0, 1),
+    "front": (1, 1),
+    "right": (2, 1),
+    "back": (3, 1),
+    "top": (1, 0),
+    "bottom": (1, 2),
+}
+_LINE_M, _MARK_SHARE = 0.0002, 0.15
+_TAB_M = 0.008
+
+
+def write_cube_pdf(path: Path, cube: Cube, paper: Paper = "a4") -> None:
+    """Write the cube's net as a PDF page at its true size, with marks for cutting and folding.
+
+    Raises
+    ------
+    ValueError
+        If the net does not fit on the paper.
+    FileError
+        If `path` does not end in ``.pdf``, or cannot be written.
+    """
+    size_m = np.array([4.0, 3.0]) * cube.side_m + [_TAB_M, 0.0]
+    caption = (
+        f"cube {1e3 * cube.side_m:g} mm, marker {1e3 * cube.marker_m:g} mm, {cube.dictionary}, "
+        f"{', '.join(f'{face} {marker}' for face, marker in zip(FACES, cube.ids, strict=True))}"
+    )
+    write_page(path, size_m, net_rectangles_m(cube), caption, paper)
+
+
+def net_rectangles_m(cube: Cube) -> Float64:
+    """Return the black rectangles of the net: (N, 4) left, top, right, bottom."""
+    margin_m = 0.5 * (cube.side_m - cube.marker_m)
+    parts = []
+    for face, marker in zip(FACES, cube.ids, strict=True):
+        corner_m = cube.side_m * np.array(_PLACES[face])
+        parts.append(_outline(corner_m, corner_m + cube.side_m))
+        parts.append(
+            marker_cells_m(cube.marker_dictionary, marker, corner_m + margin_m, cube.marker_m)
+        )
+    parts += [_outline(*corners) for corners in _tabs(cube.side_m)]
+    return np.vstack(parts)
+
+
+def _tabs(side_m: float) -> list[Float64]:
+    """Return the tabs to glue, (2, 2) each: above, below and beside the middle row."""
+    tabs = [
+        [[column * side_m, y], [(column + 1) * side_m, y + _TAB_M]]
+        for column in (0, 2, 3)
+        for y in (side_m - _TAB_M, 2 * side_m)
+    ]
+    tabs.append([[4 * side_m, side_m], [4 * side_m + _TAB_M, 2 * side_m]])
+    return [np.array(tab) for tab in tabs]
+
+
+def _outline(first_m: Float64, last_m: Float64) -> Float64:
+    """Return the ends of four thin lines just within a rectangle.
+
+    Complete lines around a marker would form a square that OpenCV may mistake for the marker.
+    """
+    (left, top), (right, bottom) = first_m, last_m
+    across, down = (_MARK_SHARE * (last_m - first_m)).tolist()
+    return np.array(
+        [
+            [x, y, x + length, y + height]
+            for length, height in ((across, _LINE_M), (_LINE_M, down))
+            for x in (left, right - length)
+            for y in (top, bottom - height)
+        ]
+    )
+
+
+_CORNERS = 0.5 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+_SMOOTHING_S = 0.3
+"""Time constant while the cube moves slowly, and at most that many seconds at rest."""
+_JUMP_M, _JUMP_RAD = 0.01, 0.07
+"""A measured pose this far from the filtered one starts the filter again."""
+_REST_NS = 600_000_000
+"""The cube is at rest if its measured poses stayed together for this time."""
+_REST_M, _REST_RAD = 0.004, 0.03
+"""Largest distance of a measured pose from the filtered one at rest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedCube:
+    """The filtered pose of the cube at the time of one frame."""
+
+    t_ns: int
+    """On the camera's clock, whose intervals do not change while its latency is estimated."""
+    T_W_T: Float64
+    """(4, 4); from the cube's frame to the world."""
+    is_at_rest: bool
+    frames: int
+    """Number of frames since the filter started."""
+
+    def __post_init__(self) -> None:
+        freeze(self, "T_W_T", np.float64, 4, 4)
+
+
+class CubeFilter:
+    """An exponential filter of poses that starts again when the cube has been moved.
+
+    The n-th pose after a start has the weight 1/n, or that of the time constant if it is larger: a
+    mean first, which then forgets.
+    """
+
+    def __init__(self) -> None:
+        self._newest: TrackedCube | None = None
+        self._recent: deque[tuple[int, Float64]] = deque()
+
+    def take(self, T_W_T: Float64, t_ns: int) -> TrackedCube:
+        """Return the filtered pose after a measured one, (4, 4); the time is the camera's."""
+        before = self._newest
+        if (
+            before is None
+            or t_ns < before.t_ns  # the camera has started again
+            or not _near(T_W_T, before.T_W_T, _JUMP_M, _JUMP_RAD)
+        ):
+            self._recent.clear()
+            filtered = TrackedCube(t_ns, T_W_T, False, 1)
+        else:
+            passed_s = 1e-9 * (t_ns - before.t_ns)
+            weight = max(1.0 / (before.frames + 1), 1.0 - float(np.exp(-passed_s / _SMOOTHING_S)))
+            pose = interpolate_pose(before.T_W_T, T_W_T, min(weight, 1.0))
+            filtered = TrackedCube(t_ns, pose, False, before.frames + 1)
+        self._recent.append((t_ns, T_W_T))
+        while len(self._recent) > 1 and self._recent[1][0] <= t_ns - _REST_NS:
+            self._recent.popleft()
+        is_at_rest = t_ns - self._recent[0][0] >= _REST_NS and all(
+            _near(T, filtered.T_W_T, _REST_M, _REST_RAD) for _, T in self._recent
+        )
+        self._newest = replace(filtered, is_at_rest=is_at_rest)
+        return self._newest
+
+
+def cube_corners_m(cube: Cube) -> Float64:
+    """Return the cube's vertices, (8, 3) in its frame: the front face, then the back behind it."""
+    around_m, inwards_m = cube.side_m * _CORNERS, np.array([0.0, 0.0, 0.5 * cube.side_m])
+    return np.concatenate([around_m - inwards_m, around_m + inwards_m])
+
+
+def facing_corners_m(cube: Cube, T_E_T: Float64) -> Float64:
+    """Return the vertices of the face that faces the origin of E most, (4, 3) in the cube's frame.
+
+    In order around the face, from the upper left of its print.
+    """
+
+    def facing(marker: int) -> float:
+        T_E_face = T_E_T @ face_pose(cube, marker)
+        return float(T_E_face[:3, 2] @ T_E_face[:3, 3] / np.linalg.norm(T_E_face[:3, 3]))
+
+    return transform(face_pose(cube, max(cube.ids, key=facing)), cube.side_m * _CORNERS)
+
+
+def _near(a: Float64, b: Float64, apart_m: float, apart_rad: float) -> bool:
+    turned_rad = Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).magnitude()
+    return bool(np.linalg.norm(a[:3, 3] - b[:3, 3]) <= apart_m and turned_rad <= apart_rad)

@@ -3,6 +3,10 @@
 The display is a plane S in front of the camera, so a homography takes the camera's pixels to the
 display's. Combined with the camera's lens matrix and its pose in the headset it is the off-axis
 projection K H0 from the viewpoint C0 (Hu et al. 2021, homography-corrected off-axis model).
+
+A camera is never exactly parallel to the display, but objects aligned in its image must also be
+aligned on the display. So frames are undistorted and warped by the rotation between the two
+(`RotationWarp`; Hu et al. 2021, assessment with eye-replacement camera).
 """
 
 from __future__ import annotations
@@ -17,14 +21,23 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.frozen import freeze
 from handcal.core.geometry import camera_matrix, invert
-from handcal.core.types import EyeDisplay, Float64, Intrinsics
+from handcal.core.types import EyeDisplay, Float64, Intrinsics, UInt8
 from handcal.rig.boards.views import ViewsError, require_size
-from handcal.rig.check import MAX_DEVICE_SIDE_PX
 from handcal.rig.displays.grid import GridView
-from handcal.rig.lens.fit import clustered_covariance, rms
+from handcal.rig.lens.fit import CalibrationVerdict, clustered_covariance, rms
 from handcal.rig.lens.viewpoint import ViewpointPose, plane_pose
-from handcal.rig.verdict import CalibrationVerdict
+from handcal.rig.plausible import MAX_DEVICE_SIDE_PX
 
+# Relative standard deviation of the display's distance, or of its pixels' size.
+_DISTANCE_SIGMA = 0.01
+# Root mean square reprojection error in the camera: good up to the first, rejected from the second.
+_GOOD_PX, _BAD_PX = 0.5, 2.0
+# Largest standard deviation of the display's corners, px.
+_GOOD_SIGMA_PX = 0.3
+# Limit of the angle between the axes of the display and of V.
+_LARGEST_TURN_RAD = 0.05
+# Limit of the distance from C0 to V: the eye box.
+_LARGEST_OFFSET_M = 0.02
 DISPLAY_PARAMETERS = ("t_C0_V_x_m", "t_C0_V_y_m", "t_C0_V_z_m", "z_C0_S_m")
 """Parameters of `DisplayCalibration.covariance`."""
 
@@ -48,25 +61,13 @@ class Screen:
 
 @dataclass(frozen=True, slots=True)
 class DisplaySettings:
-    """Distance of the display, and limits for accepting a calibration."""
+    """Distance of the display, as measured or by the size of its pixels."""
 
     distance_m: float | None = None
     """z(C0→S) as measured, for example by the focus of the viewpoint camera."""
     pixel_m: float | None = None
     """Size of a display's pixel on S, to solve z(C0→S) from the grid: see `pixel_size_m`. Either
     this or `distance_m`."""
-    distance_sigma: float = 0.01
-    """Relative standard deviation of either."""
-    good_px: float = 0.5
-    bad_px: float = 2.0
-    """Root mean square reprojection error in the camera: good up to the first, rejected from the
-    second."""
-    good_sigma_px: float = 0.3
-    """Largest standard deviation of the display's corners, px."""
-    largest_turn_rad: float = 0.05
-    """Limit of the angle between the axes of the display and of V."""
-    largest_offset_m: float = 0.02
-    """Limit of the distance from C0 to V: the eye box."""
 
     def __post_init__(self) -> None:
         if (self.distance_m is None) == (self.pixel_m is None):
@@ -209,14 +210,14 @@ def calibrate_display(
     covariance = np.zeros((4, 4))
     R_V_H = screen.T_V_H[:3, :3]
     covariance[:3, :3] = R_V_H @ viewpoint.covariance[3:, 3:] @ R_V_H.T
-    covariance[3, 3] = (settings.distance_sigma * z_C0_S_m) ** 2
+    covariance[3, 3] = (_DISTANCE_SIGMA * z_C0_S_m) ** 2
     return DisplayCalibration(
         display=display,
         homography=homography,
         R_S_C=R_S_C,
         turn_rad=turn_rad,
         covariance=0.5 * (covariance + covariance.T),
-        verdict=_judge(display, homography, viewpoint.verdict, turn_rad, settings),
+        verdict=_judge(display, homography, viewpoint.verdict, turn_rad),
     )
 
 
@@ -279,25 +280,24 @@ def _judge(
     homography: DisplayHomography,
     viewpoint: CalibrationVerdict,
     turn_rad: float,
-    settings: DisplaySettings,
 ) -> CalibrationVerdict:
     residuals_px = homography.residuals_px
     worst = max(residuals_px, key=lambda name: residuals_px[name])
     residual = f"residual {homography.rms_px:.2f} px ({worst} {residuals_px[worst]:.2f} px)"
     offset_m = float(np.linalg.norm(display.t_C0_V_m))
-    if homography.rms_px > settings.bad_px:
+    if homography.rms_px > _BAD_PX:
         return CalibrationVerdict(
             "bad",
             f"the grid does not lie on a plane, {residual}: the camera moved between the images, "
             "or its intrinsics are not these",
         )
-    if turn_rad > settings.largest_turn_rad:
+    if turn_rad > _LARGEST_TURN_RAD:
         return CalibrationVerdict(
             "bad",
             f"the display is turned by {np.degrees(turn_rad):.1f}° from the headset's own view: "
             "left and right exchanged, a mirrored image, or poses of another camera place",
         )
-    if offset_m > settings.largest_offset_m:
+    if offset_m > _LARGEST_OFFSET_M:
         return CalibrationVerdict(
             "bad",
             f"the camera was {1e3 * offset_m:.0f} mm from the headset's own viewpoint: left and "
@@ -306,7 +306,7 @@ def _judge(
         )
     if viewpoint.name != "good":
         return viewpoint
-    if homography.rms_px > settings.good_px or homography.sigma_px > settings.good_sigma_px:
+    if homography.rms_px > _GOOD_PX or homography.sigma_px > _GOOD_SIGMA_PX:
         return CalibrationVerdict(
             "needs more views",
             f"the display's corners are known to {homography.sigma_px:.2f} px, {residual}: take "
@@ -315,3 +315,43 @@ def _judge(
     return CalibrationVerdict(
         "good", f"the display's corners are known to {homography.sigma_px:.2f} px; {residual}"
     )
+
+
+class RotationWarp:
+    """Undistorts and rotates frames of one camera; the pixel map is computed once.
+
+    Parameters
+    ----------
+    camera : Intrinsics
+        Intrinsics of the frames; warped frames have the same, without distortion.
+    R_S_C : (3, 3) float64
+        From the camera's axes to the display's.
+    """
+
+    def __init__(self, camera: Intrinsics, R_S_C: Float64) -> None:
+        self._size = camera.height, camera.width
+        K = camera_matrix(camera)
+        self._x, self._y = cv2.initUndistortRectifyMap(
+            K,
+            np.array(camera.distortion),
+            R_S_C,
+            K,
+            (camera.width, camera.height),
+            cv2.CV_16SC2,
+        )
+
+    def warp(self, frame: UInt8) -> UInt8:
+        """Return a frame, (H, W) or (H, W, 3) uint8, as seen along the display's axes.
+
+        Raises
+        ------
+        ValueError
+            If it does not have the camera's size.
+        """
+        if frame.shape[:2] != self._size:
+            height, width = self._size
+            raise ValueError(
+                f"the frame is {frame.shape[1]}×{frame.shape[0]}, the camera {width}×{height}"
+            )
+        warped = cv2.remap(frame, self._x, self._y, cv2.INTER_LINEAR)
+        return warped.astype(np.uint8, copy=False)

@@ -1,1 +1,0 @@
-"""The ArUco cube of the cube test: its description, detection and net to print."""
