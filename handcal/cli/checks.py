@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 )
 def bench(arguments: argparse.Namespace) -> None:
     """Measure accuracy and speed, and compare them with targets and a baseline."""
-    from handcal.lab.bench import PARTS, QUICK, BenchSettings, bench_table, run_bench
+    from handcal.lab.bench.run import PARTS, bench_table, run_bench
+    from handcal.lab.bench.trials import QUICK, BenchSettings
 
     if arguments.only not in ("", *PARTS):
         fail(f"unknown part {arguments.only!r}; choose from {', '.join(PARTS)}", 2)
