@@ -54,9 +54,13 @@ def detector(arguments: argparse.Namespace) -> None:
     from handcal.hand.detect import HandDetector
     from handcal.hand.shipped import load_detector
     from handcal.lab.evaluate.annotations import read_annotations
-    from handcal.lab.evaluate.conditions import Conditions
-    from handcal.lab.evaluate.contact_sheet import write_contact_sheet
-    from handcal.lab.evaluate.detector import EVALUATED, detect_all, evaluation
+    from handcal.lab.evaluate.detector import (
+        EVALUATED,
+        Conditions,
+        detect_all,
+        evaluation,
+        write_contact_sheet,
+    )
 
     images = arguments.images or arguments.folder
     if images is None or (arguments.images and arguments.folder):

@@ -88,15 +88,15 @@ _RIG: Mapping[str, Entry] = {
     ),
     "grid": Entry(
         "Make the grid that a display shows to the viewpoint camera, pixel for pixel.",
-        "rig_displays",
+        "rig_files",
     ),
     "gray": Entry(
         "Make the Gray-code patterns that a display shows one after the other, in place of a grid.",
-        "rig_displays",
+        "rig_files",
     ),
     "display": Entry(
         "Calibrate one eye's display from the viewpoint camera's images of its grid.",
-        "rig_displays",
+        "rig_files",
     ),
     "make": Entry(
         "Write the depth camera's pose, from stereo calibration or the factory, into a rig file.",
@@ -161,9 +161,9 @@ COMMANDS: Mapping[str, Entry] = {
     ),
     "devices": Entry("List the paired headsets; rename or revoke one, by its identity.", "pairing"),
     "record": Entry("Record a camera into a .db3 file or a folder of images.", "cameras"),
-    "replay": Entry("Play a recording and segment the hand in every frame.", "cameras"),
+    "replay": Entry("Play a recording and segment the hand in every frame.", "recordings"),
     "segment": Entry(
-        "Segment the hand in one image pair: cloud, contour, mask and overlay.", "cameras"
+        "Segment the hand in one image pair: cloud, contour, mask and overlay.", "recordings"
     ),
     "solve": Entry("Solve a stored session again; the session itself is not changed.", "sessions"),
     "prior": Entry(

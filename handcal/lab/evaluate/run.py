@@ -16,15 +16,28 @@ from handcal.hand.shipped import make_finder
 from handcal.io.files import make_folder, require_suffix, user_path
 from handcal.io.images import write_png
 from handcal.io.resources import resource_path
-from handcal.lab.evaluate.cube_report import cube_report
-from handcal.lab.evaluate.cube_summary import ErrorSummary, cube_summary
-from handcal.lab.evaluate.cube_test import CubeTest, display_warp, judge_captures
+from handcal.lab.evaluate.cube_test import (
+    CubeTest,
+    ErrorSummary,
+    cube_report,
+    cube_summary,
+    display_warp,
+    judge_captures,
+)
 from handcal.lab.evaluate.masked_frames import read_masked_frames, read_masked_names
-from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
-from handcal.lab.evaluate.segmentation_report import segmentation_report
-from handcal.lab.evaluate.segmentation_sheet import contact_sheet, tile
-from handcal.lab.evaluate.user_test import UserTestResult, evaluate_user_test, read_user_test
-from handcal.lab.evaluate.user_test_report import user_test_report
+from handcal.lab.evaluate.segmentation import (
+    contact_sheet,
+    evaluate_frame,
+    evaluation,
+    segmentation_report,
+    tile,
+)
+from handcal.lab.evaluate.user_test import (
+    UserTestResult,
+    evaluate_user_test,
+    read_user_test,
+    user_test_report,
+)
 from handcal.lab.settings import (
     CubeTestSettings,
     SegmentationTestSettings,
