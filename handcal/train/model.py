@@ -180,6 +180,12 @@ class HandNet(nn.Module):
 assert len(_TAPS) == len(STRIDES)
 
 
+# Insertion of batch normalisation into a trained network that has none, or has it folded in.
+#
+# Without it training destroys the backbone: at the learning rates of the new layers more and more
+# channels become constant at 0 or 6.
+
+
 def fold_in(normalisation: nn.BatchNorm2d, gain: Tensor, bias: Tensor) -> None:
     """Set a layer to multiply by `gain` (C,) and add `bias` (C,), with unknown input moments."""
     normalisation.load_state_dict(
@@ -228,11 +234,19 @@ def _take(normalisation: nn.Module, inputs: tuple[Tensor]) -> None:
     )
 
 
+# The pretrained backbone: an SSD-MobileNetV1 trained to detect faces.
+#
+# It is part of the npm package `@vladmandic/face-api` (MIT), quantised to 8 bits.
+
 _Tensors = dict[str, Float32]
 
 _ROOT = "MobilenetV1/Conv2d_"
 _NAME = "ssd_mobilenetv1_model"
 _EPSILON = 0.001
+# Loading of an exported float model (ONNX), to continue its training.
+#
+# Batch normalisation is folded into the exported convolutions and separated again here.
+
 _MOST_BYTES = 2**25
 
 

@@ -197,6 +197,11 @@ def collate(samples: list[tuple[UInt8, Float32]]) -> tuple[Tensor, list[Tensor]]
     return images.permute(0, 3, 1, 2), [torch.from_numpy(boxes) for _, boxes in samples]
 
 
+# Random views of an image, as a headset's camera might take them.
+#
+# Maps and boxes are in pixels from the image's upper left corner.
+
+
 def transform_corners(warp: Float64, corners: Float64) -> Float64:
     """Return the upright boxes (M, 4) of corners (M, 4, 2) after an affine map (2, 3)."""
     moved = corners @ warp[:, :2].T + warp[:, 2]

@@ -58,6 +58,12 @@ from handcal.sim.viewpoint import VIEWPOINT_CAMERA, photograph_display
 from handcal.sim.wearer import draw_eyes, draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
 
+# The paper's own simulation (Hu et al. 2021, "Simulation test on rotation-constrained ICP").
+#
+# A hand, the cursor made from it with a known φ, and the cursor turned about a random point of the
+# cloud. One set of data follows the paper, made from UQ itself (κ = 1); the other has a hand of
+# constant size (κ = 1 - φ3φ4).
+
 _SLOW = "paper", "linear"
 _PUBLISHED_MM = 4.0
 _FLOOR_RATIO = 1.1
@@ -152,6 +158,8 @@ def _row(data: str, angle_deg: float, name: str, errors_m: Float64) -> dict[str,
     }
 
 
+# Clouds as from a sensor: cut at different places, sampled independently, noisy.
+
 _CUT_SIGMA_M = 0.0015
 _SIGMA_M = 0.0005, 0.002
 _ANGLE_MAX_DEG = 9.0
@@ -216,6 +224,8 @@ def measure_covariance(settings: BenchSettings, progress: Progress) -> Measured:
     )
 
 
+# Ideal alignments by a simulated person without placement error.
+
 _ASIDE_M, _ALONG_M = 0.005, 0.010
 _BIAS_MM = 0.3
 
@@ -256,6 +266,8 @@ def measure_wearer(settings: BenchSettings, progress: Progress) -> Measured:
     )
 
 
+# Whole calibrations with simulated depth cameras: a RealSense D415, and AHAT of a HoloLens 2.
+
 _SEED = 1
 _AT_MOST = 1.3
 _CAMERAS: dict[str, SensorName] = {"D415": "d415", "AHAT": "ahat"}
@@ -292,6 +304,8 @@ def _errors_arcmin(sensor: SensorName, number: int) -> list[float]:
     rows = procedure_trial(ProcedureSettings(_SEED, ProcedureModel(sensor=sensor)), plan)
     return [cast("float", row["after_arcmin"]) for row in rows]
 
+
+# Reprojection errors of wearers who calibrate with an imperfect rig.
 
 _POINTS = 3000
 _DEPTH_SIGMA_M = 0.001
@@ -346,6 +360,8 @@ def ratio_of_means(errors: Float64, baseline: Float64) -> MeanInterval:
     about = mean_interval((errors - ratio * baseline) / baseline.mean())
     return MeanInterval(ratio, ratio + about.low, ratio + about.high, about.level, about.clusters)
 
+
+# The whole offline calibration, from rendered photographs of a known rig.
 
 HEADSET_CAMERA = Intrinsics(
     1280, 720, 1010.0, 1008.0, 645.0, 356.0, (0.06, -0.13, 0.0006, -0.0004, 0.04)

@@ -30,6 +30,9 @@ from handcal.register.surface import describe_surface
 from handcal.sim.alignments import SimulatedAlignment
 from handcal.sim.raster import visible_points
 
+# Other libraries at their best settings. Times are processor time, which other programs on the
+# machine affect least.
+
 RegisterAlignment: TypeAlias = Callable[[SimulatedAlignment], Float64 | None]
 """Return T_cursor_hand, (4, 4); None for what gives no movement."""
 
@@ -201,6 +204,8 @@ def _open3d() -> dict[str, RegisterAlignment]:
 def _start(made: SimulatedAlignment) -> Float64:
     return rigid(translation_m=made.cursor_m.mean(axis=0) - made.hand_m.mean(axis=0))
 
+
+# Registration of clouds with outliers or missing parts, beside robust libraries; opened hands.
 
 Cloud: TypeAlias = tuple[Float64, Bool]
 """Points (N, 3) in the camera's frame, and which are beside a cut edge."""

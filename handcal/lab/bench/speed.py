@@ -205,6 +205,8 @@ def _medians_ms(inputs: Sequence[Input], *actions: Callable[[Input], object]) ->
     return [1e3 * float(np.median(durations)) for durations in durations_s]
 
 
+# Latency of sending a cursor to the headset, on a good network and on a bad one.
+
 _LOSSES = 0.0, 0.3
 _PATIENCE_S = 5.0
 
@@ -241,6 +243,8 @@ def _cursor_durations_ms(loss: float, settings: BenchSettings) -> list[float]:
             durations_ms.append(1e3 * (perf_counter() - start_s))
     return durations_ms
 
+
+# Speed of a study, with one and with two processes.
 
 # Each process makes its own hands; in a whole study this time is negligible.
 _HANDS = 2

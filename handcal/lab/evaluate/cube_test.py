@@ -22,7 +22,7 @@ from handcal.core.types import Float64, Intrinsics, UInt8
 from handcal.export.figures import name_axes
 from handcal.io.images import read_grey
 from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
-from handcal.lab.methods.published import MISALIGNMENT
+from handcal.lab.methods import MISALIGNMENT
 from handcal.report.cells import interval_ends, mean_sd
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
@@ -165,6 +165,12 @@ def _noted(left_out: dict[str, str], name: str) -> Iterator[None]:
 
 def _read(path: Path) -> UInt8:
     return read_grey(path)
+
+
+# Misalignment of a virtual cube and the real one in captures by the eye-replacement camera.
+#
+# As in Hu et al. 2021 (assessment with eye-replacement camera): across the line of sight by the
+# markers' corners in the image, along it and in rotation by the cube's pose from all of them.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -99,6 +99,8 @@ def wilson(hits: int, trials: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
+# Conditions under which photographs are shown to a detector: light, size of the hand, gloves.
+
 Glove: TypeAlias = Literal["blue", "black"]
 
 _SHAPE = (480, 640)  # of the image in which a hand is shown at a given height

@@ -23,7 +23,7 @@ from handcal.core.types import EYES, Float64
 from handcal.export.figures import COLORS, MARKERS, draw_trial_errors, name_axes
 from handcal.export.tables import corner_rows
 from handcal.io.files import read_limited
-from handcal.lab.methods.published import REPROJECTION
+from handcal.lab.methods import REPROJECTION
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
 from handcal.report.page import families, plain

@@ -19,11 +19,14 @@ from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Alignment, Eye, EyeShift, Float64
-from handcal.lab.methods.fingertip import solve_eye_from_points
-from handcal.lab.methods.indica import solve_indica_recycled
-from handcal.lab.methods.mpaam import FEWEST_PAIRS, solve_mpaam
-from handcal.lab.methods.spaam import solve_spaam
-from handcal.lab.methods.stereo_spaam import solve_stereo_spaam
+from handcal.lab.methods import (
+    FEWEST_PAIRS,
+    solve_eye_from_points,
+    solve_indica_recycled,
+    solve_mpaam,
+    solve_spaam,
+    solve_stereo_spaam,
+)
 from handcal.lab.study.run import Case, Study
 from handcal.lab.study.store import StudyRow
 from handcal.lab.study.trials import BEST_ITERATE, solve_by_paper
@@ -361,6 +364,12 @@ def _align_in_turn(
         shift_m = shift_m | {eye: found.shift_m for eye, found in fused.shifts.items()}
         yield alignment, shift_m
 
+
+# Search for the placement errors with which the paper's method has its published error.
+#
+# A method comparison is only as good as its simulated wearers. All their placement errors, lateral,
+# in depth and in rotation, are those of `WearerSettings` times one scale. The published solver may
+# swing to its last iteration; the search by its best iterate does not depend on where it stops.
 
 PAPER_MEAN_ARCMIN, PAPER_SD_ARCMIN = 10.79, 3.21
 """Hu et al. 2021, user test: all corners."""

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from handcal.core.display import TARGET_DEPTHS_M
 from handcal.core.types import EYES, Float64
 from handcal.export.figures import COLORS, name_axes
-from handcal.lab.methods.published import MISALIGNMENT, REPROJECTION
+from handcal.lab.methods import MISALIGNMENT, REPROJECTION
 from handcal.lab.study.methods import HANDCAL_BOTH, HANDCAL_EACH, PAPER, MethodSettings
 from handcal.lab.study.store import StudyRow
 from handcal.report.document import Column, Figure, Report, Section, Table, facts

@@ -20,7 +20,7 @@ from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, CameraIdentity, DepthEdges, Eye, Float64
 from handcal.hand.edges import edges_of
-from handcal.lab.methods.spaam import solve_spaam
+from handcal.lab.methods import solve_spaam
 from handcal.lab.settings import ProcedureStudySettings
 from handcal.lab.study.procedure_trial import Calibrated, ProcedureModel, lead_through
 from handcal.lab.study.run import Case, Study

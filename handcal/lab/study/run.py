@@ -181,6 +181,8 @@ def _run_case(trial: Callable[[Any, Case], list[StudyRow]], settings: Any, case:
         raise
 
 
+# Workers of a study: this process, processes on this machine, or a Dask cluster.
+
 OVERSUBSCRIBE = "HANDCAL_OVERSUBSCRIBE"
 """Variable of the environment that allows more workers than cores."""
 _CONNECT_S = 30

@@ -7,7 +7,7 @@ from handcal.core.errors import HandcalError
 from handcal.core.geometry import project
 from handcal.core.progress import Progress
 from handcal.core.types import EYES
-from handcal.lab.methods.spaam import solve_spaam
+from handcal.lab.methods import solve_spaam
 from handcal.lab.study import methods
 from handcal.lab.study.methods import (
     HANDCAL_EACH,
