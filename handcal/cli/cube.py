@@ -122,7 +122,7 @@ def capture(arguments: argparse.Namespace) -> None:
     from handcal.camera.viewpoint import open_viewpoint
     from handcal.lab.evaluate.cube_capture import take_at_rest, take_captures
     from handcal.lab.evaluate.cube_folder import missing_captures
-    from handcal.lab.evaluate.run import cube_and_grid
+    from handcal.lab.evaluate.cube_test import cube_and_grid
 
     def ask(what: str) -> None:
         try:
@@ -169,7 +169,7 @@ def capture(arguments: argparse.Namespace) -> None:
 )
 def simulate(arguments: argparse.Namespace) -> None:
     """Render all captures of a test, with a display calibrated by a simulated hand."""
-    from handcal.lab.evaluate.run import render_captures
+    from handcal.lab.evaluate.cube_test import render_captures
     from handcal.lab.settings import CubeTestSettings
 
     settings = CubeTestSettings(
@@ -196,7 +196,7 @@ def simulate(arguments: argparse.Namespace) -> None:
 )
 def report(arguments: argparse.Namespace) -> None:
     """Report the errors of the drawn cube against the real one, over all captures."""
-    from handcal.lab.evaluate.run import run_cube_test
+    from handcal.lab.evaluate.cube_test import run_cube_test
     from handcal.report.cells import mean_sd
 
     settings = replace(

@@ -114,7 +114,7 @@ def detector(arguments: argparse.Namespace) -> None:
 )
 def segmentation(arguments: argparse.Namespace) -> None:
     """Measure the segmentation of the hand on frames with true masks."""
-    from handcal.lab.evaluate.run import run_segmentation_test
+    from handcal.lab.evaluate.segmentation import run_segmentation_test
     from handcal.lab.settings import SegmentationTestSettings
 
     settings = SegmentationTestSettings(
@@ -164,7 +164,7 @@ def _cell(value: float | None, scale: float, digits: int) -> str:
 )
 def users(arguments: argparse.Namespace) -> None:
     """Evaluate the user test: the errors that wearers saw after calibration."""
-    from handcal.lab.evaluate.run import run_user_test
+    from handcal.lab.evaluate.user_test import run_user_test
     from handcal.lab.settings import UserTestSettings
     from handcal.report.cells import interval_ends, mean_sd
 

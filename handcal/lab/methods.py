@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import rq
 
 from handcal.core.display import update_matrix
-from handcal.core.geometry import rigid
 from handcal.core.types import Eye, EyeDisplay, Float64
+from handcal.register.rcicp import best_rigid
 
 _MOST = 100_000
 _FARTHEST = 1e6
@@ -423,19 +423,11 @@ def solve_mpaam(tracked_m: ArrayLike, shown_m: ArrayLike, model: MapModel) -> Fl
         where = "one line" if model == "isometric" else "one plane"
         raise ValueError(f"tracked_m lies on {where}: align the cube at different places")
     if model == "isometric":
-        return _fit_isometric(tracked, shown)
+        return best_rigid(tracked, shown)
     if model == "affine":
         rows = np.column_stack([tracked, np.ones(len(tracked))])
         return np.vstack([np.linalg.lstsq(rows, shown)[0].T, [0.0, 0.0, 0.0, 1.0]])
     return fit_projective(tracked, shown)
-
-
-def _fit_isometric(source: Float64, target: Float64) -> Float64:
-    """Return the least-squares rigid motion (Kabsch 1976)."""
-    middle, goal = source.mean(axis=0), target.mean(axis=0)
-    U, _, Vt = np.linalg.svd((target - goal).T @ (source - middle))
-    R = U @ np.diag([1.0, 1.0, np.linalg.det(U) * np.linalg.det(Vt)]) @ Vt
-    return rigid(R, goal - R @ middle)
 
 
 # Published results of these methods, as collected by Hu et al. 2021 (their tables 2 and 3).

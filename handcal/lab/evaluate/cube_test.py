@@ -8,21 +8,29 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
 from scipy.spatial.transform import Rotation
 
-from handcal.core.errors import FileError
+from handcal.core.errors import FileError, HandcalError
 from handcal.core.frozen import freeze
 from handcal.core.geometry import camera_matrix, transform
 from handcal.core.progress import Progress
-from handcal.core.types import Float64, Intrinsics, UInt8
+from handcal.core.types import Float64, Intrinsics, Rig, UInt8
 from handcal.export.figures import name_axes
+from handcal.io.files import user_path
 from handcal.io.images import read_grey
+from handcal.io.resources import resource_path
 from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
 from handcal.lab.methods import MISALIGNMENT
+from handcal.lab.settings import (
+    CubeTestSettings,
+    output_folder,
+)
+from handcal.lab.study.store import free_of_studies
 from handcal.report.cells import interval_ends, mean_sd
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with, settings_items
@@ -33,12 +41,17 @@ from handcal.report.statistics import (
     mean_interval,
     summarise,
 )
+from handcal.report.write import write_report
 from handcal.rig.boards.board import BoardError
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.cube.cube import MIN_FACES, Cube, CubeError, cube_pose, find_cube, marker_corners_m
+from handcal.rig.cube.cube_file import read_cube
 from handcal.rig.displays.display import fit_homography, pose_before
-from handcal.rig.displays.grid import Grid, find_grid
+from handcal.rig.displays.grid import Grid, find_grid, grid_on
 from handcal.rig.displays.warp import RotationWarp
+from handcal.rig.formats import read_intrinsics
+from handcal.rig.rig_file import read_rig
+from handcal.sim.cube_captures import CaptureSettings, write_captures
 
 CubeRow: TypeAlias = dict[str, float | int | str]
 """Errors of one pair of captures; units are in the names."""
@@ -461,3 +474,122 @@ def _published(summary: Mapping[str, Mapping[str, ErrorSummary]]) -> Section:
         for p in MISALIGNMENT
     ]
     return Section("Beside published tests", [Table(columns, [*here, *published], caption)])
+
+
+# Shares of the time of an evaluation.
+_READING, _RENDERING = 0.7, 0.49
+_MOST_REASONS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CubeTestResult:
+    """The errors found in a cube test, and its report as it was written."""
+
+    test: CubeTest
+    summary: Mapping[str, Mapping[str, ErrorSummary]]
+    """By the name of the drawn cube and of the error."""
+    report: Report
+    files: tuple[Path, ...]
+    """The report as PDF and as HTML."""
+
+
+def run_cube_test(settings: CubeTestSettings, progress: Progress = Progress()) -> CubeTestResult:
+    """Evaluate the captures of a cube test, rendered ones without a folder, and write the report.
+
+    Raises
+    ------
+    CancelledError
+    HandcalError
+        If a file cannot be used, the results would go into a study's folder, or no pair of captures
+        can be evaluated.
+    """
+    output = free_of_studies(output_folder(settings.output))
+    if settings.captures:
+        folder = user_path(settings.captures)
+        return _evaluate_captures(settings, folder, output, progress, 0.0)
+    with TemporaryDirectory() as rendered:
+        render_captures(settings, Path(rendered), progress.part(0.0, _RENDERING))
+        return _evaluate_captures(settings, Path(rendered), output, progress, _RENDERING)
+
+
+def render_captures(
+    settings: CubeTestSettings, folder: Path, progress: Progress = Progress()
+) -> None:
+    """Render all captures of a cube test into a new or empty folder.
+
+    Raises
+    ------
+    CancelledError
+    HandcalError
+        If the rig file cannot be used, or the folder is not empty or cannot be written.
+    """
+    chosen = CaptureSettings(
+        seed=settings.seed,
+        eye=settings.eye,
+        poses=settings.poses,
+        alignments=settings.alignments,
+        prior=settings.prior,
+    )
+    write_captures(folder, _rig(settings), chosen, progress)
+
+
+def cube_and_grid(settings: CubeTestSettings, folder: Path) -> tuple[Cube, Grid]:
+    """Return the cube and the display's grid that the captures in a folder show.
+
+    Raises
+    ------
+    HandcalError
+        If a file is missing or wrong, or the display has no room for such a grid.
+    """
+    file = _file(settings.cube, folder / "cube.json")
+    if not file.exists():
+        raise FileError(
+            f"there is no {file}: choose the description of the cube, or write one together with "
+            "the cube's net by handcal evaluate cube net"
+        )
+    display = _rig(settings).eyes[settings.eye]
+    return read_cube(file), grid_on(display.width_px, display.height_px, settings.square_px)
+
+
+def position_warp(settings: CubeTestSettings, folder: Path, position: str) -> RotationWarp | None:
+    """Return the warp of the live view at a position; None before its grid is captured.
+
+    Raises
+    ------
+    HandcalError
+        If the camera's intrinsics or the image of the grid cannot be used.
+    """
+    file = _file(settings.camera, folder / "camera.json")
+    if not file.exists():
+        raise FileError(f"there is no {file}: choose the file of the camera's intrinsics")
+    camera = read_intrinsics(file)
+    grid = cube_and_grid(settings, folder)[1]
+    return display_warp(folder / position, camera, grid)
+
+
+def _evaluate_captures(
+    settings: CubeTestSettings, folder: Path, output: Path, progress: Progress, begun: float
+) -> CubeTestResult:
+    cube, grid = cube_and_grid(settings, folder)
+    camera = read_intrinsics(_file(settings.camera, folder / "camera.json"))
+    test = judge_captures(folder, cube, camera, grid, progress.part(begun, _READING))
+    if not test.rows:
+        reasons = [f"{name}: {why}" for name, why in test.left_out.items()]
+        shown = "; ".join(reasons[:_MOST_REASONS])
+        raise HandcalError(f"no pair of captures can be evaluated ({shown})")
+    summary = cube_summary(test.rows)
+    report = cube_report(test, summary, cube, camera)
+    return CubeTestResult(
+        test,
+        summary,
+        report,
+        write_report(output, report, progress.part(_READING, 1.0, "Writing the report")),
+    )
+
+
+def _rig(settings: CubeTestSettings) -> Rig:
+    return read_rig(_file(settings.rig, resource_path("example_rig.yaml")))
+
+
+def _file(chosen: str, otherwise: Path) -> Path:
+    return user_path(chosen) if chosen else otherwise

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -13,11 +14,29 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from handcal.core.errors import HandError
+from handcal.core.progress import Progress
 from handcal.core.types import Bool, Frame, HandCloud, UInt8
 from handcal.export.figures import name_axes
-from handcal.lab.evaluate.masked_frames import MaskedFrame, cropped, scaled, subsampled
+from handcal.hand.settings import SegmentSettings
+from handcal.hand.shipped import make_finder
+from handcal.io.files import make_folder, require_suffix, user_path
+from handcal.io.images import write_png
+from handcal.lab.evaluate.masked_frames import (
+    MaskedFrame,
+    cropped,
+    read_masked_frames,
+    read_masked_names,
+    scaled,
+    subsampled,
+)
+from handcal.lab.settings import (
+    SegmentationTestSettings,
+    output_folder,
+)
+from handcal.lab.study.store import free_of_studies
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with
+from handcal.report.write import write_report
 
 Find = Callable[[Frame], HandCloud]
 """Segments the hand in a frame that stands alone; raises HandError if it finds none."""
@@ -333,3 +352,57 @@ def _table(rows: Sequence[Any]) -> Table:
 
 def _cell(value: float | None, scale: float, digits: int) -> str:
     return "–" if value is None else f"{scale * value:.{digits}f}"
+
+
+_SEGMENTING = 0.95
+"""Share of the time of an evaluation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SegmentationRun:
+    """The figures of a test of the segmentation, and its report."""
+
+    figures: dict[str, Any]
+    """As `evaluation` gives them."""
+    report: Report
+    files: tuple[Path, ...]
+    """The report as PDF and as HTML, if it was written."""
+
+
+def run_segmentation_test(
+    settings: SegmentationTestSettings, progress: Progress = Progress()
+) -> SegmentationRun:
+    """Segment the hand in a folder of frames with true masks.
+
+    Writes the report and the contact sheet, if they are wanted.
+
+    Raises
+    ------
+    CancelledError
+    FileError
+        If a file cannot be used or written, or the report would go into a study's folder.
+    """
+    output = free_of_studies(output_folder(settings.output)) if settings.output else None
+    sheet = user_path(settings.sheet) if settings.sheet else None
+    if sheet is not None:  # before the long work, whose result would be lost
+        require_suffix(sheet, ".png")
+        make_folder(sheet.parent)
+    folder = user_path(settings.folder)
+    segmenting = SegmentSettings(roi=settings.roi)
+    described = read_masked_names(folder)
+    rows, tiles = [], []
+    for shot in read_masked_frames(folder, described):
+        row, mask = evaluate_frame(shot, lambda one: make_finder(segmenting).find(one))
+        rows.append(row)
+        tiles.append(tile(shot, mask, row))
+        progress.at(_SEGMENTING * len(rows) / len(described), "Segmenting hands")
+    if sheet is not None:
+        write_png(sheet, contact_sheet(tiles))
+    figures = evaluation(rows)
+    report = segmentation_report(figures, tiles)
+    files = (
+        ()
+        if output is None
+        else write_report(output, report, progress.part(_SEGMENTING, 1.0, "Writing the report"))
+    )
+    return SegmentationRun(figures, report, files)

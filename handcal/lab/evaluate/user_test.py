@@ -22,8 +22,13 @@ from handcal.core.progress import Progress
 from handcal.core.types import EYES, Float64
 from handcal.export.figures import COLORS, MARKERS, draw_trial_errors, name_axes
 from handcal.export.tables import corner_rows
-from handcal.io.files import read_limited
+from handcal.io.files import read_limited, user_path
 from handcal.lab.methods import REPROJECTION
+from handcal.lab.settings import (
+    UserTestSettings,
+    output_folder,
+)
+from handcal.lab.study.store import free_of_studies
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
 from handcal.report.page import families, plain
@@ -37,6 +42,7 @@ from handcal.report.statistics import (
     summarise,
     variance_components,
 )
+from handcal.report.write import write_report
 from handcal.session.comparison import count_comparisons, read_comparisons
 from handcal.session.journal import JOURNAL, MAX_JOURNAL_BYTES
 from handcal.session.record import replay
@@ -536,3 +542,38 @@ def _mean(total: GroupErrors) -> str:
 
 def _count(number: int, what: str) -> str:
     return f"1 {what}" if number == 1 else f"{number:,} {what}s"
+
+
+_READING = 0.7
+"""Share of the time of an evaluation."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UserTestRun:
+    """The errors found in a user test, and its report as it was written."""
+
+    result: UserTestResult
+    report: Report
+    files: tuple[Path, ...]
+    """The report as PDF and as HTML."""
+
+
+def run_user_test(settings: UserTestSettings, progress: Progress = Progress()) -> UserTestRun:
+    """Evaluate the user test over sessions, and write the report.
+
+    Raises
+    ------
+    CancelledError
+    FileError
+        If no session holds a trial, or the results would go into a study's folder.
+    """
+    output = free_of_studies(output_folder(settings.output))
+    folders = [user_path(folder) for folder in settings.folders]
+    test = read_user_test(folders, progress.part(0.0, _READING))
+    result = evaluate_user_test(test)
+    report = user_test_report(test, result)
+    return UserTestRun(
+        result,
+        report,
+        write_report(output, report, progress.part(_READING, 1.0, "Writing the report")),
+    )
