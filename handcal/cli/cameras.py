@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, until_interrupted
-from handcal.cli.terminal import (
-    arg,
-    command,
-    fail,
-    flag,
-    number,
-    seed,
-    value,
-)
+from handcal.cli.terminal import arg, command, fail, flag, number, seed, value
 from handcal.core.errors import HandcalError
 
 if TYPE_CHECKING:

@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from handcal.cli.output import console, save, show_progress, table, until_interrupted
 from handcal.cli.run import SENSOR_OPTIONS
-from handcal.cli.terminal import (
-    Option,
-    arg,
-    command,
-    flag,
-    folder_option,
-    number,
-    seed,
-    value,
-)
+from handcal.cli.terminal import Option, arg, command, flag, folder_option, number, seed, value
 
 if TYPE_CHECKING:
     from handcal.core.progress import Progress

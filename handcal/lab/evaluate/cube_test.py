@@ -26,10 +26,7 @@ from handcal.io.images import read_grey
 from handcal.io.resources import resource_path
 from handcal.lab.evaluate.cube_folder import GRID, find_captures, images_in
 from handcal.lab.methods import MISALIGNMENT
-from handcal.lab.settings import (
-    CubeTestSettings,
-    output_folder,
-)
+from handcal.lab.settings import CubeTestSettings, output_folder
 from handcal.lab.study.store import free_of_studies
 from handcal.report.cells import interval_ends, mean_sd
 from handcal.report.document import Column, Figure, Report, Section, Table, facts

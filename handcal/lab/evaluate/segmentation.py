@@ -29,10 +29,7 @@ from handcal.lab.evaluate.masked_frames import (
     scaled,
     subsampled,
 )
-from handcal.lab.settings import (
-    SegmentationTestSettings,
-    output_folder,
-)
+from handcal.lab.settings import SegmentationTestSettings, output_folder
 from handcal.lab.study.store import free_of_studies
 from handcal.report.document import Column, Figure, Report, Section, Table, facts
 from handcal.report.provenance import made_with

@@ -24,10 +24,7 @@ from handcal.export.figures import COLORS, MARKERS, draw_trial_errors, name_axes
 from handcal.export.tables import corner_rows
 from handcal.io.files import read_limited, user_path
 from handcal.lab.methods import REPROJECTION
-from handcal.lab.settings import (
-    UserTestSettings,
-    output_folder,
-)
+from handcal.lab.settings import UserTestSettings, output_folder
 from handcal.lab.study.store import free_of_studies
 from handcal.report.cells import extremes, interval_ends, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
