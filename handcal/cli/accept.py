@@ -75,22 +75,21 @@ def accept(arguments: argparse.Namespace) -> None:
         found = run_acceptance(settings, progress)
     save(arguments.json, found.json(settings.limit_arcmin))
     for name, why in found.left_out.items():
-        console.print(f"Left out: {name}: {why}", markup=False)
+        console.print(f"Left out: {name}: {why}")
     shown = table("eye", "distance, m", "corners", "mean, arcmin", "largest, arcmin")
     for eye, one in found.eyes.items():
         for row in view_rows(one):
             shown.add_row(eye, *row)
     console.print(shown)
     for file in found.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))
     for eye, one in found.eyes.items():
         console.print(
             f"{eye}: {found.problems[eye] or 'passed'}; {one.mean_arcmin:.1f}′ on average, camera "
-            f"{triple(1e3 * one.shift_m)} mm from C0",
-            markup=False,
+            f"{triple(1e3 * one.shift_m)} mm from C0"
         )
     if found.move is not None:
-        console.print(f"depth camera: {found.move.words}, by tracked boards", markup=False)
+        console.print(f"depth camera: {found.move.words}, by tracked boards")
     if found.cause.words:
         how = "; ".join(dict.fromkeys(_HOW[part] for part in found.cause.again))
         raise HandcalError(f"the rig fails: {found.cause.words}{how and f' ({how})'}")
@@ -146,4 +145,4 @@ def simulate(arguments: argparse.Namespace) -> None:
         )
     lines.append("Acceptance: images for 'handcal rig accept' in accept")
     for line in lines:
-        console.print(line, markup=False)
+        console.print(line)

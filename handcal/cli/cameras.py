@@ -81,7 +81,7 @@ def record(arguments: argparse.Namespace) -> None:
         until_interrupted() as is_stopped,
     ):
         said = f"Recording {camera.name}; press Ctrl+C to stop and keep the recording."
-        console.print(said, markup=False)
+        console.print(said)
         try:
             with show_progress(is_stopped) as progress:
                 recorded = record_camera(camera, arguments.output, settings, progress)

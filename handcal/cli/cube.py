@@ -7,8 +7,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.markup import escape
-
 from handcal.cli.boards import GRID_OPTION
 from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
@@ -78,11 +76,11 @@ def net(arguments: argparse.Namespace) -> None:
         write_cube_pdf(arguments.pdf, cube, arguments.paper)
     except ValueError as error:
         raise HandcalError(str(error)) from error
-    console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler", markup=False)
+    console.print(f"{arguments.pdf}: print at 100 %, and measure the ruler")
     if arguments.cube is not None:
         make_folder(arguments.cube.parent)
         write_cube(arguments.cube, cube)
-        console.print(f"{arguments.cube}: enter the measured sides there", markup=False)
+        console.print(f"{arguments.cube}: enter the measured sides there")
 
 
 @command(
@@ -126,7 +124,7 @@ def capture(arguments: argparse.Namespace) -> None:
 
     def ask(what: str) -> None:
         try:
-            console.input(f"{escape(what)}, then press Enter ")
+            console.input(f"{what}, then press Enter ", markup=False)
         except EOFError:
             raise HandcalError("no answer", "repeat the command to take what is missing") from None
 
@@ -182,7 +180,7 @@ def simulate(arguments: argparse.Namespace) -> None:
     )
     with show_progress() as progress:
         render_captures(settings, arguments.folder, progress)
-    console.print(f"Captures: {arguments.folder}", markup=False)
+    console.print(f"Captures: {arguments.folder}")
 
 
 @command(
@@ -207,7 +205,7 @@ def report(arguments: argparse.Namespace) -> None:
     with show_progress() as progress:
         found = run_cube_test(settings, progress)
     for name, why in found.test.left_out.items():
-        console.print(f"Left out: {name}: {why}", markup=False)
+        console.print(f"Left out: {name}: {why}")
     errors = {
         drawn: {name: asdict(error) for name, error in by_name.items()}
         for drawn, by_name in found.summary.items()
@@ -217,10 +215,10 @@ def report(arguments: argparse.Namespace) -> None:
     shown_table = table("drawn", "pairs", *(title for _, title in _SHOWN))
     for drawn, by_name in found.summary.items():
         spreads = [by_name[name].spread for name, _ in _SHOWN]
-        shown_table.add_row(escape(drawn), str(spreads[0].count), *map(mean_sd, spreads))
+        shown_table.add_row(drawn, str(spreads[0].count), *map(mean_sd, spreads))
     console.print(shown_table)
     for file in found.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))
 
 
 def _settings(arguments: argparse.Namespace) -> CubeTestSettings:

@@ -73,10 +73,10 @@ def display_check(arguments: argparse.Namespace) -> None:
             server, rig, observe, "wearer" if is_asked else "camera", eyes=eyes
         )
     finding = display_finding(made)
-    console.print(f"{'good' if finding.is_fine else 'bad'}: {finding.found}", markup=False)
+    console.print(f"{'good' if finding.is_fine else 'bad'}: {finding.found}")
     make_folder(arguments.output.parent)
     write_rig(arguments.output, replace(rig, display_check=made))
-    console.print(str(arguments.output), markup=False)
+    console.print(str(arguments.output))
     if not finding.is_fine:
         raise HandcalError("the headset does not draw what it is sent", "see above")
 

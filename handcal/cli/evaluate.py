@@ -7,8 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import get_args
 
-from rich.markup import escape
-
 from handcal.cli.output import console, save, show_progress, table
 from handcal.cli.terminal import arg, command, file_option, folder_option, number, value
 from handcal.core.errors import HandcalError
@@ -87,8 +85,8 @@ def detector(arguments: argparse.Namespace) -> None:
     shares = table("skin", "side", "hands", "found, score at least 0.3", "95 % interval")
     for share in result["found"]:
         shares.add_row(
-            escape(share["skin"] or "all"),
-            escape(share["aspect"]),
+            share["skin"] or "all",
+            share["aspect"],
             str(share["hands"]),
             f"{100 * share['share']:.1f} %",
             f"{100 * share['low']:.1f} to {100 * share['high']:.1f} %",
@@ -141,7 +139,7 @@ def segmentation(arguments: argparse.Namespace) -> None:
     console.print(shown_table)
     for row in result["rows"]:
         if row["refused"] is not None:
-            console.print(f"{row['name']}: {row['refused']}", markup=False)
+            console.print(f"{row['name']}: {row['refused']}")
     console.print(
         f"{result['frames']} frames, {result['refused']} refused. "
         f"IoU {_cell(result['iou_mean'], 1, 3)}, at least {_cell(result['iou_min'], 1, 3)}; "
@@ -176,7 +174,7 @@ def users(arguments: argparse.Namespace) -> None:
     shown_table = table("wearer", "calibrations", "trials", "mean ± SD, arcmin", "95 % interval")
     for name, errors in (*result.by_wearer.items(), ("all", result.total)):
         shown_table.add_row(
-            escape(name),
+            name,
             str(errors.calibrations),
             str(errors.trials),
             mean_sd(errors.arcmin),
@@ -184,7 +182,7 @@ def users(arguments: argparse.Namespace) -> None:
         )
     console.print(shown_table)
     for path, why in result.left_out.items():
-        console.print(f"Left out: {path}: {why}", markup=False)
+        console.print(f"Left out: {path}: {why}")
     console.print(found.report.lead)
     for file in found.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))

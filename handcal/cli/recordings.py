@@ -81,7 +81,7 @@ def replay(arguments: argparse.Namespace) -> None:
     console.print(shown_table)
     save(arguments.json, {"frames": rows, "notes": list(camera.notes)})
     for note in camera.notes:
-        console.print(f"The recording: {note}", markup=False)
+        console.print(f"The recording: {note}")
     without = sum(not row["color"] for row in rows)
     if without:
         console.print(f"{without} of {len(rows)} frames have no colour: found by depth alone.")

@@ -160,17 +160,17 @@ def depth(arguments: argparse.Namespace) -> None:
         shown.add_row(f"{near_m:.1f} to {far_m:.1f}", f"{1e3 * flat_m:.2f} ± {1e3 * sigma_m:.2f}")
     console.print(shown)
     finding = depth_finding(measured)
-    console.print(f"{'good' if finding.is_fine else 'doubtful'}: {finding.found}", markup=False)
+    console.print(f"{'good' if finding.is_fine else 'doubtful'}: {finding.found}")
     if not finding.is_fine:
         why = explain_depth(measured, board.square_m)
-        console.print(why or "add views, at more distances", markup=False)
+        console.print(why or "add views, at more distances")
     if found.board.words:
-        console.print(f"The board is not as entered: {found.board.words}", markup=False)
+        console.print(f"The board is not as entered: {found.board.words}")
     if found.edges is None:
-        console.print(f"Edges not measured: {found.why_no_edges}", markup=False)
+        console.print(f"Edges not measured: {found.why_no_edges}")
     else:
         rig = replace(rig, depth_edges=found.edges)
-    console.print(f"Edges outside the true ones: {edges_finding(rig).found}", markup=False)
+    console.print(f"Edges outside the true ones: {edges_finding(rig).found}")
     write_rig_file(arguments.output, replace(rig, depth_check=measured))
 
 
@@ -238,7 +238,7 @@ def write_rig_file(path: Path, rig: Rig) -> None:
         write_rig(path, rig)
     except ValueError as error:
         raise HandcalError(f"this rig is not plausible: {error}") from error
-    console.print(str(path), markup=False)
+    console.print(str(path))
 
 
 _METRES = number(float, 0.1, 100.0)
@@ -286,8 +286,7 @@ def gray(arguments: argparse.Namespace) -> None:
         write_png(arguments.output / f"{name}.png", pattern)
     console.print(
         f"{arguments.output}: {len(made)} patterns; show each unscaled, and give the camera's "
-        "image of it the same name",
-        markup=False,
+        "image of it the same name"
     )
 
 

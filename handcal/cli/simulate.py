@@ -157,7 +157,7 @@ def demo(arguments: argparse.Namespace) -> None:
 def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
     """Say why there is no result, and end."""
     for reason in dict.fromkeys(found["reason"] for found in result["eyes"].values()):
-        console.print(f"contradicted: {reason}", markup=False)
+        console.print(f"contradicted: {reason}")
     _say_meaning(result, settings)
     sys.exit(_CONTRADICTED)
 
@@ -166,8 +166,8 @@ def _say_meaning(result: dict[str, Any], settings: DemoSettings) -> None:
     """Say what each verdict means and what to try next, and the session's folder."""
     verdicts = {eye: found["verdict"] for eye, found in result["eyes"].items()}
     for line in meanings(verdicts, settings, result["session"]):
-        console.print(line, markup=False)
-    console.print(f"Session: {result['session']}", markup=False)
+        console.print(line)
+    console.print(f"Session: {result['session']}")
 
 
 def meanings(

@@ -243,7 +243,7 @@ def _run(arguments: argparse.Namespace, order: Callable[[Progress], StudyResult]
     save(arguments.json, {"figures": figures})
     console.print(result.report.lead)
     for file in result.files:
-        console.print(str(file), markup=False)
+        console.print(str(file))
     return result
 
 
