@@ -1,4 +1,4 @@
-"""Calibration methods of others: exact data give the truth, and what determines nothing is refused."""
+"""Calibration methods of others: exact data give the truth, and hopeless ones are refused."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,9 @@ def test_spaam_gives_the_projection(seed: int, count: int) -> None:
 def test_stereo_spaam_gives_each_eye_its_own() -> None:
     rng = np.random.default_rng(3)
     points_m = spread_points(rng, 12)
-    true = {eye: eye_projection(example_rig().eyes[eye], rng.uniform(-0.01, 0.01, 3)) for eye in EYES}
+    true = {
+        eye: eye_projection(example_rig().eyes[eye], rng.uniform(-0.01, 0.01, 3)) for eye in EYES
+    }
     found = solve_stereo_spaam(points_m, {eye: project(P, points_m) for eye, P in true.items()})
     assert max(difference(found[eye], true[eye]) for eye in EYES) < 1e-6
     with pytest.raises(ValueError, match="right eye: points_m has 2"):
@@ -175,7 +177,12 @@ def test_indica_refuses() -> None:
 
 @pytest.mark.parametrize(
     ("model", "true"),
-    [("isometric", RIGID), ("affine", AFFINE), ("perspective", AFFINE), ("perspective", PERSPECTIVE)],
+    [
+        ("isometric", RIGID),
+        ("affine", AFFINE),
+        ("perspective", AFFINE),
+        ("perspective", PERSPECTIVE),
+    ],
 )
 def test_mpaam_gives_the_map(model: MapModel, true: Float64) -> None:
     rng = np.random.default_rng(1)
@@ -203,6 +210,6 @@ def test_mpaam_needs_so_many_pairs_apart(model: MapModel) -> None:
 
 def test_the_isometric_map_is_the_nearest_motion() -> None:
     """Never a mirror, though one would fit these pairs better."""
-    points_m = CORNERS_M[:3] + [0.0, 0.0, 0.5]
+    points_m = CORNERS_M[:3] + np.array([0.0, 0.0, 0.5])
     found = solve_mpaam(points_m, points_m * [1.0, 1.0, -1.0], "isometric")
     assert np.linalg.det(found[:3, :3]) == pytest.approx(1.0)
