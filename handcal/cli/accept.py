@@ -7,7 +7,18 @@ from pathlib import Path
 
 from handcal.cli.boards import BOARD_OPTIONS, GRID_OPTION, board_of
 from handcal.cli.output import console, save, show_progress, table, triple
-from handcal.cli.terminal import arg, command, file_option, folder_option, number, seed, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    eyes_of,
+    eyes_option,
+    file_option,
+    folder_option,
+    number,
+    seed,
+    settings_of,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.core.types import EYES, RigPart
 from handcal.io.files import make_folder
@@ -28,7 +39,7 @@ _HOW: dict[RigPart, str] = {
         "headset tracks the board",
     ),
     file_option("--rig", "rig file to accept", required=True),
-    arg("--eyes", choices=("both", *EYES), default="both", help="eyes to check"),
+    eyes_option("eyes to check"),
     file_option(
         "--camera-intrinsics", "intrinsics of the viewpoint camera (default: FOLDER/camera.json)"
     ),
@@ -60,16 +71,13 @@ def accept(arguments: argparse.Namespace) -> None:
         view_rows,
     )
 
-    settings = AcceptanceSettings(
-        arguments.folder,
-        arguments.rig,
-        arguments.output,
-        board_of(arguments),
-        arguments.square_px,
-        EYES if arguments.eyes == "both" else (arguments.eyes,),
-        arguments.camera_intrinsics,
-        arguments.depth_intrinsics,
-        arguments.limit_arcmin,
+    settings = settings_of(
+        AcceptanceSettings,
+        arguments,
+        board=board_of(arguments),
+        eyes=eyes_of(arguments),
+        camera=arguments.camera_intrinsics,
+        depth_camera=arguments.depth_intrinsics,
     )
     with show_progress() as progress:
         found = run_acceptance(settings, progress)

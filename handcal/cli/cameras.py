@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from handcal.camera.settings import Preset, Profile, RealSenseSettings
 from handcal.cli.output import console, save, show_progress, until_interrupted
-from handcal.cli.terminal import arg, command, fail, flag, number, seed, value
+from handcal.cli.terminal import arg, command, fail, flag, number, seed, settings_of, value
 from handcal.core.errors import HandcalError
 
 if TYPE_CHECKING:
@@ -96,8 +96,7 @@ def record(arguments: argparse.Namespace) -> None:
 
 def realsense_of(arguments: argparse.Namespace) -> RealSenseSettings:
     """Return the settings that the options describe."""
-    names = [field.name for field in fields(RealSenseSettings)]
-    return RealSenseSettings(**{name: getattr(arguments, name) for name in names})
+    return settings_of(RealSenseSettings, arguments)
 
 
 def gate_of(

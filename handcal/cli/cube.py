@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 
 from handcal.cli.boards import GRID_OPTION
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, file_option, flag, folder_option, number, seed, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    file_option,
+    flag,
+    folder_option,
+    number,
+    seed,
+    settings_of,
+    value,
+)
 from handcal.core.errors import CameraError, HandcalError
 from handcal.core.types import EYES
 from handcal.io.files import make_folder
@@ -170,16 +180,8 @@ def simulate(arguments: argparse.Namespace) -> None:
     from handcal.lab.evaluate.cube_test import render_captures
     from handcal.lab.settings import CubeTestSettings
 
-    settings = CubeTestSettings(
-        rig=_text(arguments.rig),
-        eye=arguments.eye,
-        seed=arguments.seed,
-        poses=arguments.poses,
-        alignments=arguments.alignments,
-        prior=arguments.prior,
-    )
     with show_progress() as progress:
-        render_captures(settings, arguments.folder, progress)
+        render_captures(settings_of(CubeTestSettings, arguments), arguments.folder, progress)
     console.print(f"Captures: {arguments.folder}")
 
 
@@ -199,7 +201,7 @@ def report(arguments: argparse.Namespace) -> None:
 
     settings = replace(
         _settings(arguments),
-        camera=_text(arguments.camera_intrinsics),
+        camera=str(arguments.camera_intrinsics or ""),
         output=str(arguments.output),
     )
     with show_progress() as progress:
@@ -225,17 +227,8 @@ def _settings(arguments: argparse.Namespace) -> CubeTestSettings:
     """Return the settings that the options of captures describe."""
     from handcal.lab.settings import CubeTestSettings
 
-    return CubeTestSettings(
-        captures=str(arguments.folder),
-        cube=_text(arguments.cube),
-        rig=_text(arguments.rig),
-        eye=arguments.eye,
-        square_px=arguments.square_px,
-    )
-
-
-def _text(path: Path | None) -> str:
-    return "" if path is None else str(path)
+    # The captures' option --camera is a number, and that of the settings a file.
+    return settings_of(CubeTestSettings, arguments, captures=str(arguments.folder), camera="")
 
 
 def _only_camera() -> int:

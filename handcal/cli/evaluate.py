@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import get_args
 
 from handcal.cli.output import console, save, show_progress, table
-from handcal.cli.terminal import arg, command, file_option, folder_option, number, value
+from handcal.cli.terminal import (
+    arg,
+    command,
+    file_option,
+    folder_option,
+    number,
+    settings_of,
+    value,
+)
 from handcal.core.errors import HandcalError
 from handcal.hand.settings import Roi
 from handcal.io.files import make_folder, require_suffix
@@ -115,13 +123,8 @@ def segmentation(arguments: argparse.Namespace) -> None:
     from handcal.lab.evaluate.segmentation import run_segmentation_test
     from handcal.lab.settings import SegmentationTestSettings
 
-    settings = SegmentationTestSettings(
-        str(arguments.folder),
-        arguments.roi,
-        str(arguments.sheet or ""),
-        str(arguments.output or ""),
-    )
     with show_progress() as progress:
+        settings = settings_of(SegmentationTestSettings, arguments)
         result = run_segmentation_test(settings, progress).figures
     save(arguments.json, result)
     shown_table = table(

@@ -19,6 +19,7 @@ from handcal.cli.terminal import (
     folder_option,
     number,
     seed,
+    settings_of,
     value,
 )
 from handcal.core.types import Eye, VerdictName
@@ -47,7 +48,10 @@ _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
 _RIG = file_option("--rig", "rig file (default: the shipped example)")
 _HAND = arg(
-    "--hand", choices=("left", "right"), help="the raised hand (default: drawn from the seed)"
+    "--hand",
+    dest="side",
+    choices=("left", "right"),
+    help="the raised hand (default: drawn from the seed)",
 )
 _LINK = (
     value("--loss", _SHARE, "P", "share of datagrams lost", default=0.0),
@@ -68,7 +72,12 @@ _LINK = (
         help="the paper's alignments, or the recommended plan: cursors placed by the program, then "
         "a verification of each eye",
     ),
-    flag("--no-verify", "end the recommended plan without verifying the eyes"),
+    arg(
+        "--no-verify",
+        dest="verify",
+        action="store_false",
+        help="end the recommended plan without verifying the eyes",
+    ),
     arg(
         "--from",
         dest="former",
@@ -82,7 +91,12 @@ _LINK = (
     _RIG,
     file_option("--worn-rig", "true rig of the simulated headset (default: the same as --rig)"),
     *SENSOR_OPTIONS,
-    flag("--known-fat", "the rig knows how fat the camera's edges are, as from a depth check"),
+    arg(
+        "--known-fat",
+        dest="is_fat_known",
+        action="store_true",
+        help="the rig knows how fat the camera's edges are, as from a depth check",
+    ),
     arg(
         "--fault",
         choices=FAULTS,
@@ -102,24 +116,7 @@ def demo(arguments: argparse.Namespace) -> None:
     from handcal.core.types import EyeDistance
     from handcal.lab.demo import DemoSettings, run_demo
 
-    settings = DemoSettings(
-        seed=arguments.seed,
-        alignments=arguments.alignments,
-        eyes=arguments.eyes,
-        plan=arguments.plan,
-        verify=not arguments.no_verify,
-        former=str(arguments.former or ""),
-        slipped=arguments.slipped,
-        side=arguments.hand,
-        loss=arguments.loss,
-        reorder=arguments.reorder,
-        worn_rig=str(arguments.worn_rig or ""),
-        fault=arguments.fault or "",
-        eye_distance=arguments.eye_distance,
-        sensor=arguments.sensor,
-        fatten_px=arguments.fatten_px,
-        is_fat_known=arguments.known_fat,
-    )
+    settings = settings_of(DemoSettings, arguments)
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         rig = _rig_path(arguments.rig)
         result = run_demo(settings, rig, make_folder(arguments.output), progress)
@@ -322,7 +319,7 @@ def headset(arguments: argparse.Namespace) -> None:
         loses_start=arguments.lose_start,
         steps_clock=arguments.step_clock,
         eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
-        side=arguments.hand,
+        side=arguments.side,
         wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),
         has_wearer=not arguments.as_device,
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from time import process_time
 from typing import Any, TypeAlias
 
@@ -30,11 +31,15 @@ from handcal.register.surface import describe_surface
 from handcal.sim.alignments import SimulatedAlignment
 from handcal.sim.raster import visible_points
 
+Cloud: TypeAlias = tuple[Float64, Bool]
+"""Points (N, 3) in the camera's frame, and which are beside a cut edge."""
+Register: TypeAlias = Callable[[Cloud, Cloud], Float64 | None]
+"""Return T_target_source of a source and a target; None for what gives no movement."""
+Spoil: TypeAlias = Callable[[np.random.Generator, Cloud, Float64], Cloud]
+"""Spoil a cloud, given the palm's centre and the arm's direction, (2, 3)."""
+
 # Other libraries at their best settings. Times are processor time, which other programs on the
 # machine affect least.
-
-RegisterAlignment: TypeAlias = Callable[[SimulatedAlignment], Float64 | None]
-"""Return T_cursor_hand, (4, 4); None for what gives no movement."""
 
 _SIGMA_M = 0.001
 _ANGLE_MAX_DEG = 9.0
@@ -88,13 +93,19 @@ def _measure_size(points: int, trials: int) -> list[dict[str, Any]]:
         rng = np.random.default_rng([trial, 3])
         angle_deg = rng.uniform(0.0, _ANGLE_MAX_DEG)
         made = measured_alignment(rng, trial, angle_deg, _SIGMA_M, points)
-        peers = _small_gicp() | (_open3d() if points <= _MANY else {})
-        for name, register in (_own(made) | peers).items():
+        hand, cursor = (made.hand_m, made.hand_cut), (made.cursor_m, made.cursor_cut)
+        T_E_true = best_rigid(made.known_hand_m, made.known_cursor_m)
+        T_true = invert(made.T_E_W) @ T_E_true @ made.T_E_W
+        for name, register in (_own(made) | _best_libraries(points)).items():
             start_s = process_time()
-            T_cursor_hand = register(made)
+            T_cursor_hand = register(hand, cursor)
             times_ms.setdefault(name, []).append(1e3 * (process_time() - start_s))
-            if T_cursor_hand is not None:
-                errors.setdefault(name, []).append(_errors(T_cursor_hand, made))
+            if T_cursor_hand is None:
+                continue
+            mm, deg = _miss(T_cursor_hand, T_true, made.hand_m)
+            # A rotation alone says nothing of the place.
+            has_place = T_cursor_hand[:3, 3].any()
+            errors.setdefault(name, []).append((mm if has_place else np.nan, deg))
     rows: list[dict[str, Any]] = []
     for name, each_ms in times_ms.items():
         row: dict[str, Any] = {"method": name, "points": points}
@@ -106,113 +117,123 @@ def _measure_size(points: int, trials: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _errors(T_cursor_hand: Float64, made: SimulatedAlignment) -> tuple[float, float]:
-    """Return the errors of the centroid, mm, and of the rotation, degrees."""
-    T_true = invert(made.T_E_W) @ best_rigid(made.known_hand_m, made.known_cursor_m) @ made.T_E_W
-    middle_m = made.hand_m.mean(axis=0)[None]
-    away_m = transform(T_cursor_hand, middle_m) - transform(T_true, middle_m)
-    turned = Rotation.from_matrix(T_cursor_hand[:3, :3] @ T_true[:3, :3].T)
-    # A rotation alone says nothing of the place.
-    has_place = T_cursor_hand[:3, 3].any()
-    away_mm = 1e3 * float(np.linalg.norm(away_m)) if has_place else np.nan
-    return away_mm, float(np.degrees(turned.magnitude()))
-
-
-def _own(made: SimulatedAlignment) -> dict[str, RegisterAlignment]:
+def _own(alignment: SimulatedAlignment) -> dict[str, Register]:
     """Return handcal's registration, solver and guard; the guard has seen the hand move."""
-    guard = RotationGuard(made.cursor_m, made.cursor_cut)
-    middle_m = made.hand_m.mean(axis=0)
+    guard = RotationGuard(alignment.cursor_m, alignment.cursor_cut)
+    middle_m = alignment.hand_m.mean(axis=0)
     T_before = rigid([0.02, -0.01, 0.015], middle_m + np.array([0.004, -0.003, 0.005]))
-    guard.follow(transform(T_before, made.hand_m - middle_m), made.hand_cut)
+    guard.follow(transform(T_before, alignment.hand_m - middle_m), alignment.hand_cut)
 
-    def register(made: SimulatedAlignment) -> Float64:
-        clouds = made.cursor_m, made.hand_m, made.cursor_cut, made.hand_cut
-        return match_hands(*clouds).rigid.T_target_source
-
-    def solve(made: SimulatedAlignment) -> None:
+    def solve(hand: Cloud, cursor: Cloud) -> None:
         solve_eye_shift(
-            made.cursor_m,
-            made.hand_m,
-            display_distance_m=made.display_distance_m,
-            T_E_W=made.T_E_W,
-            cursor_cut=made.cursor_cut,
-            hand_cut=made.hand_cut,
-        )
-
-    def follow(made: SimulatedAlignment) -> Float64:
-        return rigid(-guard.follow(made.hand_m, made.hand_cut))
-
-    return {"handcal": register, _SOLVE: solve, _FOLLOW: follow}
-
-
-def _small_gicp() -> dict[str, RegisterAlignment]:
-    def align(kind: str, cube_m: float) -> RegisterAlignment:
-        return lambda made: (
-            small_gicp.align(
-                made.cursor_m,
-                made.hand_m,
-                _start(made),
-                registration_type=kind,
-                voxel_resolution=0.01,
-                downsampling_resolution=cube_m,
-                max_correspondence_distance=_REACH_M,
-                num_threads=1,
-                max_iterations=_ITERATIONS,
-            ).T_target_source
+            cursor[0],
+            hand[0],
+            display_distance_m=alignment.display_distance_m,
+            T_E_W=alignment.T_E_W,
+            cursor_cut=cursor[1],
+            hand_cut=hand[1],
         )
 
     return {
-        _BEST: align("GICP", 0.005),
-        "small_gicp GICP, 3 mm": align("GICP", 0.003),
-        "small_gicp VGICP, 5 mm": align("VGICP", 0.005),
+        "handcal": _handcal,
+        _SOLVE: solve,
+        _FOLLOW: lambda hand, _: rigid(-guard.follow(*hand)),
     }
 
 
-def _open3d() -> dict[str, RegisterAlignment]:
-    """Return Open3D's registrations with normals and a sharp end; none if it is not installed."""
+def _best_libraries(points: int) -> dict[str, Register]:
+    """Return the libraries at their best settings; without Open3D if it is not installed."""
+    peers = {
+        name: partial(_small_gicp, kind=kind, cube_m=cube_m)
+        for name, kind, cube_m in (
+            (_BEST, "GICP", 0.005),
+            ("small_gicp GICP, 3 mm", "GICP", 0.003),
+            ("small_gicp VGICP, 5 mm", "VGICP", 0.005),
+        )
+    }
+    open3d = _import_open3d()
+    if open3d is None or points > _MANY:
+        return peers
+    icp = open3d.pipelines.registration
+    to_plane = icp.TransformationEstimationPointToPlane()
+    generalized = icp.TransformationEstimationForGeneralizedICP()
+    return peers | {
+        "Open3D point to plane": partial(_open3d_icp, icp.registration_icp, [(_REACH_M, to_plane)]),
+        "Open3D GICP": partial(
+            _open3d_icp, icp.registration_generalized_icp, [(_REACH_M, generalized)]
+        ),
+    }
+
+
+def _handcal(source: Cloud, target: Cloud) -> Float64:
+    return match_hands(target[0], source[0], target[1], source[1]).rigid.T_target_source
+
+
+def _small_gicp(
+    source: Cloud,
+    target: Cloud,
+    T: Float64 | None = None,
+    reach_m: float = _REACH_M,
+    cube_m: float = 0.005,
+    kind: str = "GICP",
+) -> Float64:
+    """Register by small_gicp; from coinciding means by default."""
+    found = small_gicp.align(
+        target[0],
+        source[0],
+        _means_together(source, target) if T is None else T,
+        registration_type=kind,
+        voxel_resolution=0.01,
+        downsampling_resolution=cube_m,
+        max_correspondence_distance=reach_m,
+        num_threads=1,
+        max_iterations=_ITERATIONS,
+    )
+    return np.asarray(found.T_target_source)
+
+
+def _import_open3d() -> Any:
+    """Return Open3D, or None if it is not installed."""
     try:
         import open3d
     except ImportError:
-        return {}
-    registration = open3d.pipelines.registration
-    sharp = registration.ICPConvergenceCriteria(1e-8, 1e-8, _ITERATIONS)
-    around = open3d.geometry.KDTreeSearchParamKNN(16)
-
-    def clouds(made: SimulatedAlignment) -> list[Any]:
-        found = []
-        for points_m in (made.hand_m, made.cursor_m):
-            cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points_m))
-            cloud.estimate_normals(around)
-            found.append(cloud)
-        return found
-
-    def to_plane(made: SimulatedAlignment) -> Float64:
-        kind = registration.TransformationEstimationPointToPlane()
-        found = registration.registration_icp(*clouds(made), _REACH_M, _start(made), kind, sharp)
-        return np.array(found.transformation)
-
-    def gicp(made: SimulatedAlignment) -> Float64:
-        kind = registration.TransformationEstimationForGeneralizedICP()
-        found = registration.registration_generalized_icp(
-            *clouds(made), _REACH_M, _start(made), kind, sharp
-        )
-        return np.array(found.transformation)
-
-    return {"Open3D point to plane": to_plane, "Open3D GICP": gicp}
+        return None
+    return open3d
 
 
-def _start(made: SimulatedAlignment) -> Float64:
-    return rigid(translation_m=made.cursor_m.mean(axis=0) - made.hand_m.mean(axis=0))
+def _open3d_icp(
+    algorithm: Callable[..., Any],
+    steps: Sequence[tuple[float, object]],
+    source: Cloud,
+    target: Cloud,
+) -> Float64:
+    """Register by Open3D with normals and a sharp end, in steps of a reach and an estimation."""
+    open3d = _import_open3d()
+    clouds = []
+    for points_m, _ in (source, target):
+        cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points_m))
+        cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(16))
+        clouds.append(cloud)
+    sharp = open3d.pipelines.registration.ICPConvergenceCriteria(1e-8, 1e-8, _ITERATIONS)
+    T = _means_together(source, target)
+    for reach_m, estimation in steps:
+        T = algorithm(*clouds, reach_m, T, estimation, sharp).transformation
+    return np.array(T)
+
+
+def _means_together(source: Cloud, target: Cloud) -> Float64:
+    return rigid(translation_m=target[0].mean(axis=0) - source[0].mean(axis=0))
+
+
+def _miss(T: Float64, T_true: Float64, source_m: Float64) -> tuple[float, float]:
+    """Return the errors of the centroid, mm, and of the rotation, degrees."""
+    middle_m = source_m.mean(axis=0)[None]
+    away_m = transform(T, middle_m) - transform(T_true, middle_m)
+    turned = Rotation.from_matrix(T[:3, :3] @ T_true[:3, :3].T)
+    return 1e3 * float(np.linalg.norm(away_m)), float(np.degrees(turned.magnitude()))
 
 
 # Registration of clouds with outliers or missing parts, beside robust libraries; opened hands.
-
-Cloud: TypeAlias = tuple[Float64, Bool]
-"""Points (N, 3) in the camera's frame, and which are beside a cut edge."""
-Spoil: TypeAlias = Callable[[np.random.Generator, Cloud, Float64], Cloud]
-"""Spoil a cloud, given the palm's centre and the arm's direction, (2, 3)."""
-Register: TypeAlias = Callable[[Cloud, Cloud], Float64]
-"""Return T_target_source of a source and a target."""
 
 _ANGLE_RAD, _AWAY_M = float(np.radians(3.0)), 0.02
 _FOREARM_M = 0.02, 0.06
@@ -221,7 +242,7 @@ _OUTLIERS, _FLYING, _FLYING_M, _BORDER = 0.05, 0.10, 0.06, 0.3
 _BORDER_LOST = "30 % lost at the border"
 _RIM_POINTS = 1500
 _BORDER_BAND_M = 0.003
-_FINE_REACH_M, _COARSE_CUBE_M, _CUBE_M, _FINE_CUBE_M = 0.006, 0.006, 0.005, 0.003
+_FINE_REACH_M, _COARSE_CUBE_M, _FINE_CUBE_M = 0.006, 0.006, 0.003
 _TUKEY_M = (0.05, 0.02), (0.03, 0.005)
 _FAILED_MM, _FAILED_DEG = 5.0, 5.0
 _MOST_RATIO = 1.5
@@ -233,7 +254,8 @@ def measure_spoiled_clouds(settings: BenchSettings, progress: Progress) -> Measu
     """Register spoiled clouds by handcal and by others; all start from coinciding means."""
     rows: list[dict[str, Any]] = []
     figures: list[BenchFigure] = []
-    registers = {"handcal": _handcal} | _peers()
+    libraries = _robust_libraries()
+    registers = {"handcal": _handcal} | libraries
     for number, (condition, spoils) in enumerate(_CONDITIONS.items()):
         errors: dict[str, list[tuple[float, float]]] = {name: [] for name in registers}
         for trial in range(settings.spoiled_pairs):
@@ -242,7 +264,7 @@ def measure_spoiled_clouds(settings: BenchSettings, progress: Progress) -> Measu
                 errors[name].append(_miss(register(source, target), T_true, source[0]))
         found = {name: _row(condition, name, each) for name, each in errors.items()}
         rows += found.values()
-        own, best = found["handcal"], min(found[name]["median_mm"] for name in _peers())
+        own, best = found["handcal"], min(found[name]["median_mm"] for name in libraries)
         ratio = own["median_mm"] / best
         figures.append(
             BenchFigure(f"{condition}: error / best library", ratio, "", at_most=_MOST_RATIO)
@@ -329,68 +351,25 @@ _CONDITIONS: Mapping[str, tuple[Spoil | None, Spoil | None]] = {
 }
 
 
-def _handcal(source: Cloud, target: Cloud) -> Float64:
-    return match_hands(target[0], source[0], target[1], source[1]).rigid.T_target_source
-
-
-def _peers() -> dict[str, Register]:
+def _robust_libraries() -> dict[str, Register]:
     """Return the libraries at settings for outliers; without Open3D if it is not installed."""
 
-    def gicp(source: Cloud, target: Cloud, T: Float64, reach_m: float, cube_m: float) -> Float64:
-        found = small_gicp.align(
-            target[0],
-            source[0],
-            T,
-            registration_type="GICP",
-            downsampling_resolution=cube_m,
-            max_correspondence_distance=reach_m,
-            num_threads=1,
-            max_iterations=100,
-        )
-        return np.asarray(found.T_target_source)
-
-    def once(source: Cloud, target: Cloud) -> Float64:
-        return gicp(source, target, _means_together(source, target), _REACH_M, _CUBE_M)
-
     def twice(source: Cloud, target: Cloud) -> Float64:
-        T = gicp(source, target, _means_together(source, target), _REACH_M, _COARSE_CUBE_M)
-        return gicp(source, target, T, _FINE_REACH_M, _FINE_CUBE_M)
+        T = _small_gicp(source, target, cube_m=_COARSE_CUBE_M)
+        return _small_gicp(source, target, T, _FINE_REACH_M, _FINE_CUBE_M)
 
-    peers: dict[str, Register] = {"small_gicp, 5 mm": once, "small_gicp, 6 then 3 mm": twice}
-    try:
-        import open3d
-    except ImportError:
+    peers: dict[str, Register] = {"small_gicp, 5 mm": _small_gicp, "small_gicp, 6 then 3 mm": twice}
+    open3d = _import_open3d()
+    if open3d is None:
         return peers
-    registration = open3d.pipelines.registration
-
-    def tukey(source: Cloud, target: Cloud) -> Float64:
-        clouds = []
-        for points_m, _ in (source, target):
-            cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points_m))
-            cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(16))
-            clouds.append(cloud)
-        T = _means_together(source, target)
-        sharp = registration.ICPConvergenceCriteria(1e-8, 1e-8, 100)
-        for reach_m, width_m in _TUKEY_M:
-            kind = registration.TransformationEstimationPointToPlane(
-                registration.TukeyLoss(k=width_m)
-            )
-            T = registration.registration_icp(*clouds, reach_m, T, kind, sharp).transformation
-        return np.array(T)
-
-    return peers | {"Open3D point to plane, Tukey": tukey}
-
-
-def _means_together(source: Cloud, target: Cloud) -> Float64:
-    return rigid(translation_m=target[0].mean(axis=0) - source[0].mean(axis=0))
-
-
-def _miss(T: Float64, T_true: Float64, source_m: Float64) -> tuple[float, float]:
-    """Return the errors of the centroid, mm, and of the rotation, degrees."""
-    middle_m = source_m.mean(axis=0)[None]
-    away_m = transform(T, middle_m) - transform(T_true, middle_m)
-    turned = Rotation.from_matrix(T[:3, :3] @ T_true[:3, :3].T)
-    return 1e3 * float(np.linalg.norm(away_m)), float(np.degrees(turned.magnitude()))
+    icp = open3d.pipelines.registration
+    steps = [
+        (reach_m, icp.TransformationEstimationPointToPlane(icp.TukeyLoss(k=width_m)))
+        for reach_m, width_m in _TUKEY_M
+    ]
+    return peers | {
+        "Open3D point to plane, Tukey": partial(_open3d_icp, icp.registration_icp, steps)
+    }
 
 
 def _row(condition: str, name: str, errors: list[tuple[float, float]]) -> dict[str, Any]:
