@@ -33,8 +33,10 @@ from handcal.sim.raster import visible_points
 
 Cloud: TypeAlias = tuple[Float64, Bool]
 """Points (N, 3) in the camera's frame, and which are beside a cut edge."""
-Register: TypeAlias = Callable[[Cloud, Cloud], Float64 | None]
-"""Return T_target_source of a source and a target; None for what gives no movement."""
+Register: TypeAlias = Callable[[Cloud, Cloud], Float64]
+"""Return T_target_source of a source and a target."""
+Timed: TypeAlias = Callable[[Cloud, Cloud], Float64 | None]
+"""The same; None for what gives no movement."""
 Spoil: TypeAlias = Callable[[np.random.Generator, Cloud, Float64], Cloud]
 """Spoil a cloud, given the palm's centre and the arm's direction, (2, 3)."""
 
@@ -117,7 +119,7 @@ def _measure_size(points: int, trials: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _own(alignment: SimulatedAlignment) -> dict[str, Register]:
+def _own(alignment: SimulatedAlignment) -> dict[str, Timed]:
     """Return handcal's registration, solver and guard; the guard has seen the hand move."""
     guard = RotationGuard(alignment.cursor_m, alignment.cursor_cut)
     middle_m = alignment.hand_m.mean(axis=0)
@@ -141,9 +143,9 @@ def _own(alignment: SimulatedAlignment) -> dict[str, Register]:
     }
 
 
-def _best_libraries(points: int) -> dict[str, Register]:
+def _best_libraries(points: int) -> dict[str, Timed]:
     """Return the libraries at their best settings; without Open3D if it is not installed."""
-    peers = {
+    peers: dict[str, Timed] = {
         name: partial(_small_gicp, kind=kind, cube_m=cube_m)
         for name, kind, cube_m in (
             (_BEST, "GICP", 0.005),
