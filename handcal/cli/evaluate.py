@@ -120,42 +120,30 @@ def detector(arguments: argparse.Namespace) -> None:
 )
 def segmentation(arguments: argparse.Namespace) -> None:
     """Measure the segmentation of the hand on frames with true masks."""
-    from handcal.lab.evaluate.segmentation import run_segmentation_test
+    from handcal.lab.evaluate.segmentation import cell, frame_table, run_segmentation_test
     from handcal.lab.settings import SegmentationTestSettings
 
     with show_progress() as progress:
         settings = settings_of(SegmentationTestSettings, arguments)
         result = run_segmentation_test(settings, progress).figures
     save(arguments.json, result)
-    shown_table = table(
-        "frame", "IoU", "kept, %", "beyond wrist, mm", "area ±, %", "centroid ±, mm"
-    )
-    for row in result["rows"]:
-        shown_table.add_row(
-            row["name"],
-            _cell(row["iou"], 1, 3),
-            _cell(row["kept"], 100, 1),
-            _cell(row["beyond_wrist_mm"], 1, 1),
-            _cell(row["area_change"], 100, 1),
-            _cell(row["centroid_change_mm"], 1, 1),
-        )
+    frames = frame_table(result["rows"])
+    shown_table = table(*(column.title for column in frames.columns))
+    for cells in frames.rows:
+        shown_table.add_row(*cells)
     console.print(shown_table)
     for row in result["rows"]:
         if row["refused"] is not None:
             console.print(f"{row['name']}: {row['refused']}")
     console.print(
         f"{result['frames']} frames, {result['refused']} refused. "
-        f"IoU {_cell(result['iou_mean'], 1, 3)}, at least {_cell(result['iou_min'], 1, 3)}; "
-        f"at least {_cell(result['kept_min'], 100, 1)} % of the hand kept. Cut at the wrist: "
-        f"SD {_cell(result['wrist_sd_mm'], 1, 1)} mm, largest step "
-        f"{_cell(result['wrist_max_step_mm'], 1, 1)} mm. Area of cropped, scaled and sub-sampled "
-        f"frames: at most {_cell(result['area_change_max'], 100, 1)} % different; more than 10 % "
+        f"IoU {cell(result['iou_mean'], 1, 3)}, at least {cell(result['iou_min'], 1, 3)}; "
+        f"at least {cell(result['kept_min'], 100, 1)} % of the hand kept. Cut at the wrist: "
+        f"SD {cell(result['wrist_sd_mm'], 1, 1)} mm, largest step "
+        f"{cell(result['wrist_max_step_mm'], 1, 1)} mm. Area of cropped, scaled and sub-sampled "
+        f"frames: at most {cell(result['area_change_max'], 100, 1)} % different; more than 10 % "
         f"in {result['area_changes_over_10_percent']} frames."
     )
-
-
-def _cell(value: float | None, scale: float, digits: int) -> str:
-    return "–" if value is None else f"{scale * value:.{digits}f}"
 
 
 @command(

@@ -133,6 +133,9 @@ def _area(boxes: Tensor) -> Tensor:
 
 
 _CHECKPOINT = "checkpoint.pt"
+_BACKBONE_RATE = 3e-4  # peak learning rate of the pretrained layers
+_RISE = 0.03  # first share of the steps, over which rates rise
+_GRADIENT_MAX = 10.0  # norm to which longer gradients are clipped
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,14 +146,10 @@ class TrainSettings:
     steps: int = 60_000
     batch: int = 4
     rate: float = 1e-3
-    backbone_rate: float = 3e-4
-    """Peak learning rates of AdamW for the new and the pretrained layers; they rise over the first
-    share `rise` of the steps and fall linearly to 0 over the last share `fall`."""
-    rise: float = 0.03
+    """Peak learning rate of AdamW for the new layers; rates rise over the first steps and fall
+    linearly to 0 over the last share `fall`."""
     fall: float = 0.8
     weight_decay: float = 0.03
-    gradient_max: float = 10.0
-    """Norm to which longer gradients are clipped."""
     average: float = 0.998
     """Decay per step of the running mean of the weights, which is evaluated."""
     settled: int = 300
@@ -274,7 +273,7 @@ class Training:
         score_loss, box_loss = detection_loss(raw.float(), hands, grid)
         self._optimizer.zero_grad()
         (score_loss + box_loss).backward()  # type: ignore[no-untyped-call]
-        nn.utils.clip_grad_norm_(self._net.parameters(), self._settings.gradient_max)
+        nn.utils.clip_grad_norm_(self._net.parameters(), _GRADIENT_MAX)
         self._optimizer.step()
         self._average.update_parameters(self._net)
         self._step += 1
@@ -290,7 +289,7 @@ class Training:
     def _set_rates(self) -> None:
         settings = self._settings
         done = (self._step + 1) / settings.steps
-        factor = min(1.0, done / settings.rise, (1.0 - done) / settings.fall + 1e-3)
+        factor = min(1.0, done / _RISE, (1.0 - done) / settings.fall + 1e-3)
         for group in self._optimizer.param_groups:
             group["lr"] = factor * group["highest"]
 
@@ -355,7 +354,7 @@ def split(photos: Sequence[Photo], validated: float) -> tuple[list[Photo], list[
 def _groups(net: HandNet, settings: TrainSettings) -> list[dict[str, Any]]:
     """Return all parameters with their peak rates; biases and scales do not decay."""
     groups = []
-    for pretrained, rate in ((True, settings.backbone_rate), (False, settings.rate)):
+    for pretrained, rate in ((True, _BACKBONE_RATE), (False, settings.rate)):
         named = [
             parameter
             for name, parameter in net.named_parameters()

@@ -18,6 +18,14 @@ from handcal.io.files import read_json
 from handcal.io.images import read_image
 from handcal.lab.evaluate.annotations import Photo
 
+# Side of a square with as many pixels as the detector's input.
+_WHOLE_PX = 332.0
+# Share of the crops around a hand that are centred on it. The others show any part of the
+# photograph at the same scale: faces, arms and other objects.
+_CENTERED = 0.72
+_ZOOM_MAX = 4.0  # largest enlargement of a photograph
+# Relative probability of photographs in which a hand fills 15 % or more.
+_LARGE_WEIGHT = 2.0
 _SHOWN_MIN = 0.35
 _SMALLEST_PX = 9.0
 _GRAY = (127, 127, 127)
@@ -35,18 +43,9 @@ class SampleSettings:
 
     side_px: int = 288
     """Side of the square crops; a multiple of the largest stride."""
-    whole_px: float = 332.0
-    """Side of a square with as many pixels as the detector's input."""
     zoomed: float = 0.5
     """Share of crops scaled so that one hand fills 12–85 % of the side, like a wearer's; the others
     have about the scale of the detector's input."""
-    centered: float = 0.72
-    """Share of these crops centred on that hand. The others show any part of the photograph at the
-    same scale: faces, arms and other objects."""
-    zoom_max: float = 4.0
-    """Largest enlargement of a photograph."""
-    large_weight: float = 2.0
-    """Relative probability of photographs in which a hand fills 15 % or more."""
     simulated: float = 0.1
     pasted: float = 0.08
     """Shares of simulated images, and of photographs with a simulated hand."""
@@ -80,7 +79,7 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         self._seed = seed
         weights = np.array(
             [
-                settings.large_weight if photo.relative_sizes.max(initial=0.0) >= 0.15 else 1.0
+                _LARGE_WEIGHT if photo.relative_sizes.max(initial=0.0) >= 0.15 else 1.0
                 for photo in photos
             ]
         )
@@ -115,15 +114,15 @@ class Samples(Dataset[tuple[UInt8, Float32]]):
         """Select a part of a photograph: around one of its hands, or anywhere."""
         settings = self._settings
         image_px = np.sqrt(photo.width * photo.height)
-        scale = settings.whole_px / image_px * np.exp(rng.uniform(np.log(0.75), np.log(1.5)))
+        scale = _WHOLE_PX / image_px * np.exp(rng.uniform(np.log(0.75), np.log(1.5)))
         center = rng.uniform(0.0, 1.0, 2) * (photo.width, photo.height)
         if len(photo.boxes):
             sizes = photo.relative_sizes
             hand = rng.choice(len(sizes), p=sizes / sizes.sum())
             if rng.random() < settings.zoomed:
                 wanted_px = settings.side_px * np.exp(rng.uniform(np.log(0.12), np.log(0.85)))
-                scale = min(wanted_px / (sizes[hand] * image_px), settings.zoom_max)
-            if rng.random() < settings.centered:
+                scale = min(wanted_px / (sizes[hand] * image_px), _ZOOM_MAX)
+            if rng.random() < _CENTERED:
                 center = (photo.boxes[hand, :2] + photo.boxes[hand, 2:]) / 2
         size_px = photo.width, photo.height
         return random_warp(rng, size_px, center, scale, settings.side_px, _PHOTO_TURN_RAD)

@@ -19,7 +19,7 @@ from handcal.core.errors import FileError, HandcalError
 from handcal.core.frozen import freeze
 from handcal.core.geometry import camera_matrix, transform
 from handcal.core.progress import Progress
-from handcal.core.types import Float64, Intrinsics, Rig, UInt8
+from handcal.core.types import Float64, Intrinsics, Rig
 from handcal.export.figures import name_axes
 from handcal.io.files import user_path
 from handcal.io.images import read_grey
@@ -106,10 +106,10 @@ def judge_captures(
                 name = f"{position}/{pose.pose}"
                 progress.at(poses.index(pose) / len(poses), f"Looking at {name}")
                 with _noted(left_out, f"{name}/{pose.real.name}"):
-                    real_px = find_cube(warp.warp(_read(pose.real)), cube)
+                    real_px = find_cube(warp.warp(read_grey(pose.real)), cube)
                     for drawn, path in pose.virtual.items():
                         with _noted(left_out, f"{name}/{path.name}"):
-                            virtual_px = find_cube(warp.warp(_read(path)), cube)
+                            virtual_px = find_cube(warp.warp(read_grey(path)), cube)
                             errors = cube_row(compare_cubes(real_px, virtual_px, cube, straight))
                             whose = {"position": position, "pose": pose.pose, "drawn": drawn}
                             rows.append(whose | errors)
@@ -135,7 +135,7 @@ def display_warp(position: Path, camera: Intrinsics, grid: Grid) -> RotationWarp
     if path is None:
         return None
     size = grid.width_px, grid.height_px
-    homography = fit_homography({GRID: find_grid(_read(path), grid)}, camera, *size)
+    homography = fit_homography({GRID: find_grid(read_grey(path), grid)}, camera, *size)
     return RotationWarp(camera, pose_before(homography, camera, *size)[0])
 
 
@@ -171,10 +171,6 @@ def _noted(left_out: dict[str, str], name: str) -> Iterator[None]:
         yield
     except _UNUSABLE as error:
         left_out[name] = str(error)
-
-
-def _read(path: Path) -> UInt8:
-    return read_grey(path)
 
 
 # Misalignment of a virtual cube and the real one in captures by the eye-replacement camera.

@@ -90,13 +90,12 @@ def _matches(result: ImageResult, counted: Bool) -> Float64:
     return hit
 
 
-def wilson(hits: int, trials: int) -> tuple[float, float]:
-    """Return the ends of Wilson's 95 % score interval of a share (1927); at least one trial."""
-    share, z = hits / trials, 1.96
-    widened = 1.0 + z**2 / trials
-    middle = (share + z**2 / (2 * trials)) / widened
-    half = z * math.sqrt(share * (1.0 - share) / trials + z**2 / (4 * trials**2)) / widened
-    return max(0.0, middle - half), min(1.0, middle + half)
+def _interval(hits: Sequence[bool]) -> tuple[float, float]:
+    """Return the ends of Wilson's 95 % score interval of a share (1927)."""
+    from scipy.stats import binomtest  # takes a second to import
+
+    interval = binomtest(sum(hits), len(hits)).proportion_ci(0.95, "wilson")
+    return float(interval.low), float(interval.high)
 
 
 # Conditions under which photographs are shown to a detector: light, size of the hand, gloves.
@@ -337,9 +336,7 @@ def found_shares(photos: Sequence[Photo], results: Sequence[ImageResult]) -> lis
         for group in {("", ""), (photo.skin, photo.aspect)}:
             groups.setdefault(group, []).extend((best >= MATCH_OVERLAP).tolist())
     return [
-        FoundShare(
-            *group, len(hits), sum(hits), sum(hits) / len(hits), *wilson(sum(hits), len(hits))
-        )
+        FoundShare(*group, len(hits), sum(hits), sum(hits) / len(hits), *_interval(hits))
         for group, hits in sorted(groups.items())
         if hits
     ]

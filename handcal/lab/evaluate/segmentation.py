@@ -280,18 +280,18 @@ def segmentation_report(figures: Mapping[str, Any], tiles: Sequence[UInt8]) -> R
     return Report(
         title="Test of the segmentation",
         subject=f"Frames: {figures['frames']}, refused: {figures['refused']}",
-        lead=f"Intersection over union with the true masks: {_cell(figures['iou_mean'], 1, 3)} on "
-        f"average, at least {_cell(figures['iou_min'], 1, 3)}. At least "
-        f"{_cell(figures['kept_min'], _PERCENT, 1)} % of the hand are kept. With crops, scale and "
-        f"sampling the area changes by up to {_cell(figures['area_change_max'], _PERCENT, 1)} %.",
+        lead=f"Intersection over union with the true masks: {cell(figures['iou_mean'], 1, 3)} on "
+        f"average, at least {cell(figures['iou_min'], 1, 3)}. At least "
+        f"{cell(figures['kept_min'], _PERCENT, 1)} % of the hand are kept. With crops, scale and "
+        f"sampling the area changes by up to {cell(figures['area_change_max'], _PERCENT, 1)} %.",
         sections=list(_sections(figures, tiles)),
     )
 
 
 def _sections(figures: Mapping[str, Any], tiles: Sequence[UInt8]) -> Iterator[Section]:
     wrist = {
-        "Wrist, standard deviation": f"{_cell(figures['wrist_sd_mm'], 1, 1)} mm",
-        "Wrist, largest step": f"{_cell(figures['wrist_max_step_mm'], 1, 1)} mm",
+        "Wrist, standard deviation": f"{cell(figures['wrist_sd_mm'], 1, 1)} mm",
+        "Wrist, largest step": f"{cell(figures['wrist_max_step_mm'], 1, 1)} mm",
         "Frames with a change of area over 10 %": str(figures["area_changes_over_10_percent"]),
     }
     yield Section("", [facts(made_with()), _METHOD, facts(wrist)])
@@ -299,7 +299,7 @@ def _sections(figures: Mapping[str, Any], tiles: Sequence[UInt8]) -> Iterator[Se
     figure = Figure(
         "frames", "Each frame that is not refused.", partial(_draw, rows), rows, columns=2
     )
-    yield Section("Frames", [figure, _table(rows)])
+    yield Section("Frames", [figure, frame_table(rows)])
     if refused := [(row["name"], row["refused"]) for row in rows if row["refused"] is not None]:
         yield Section("Refused", [Table((Column("frame", "left"), Column("why", "left")), refused)])
     yield Section("Pictures", list(_pictures(rows, tiles)), starts_page=True)
@@ -331,23 +331,25 @@ def _draw(rows: Sequence[Any], axes: Sequence[Axes]) -> None:
         name_axes(ax, title, "frame", label)
 
 
-def _table(rows: Sequence[Any]) -> Table:
+def frame_table(rows: Sequence[Any]) -> Table:
+    """Return the figures of each frame, as `evaluation` gives them under ``rows``."""
     titles = "IoU", "kept, %", "beyond wrist, mm", "area ±, %", "centroid ±, mm"
     cells = [
         [
             row["name"],
-            _cell(row["iou"], 1, 3),
-            _cell(row["kept"], _PERCENT, 1),
-            _cell(row["beyond_wrist_mm"], 1, 1),
-            _cell(row["area_change"], _PERCENT, 1),
-            _cell(row["centroid_change_mm"], 1, 1),
+            cell(row["iou"], 1, 3),
+            cell(row["kept"], _PERCENT, 1),
+            cell(row["beyond_wrist_mm"], 1, 1),
+            cell(row["area_change"], _PERCENT, 1),
+            cell(row["centroid_change_mm"], 1, 1),
         ]
         for row in rows
     ]
     return Table([Column("frame", "left"), *map(Column, titles)], cells)
 
 
-def _cell(value: float | None, scale: float, digits: int) -> str:
+def cell(value: float | None, scale: float, digits: int) -> str:
+    """Return a scaled number, or a dash if there is none."""
     return "–" if value is None else f"{scale * value:.{digits}f}"
 
 

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from scipy.optimize import brentq
 
-from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, eye_projection, target_corners_m
+from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, target_corners_m
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, project, transform
 from handcal.core.progress import Progress
@@ -202,9 +202,7 @@ def _meet(eyes_m: Sequence[Float64], rays: Sequence[Float64]) -> Float64:
 
 def rendered(wearer: StudyWearer, shift_m: Mapping[Eye, Float64]) -> Projections:
     """Return the rig's projections for given eye shifts φ, (3,) each."""
-    return {
-        eye: eye_projection(wearer.rig.eyes[eye], shift_m[eye]) @ wearer.T_E_H(eye) for eye in EYES
-    }
+    return {eye: wearer.projection(eye, shift_m[eye]) for eye in EYES}
 
 
 def _seconds(alignments: int, *, by_hand: bool = False) -> float:
@@ -281,11 +279,10 @@ def _spaam(pairs: Mapping[Eye, tuple[Float64, Mapping[Eye, Float64]]]) -> Projec
 def _indica(wearer: StudyWearer, rng: np.random.Generator, settings: MethodSettings) -> Projections:
     projections = {}
     for eye in EYES:
-        T_E_H, display = wearer.T_E_H(eye), wearer.rig.eyes[eye]
         tracked_E_m = wearer.true_shift_m[eye] + rng.normal(0.0, settings.eye_tracker_sigma_m)
-        tracked_m = transform(invert(T_E_H), tracked_E_m[None])[0]
-        offline = eye_projection(display) @ T_E_H
-        projections[eye] = solve_indica_recycled(offline, display.z_C0_S_m, tracked_m)
+        tracked_m = transform(invert(wearer.T_E_H(eye)), tracked_E_m[None])[0]
+        offline, distance_m = wearer.projection(eye, np.zeros(3)), wearer.rig.eyes[eye].z_C0_S_m
+        projections[eye] = solve_indica_recycled(offline, distance_m, tracked_m)
     return projections
 
 
