@@ -19,6 +19,7 @@ from handcal.cli.terminal import (
     folder_option,
     number,
     seed,
+    settings_of,
     value,
 )
 from handcal.core.types import Eye, VerdictName
@@ -47,7 +48,10 @@ _SHARE = number(float, 0.0, 1.0)
 _PORT = number(int, 1, 65535)
 _RIG = file_option("--rig", "rig file (default: the shipped example)")
 _HAND = arg(
-    "--hand", choices=("left", "right"), help="the raised hand (default: drawn from the seed)"
+    "--hand",
+    dest="side",
+    choices=("left", "right"),
+    help="the raised hand (default: drawn from the seed)",
 )
 _LINK = (
     value("--loss", _SHARE, "P", "share of datagrams lost", default=0.0),
@@ -68,7 +72,12 @@ _LINK = (
         help="the paper's alignments, or the recommended plan: cursors placed by the program, then "
         "a verification of each eye",
     ),
-    flag("--no-verify", "end the recommended plan without verifying the eyes"),
+    arg(
+        "--no-verify",
+        dest="verify",
+        action="store_false",
+        help="end the recommended plan without verifying the eyes",
+    ),
     arg(
         "--from",
         dest="former",
@@ -82,7 +91,12 @@ _LINK = (
     _RIG,
     file_option("--worn-rig", "true rig of the simulated headset (default: the same as --rig)"),
     *SENSOR_OPTIONS,
-    flag("--known-fat", "the rig knows how fat the camera's edges are, as from a depth check"),
+    arg(
+        "--known-fat",
+        dest="is_fat_known",
+        action="store_true",
+        help="the rig knows how fat the camera's edges are, as from a depth check",
+    ),
     arg(
         "--fault",
         choices=FAULTS,
@@ -102,24 +116,7 @@ def demo(arguments: argparse.Namespace) -> None:
     from handcal.core.types import EyeDistance
     from handcal.lab.demo import DemoSettings, run_demo
 
-    settings = DemoSettings(
-        seed=arguments.seed,
-        alignments=arguments.alignments,
-        eyes=arguments.eyes,
-        plan=arguments.plan,
-        verify=not arguments.no_verify,
-        former=str(arguments.former or ""),
-        slipped=arguments.slipped,
-        side=arguments.hand,
-        loss=arguments.loss,
-        reorder=arguments.reorder,
-        worn_rig=str(arguments.worn_rig or ""),
-        fault=arguments.fault or "",
-        eye_distance=arguments.eye_distance,
-        sensor=arguments.sensor,
-        fatten_px=arguments.fatten_px,
-        is_fat_known=arguments.known_fat,
-    )
+    settings = settings_of(DemoSettings, arguments)
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         rig = _rig_path(arguments.rig)
         result = run_demo(settings, rig, make_folder(arguments.output), progress)
@@ -157,7 +154,7 @@ def demo(arguments: argparse.Namespace) -> None:
 def _say_contradictions(result: dict[str, Any], settings: DemoSettings) -> None:
     """Say why there is no result, and end."""
     for reason in dict.fromkeys(found["reason"] for found in result["eyes"].values()):
-        console.print(f"contradicted: {reason}", markup=False)
+        console.print(f"contradicted: {reason}")
     _say_meaning(result, settings)
     sys.exit(_CONTRADICTED)
 
@@ -166,8 +163,8 @@ def _say_meaning(result: dict[str, Any], settings: DemoSettings) -> None:
     """Say what each verdict means and what to try next, and the session's folder."""
     verdicts = {eye: found["verdict"] for eye, found in result["eyes"].items()}
     for line in meanings(verdicts, settings, result["session"]):
-        console.print(line, markup=False)
-    console.print(f"Session: {result['session']}", markup=False)
+        console.print(line)
+    console.print(f"Session: {result['session']}")
 
 
 def meanings(
@@ -322,7 +319,7 @@ def headset(arguments: argparse.Namespace) -> None:
         loses_start=arguments.lose_start,
         steps_clock=arguments.step_clock,
         eye_distance_m=arguments.eye_distance_mm and arguments.eye_distance_mm / 1e3,
-        side=arguments.hand,
+        side=arguments.side,
         wearer=WearerSettings(slip_m=(x_mm / 1e3, y_mm / 1e3, z_mm / 1e3)),
         has_wearer=not arguments.as_device,
     )

@@ -20,7 +20,8 @@ import pytest
 from handcal.core.progress import Progress
 from handcal.core.types import Alignment
 from handcal.io.resources import resource_path
-from handcal.lab import bench
+from handcal.lab.bench import run as bench
+from handcal.lab.bench.trials import QUICK
 from handcal.link.pairing import KEY_VARIABLE
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
@@ -56,7 +57,7 @@ def test_bench_shows_and_saves_its_figures(
 
     def pretend(settings: object, progress: Progress, only: str) -> dict[str, Any]:
         progress.at(0.5, "speed")
-        return {"figures": [figure], "quick": settings == bench.QUICK and not only}
+        return {"figures": [figure], "quick": settings == QUICK and not only}
 
     monkeypatch.setattr(bench, "run_bench", pretend)
     handcal("bench", "--quick", "--json", tmp_path / "bench.json")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handcal.cli.replay import replay
+from handcal.cli.recordings import replayed
 from handcal.core.errors import CameraEndError, CameraTimeoutError
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Float64, Frame, Intrinsics
@@ -72,7 +72,7 @@ def test_motion_of_the_hand_is_reported_across_frames_without_one(hand: HandMode
     turned = T_0.copy()
     turned[:3, :3] = Rotation.from_rotvec(TURN_RAD).as_matrix() @ T_0[:3, :3]
     turned[:3, 3] += SHIFT_M
-    steps = list(replay(FrameList([first, empty, look_at(hand, turned, 3)]), SegmentSettings()))
+    steps = list(replayed(FrameList([first, empty, look_at(hand, turned, 3)]), SegmentSettings()))
     assert [step.frame.index for step in steps] == [1, 2, 3]
     assert [step.hand is None for step in steps] == [False, True, False]
     assert [step.problem.startswith("no hand-sized") for step in steps] == [False, True, False]
@@ -87,11 +87,11 @@ def test_motion_of_the_hand_is_reported_across_frames_without_one(hand: HandMode
 
 def test_a_hand_wholly_beside_cut_edges_does_not_end_the_replay(hand: HandModel) -> None:
     frames = [look_at(hand, T_0, index) for index in (1, 2)]
-    steps = list(replay(FrameList(frames), SegmentSettings(cut_band_m=0.3)))
+    steps = list(replayed(FrameList(frames), SegmentSettings(cut_band_m=0.3)))
     assert [step.hand for step in steps] == [None, None]
     assert all("beside cut edges" in step.problem for step in steps)
 
 
 def test_failing_camera_is_not_taken_for_the_end() -> None:
     with pytest.raises(CameraTimeoutError):
-        list(replay(DeadCamera([]), SegmentSettings()))
+        list(replayed(DeadCamera([]), SegmentSettings()))

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handcal.cli.segmentation_file import draw_overlay, write_segmentation
+from handcal.cli.recordings import draw_overlay, write_segmentation
 from handcal.core.errors import FileError
 from handcal.core.geometry import rigid
 from handcal.core.types import Frame, HandCloud, Intrinsics

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handcal.train.augment import (
+from handcal.train.samples import (
     blemish,
     box_corners,
     clipped,

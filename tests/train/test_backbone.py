@@ -10,8 +10,7 @@ import torch
 from torch.nn import functional
 
 from handcal.core.errors import FileError
-from handcal.train.backbone import load_backbone
-from handcal.train.model import HandNet
+from handcal.train.model import HandNet, load_backbone
 
 EPSILON = 0.001
 # Channels in and out of MobileNetV1's blocks.

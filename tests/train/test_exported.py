@@ -9,8 +9,7 @@ import torch
 from handcal.core.errors import FileError
 from handcal.core.types import UInt8
 from handcal.io.resources import resource_path
-from handcal.train.exported import load_exported
-from handcal.train.model import HandNet
+from handcal.train.model import HandNet, load_exported
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from handcal.core.types import Float32
 from handcal.hand.detect import points
-from handcal.train.loss import Grid, detection_loss
+from handcal.train.loop import Grid, detection_loss
 
 PLACES, STRIDES = points(64, 64)
 GRID = Grid(torch.tensor(PLACES), torch.tensor(STRIDES))

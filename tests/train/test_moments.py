@@ -3,8 +3,7 @@ import pytest
 pytest.importorskip("torch")
 import torch
 
-from handcal.train.model import HandNet
-from handcal.train.moments import take_moments
+from handcal.train.model import HandNet, take_moments
 
 
 @pytest.fixture(scope="module")

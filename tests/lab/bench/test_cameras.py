@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from handcal.core.progress import Progress
-from handcal.lab.bench import QUICK
-from handcal.lab.bench.cameras import measure_cameras
+from handcal.lab.bench.accuracy import measure_cameras
+from handcal.lab.bench.trials import QUICK
 
 
 def test_each_camera_calibrates_the_same_wearer() -> None:

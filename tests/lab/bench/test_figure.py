@@ -1,6 +1,6 @@
 import pytest
 
-from handcal.lab.bench.figure import BenchFigure
+from handcal.lab.bench.trials import BenchFigure
 
 
 @pytest.mark.parametrize(

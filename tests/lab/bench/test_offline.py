@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from handcal.core.types import Intrinsics
-from handcal.lab.bench.offline import OfflineRun, OfflineSettings, calibrate_from_photographs
+from handcal.lab.bench.accuracy import OfflineRun, OfflineSettings, calibrate_from_photographs
 from handcal.rig.compare import compare_rigs
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig, write_rig

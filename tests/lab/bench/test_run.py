@@ -4,7 +4,8 @@ from typing import Any
 import pytest
 
 from handcal.core.progress import Progress
-from handcal.lab.bench import QUICK, bench_table, run_bench
+from handcal.lab.bench.run import bench_table, run_bench
+from handcal.lab.bench.trials import QUICK
 
 
 @pytest.fixture(scope="module")

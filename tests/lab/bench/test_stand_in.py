@@ -9,7 +9,7 @@ import pytest
 
 from handcal.core.geometry import rigid
 from handcal.core.progress import Progress
-from handcal.lab.bench.stand_in import ratio_of_means, reprojection_of_wearers
+from handcal.lab.bench.accuracy import ratio_of_means, reprojection_of_wearers
 from handcal.rig.example import example_rig
 
 

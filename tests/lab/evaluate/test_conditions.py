@@ -6,7 +6,7 @@ import pytest
 
 from handcal.core.errors import HandcalError
 from handcal.lab.evaluate.annotations import Photo
-from handcal.lab.evaluate.conditions import Conditions, shown
+from handcal.lab.evaluate.detector import Conditions, shown
 
 BOX = [30.0, 20.0, 70.0, 60.0]
 

@@ -10,12 +10,7 @@ from handcal.core.errors import CameraEndError, CancelledError
 from handcal.core.geometry import rigid
 from handcal.core.types import Intrinsics, UInt8
 from handcal.io.images import write_png
-from handcal.lab.evaluate.cube_capture import (
-    RestWatch,
-    keep_capture,
-    take_at_rest,
-    take_captures,
-)
+from handcal.lab.evaluate.cube_capture import RestWatch, keep_capture, take_at_rest, take_captures
 from handcal.lab.evaluate.cube_folder import (
     CapturePlan,
     PlannedCapture,

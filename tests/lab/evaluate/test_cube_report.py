@@ -2,10 +2,13 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from handcal.core.types import Intrinsics
-from handcal.lab.evaluate.cube import CubeMisalignment
-from handcal.lab.evaluate.cube_report import cube_report
-from handcal.lab.evaluate.cube_summary import cube_summary
-from handcal.lab.evaluate.cube_test import CubeTest, cube_row
+from handcal.lab.evaluate.cube_test import (
+    CubeMisalignment,
+    CubeTest,
+    cube_report,
+    cube_row,
+    cube_summary,
+)
 from handcal.report.document import Table
 from handcal.report.html import draw_figure
 from handcal.rig.cube import Cube

@@ -1,7 +1,6 @@
 import pytest
 
-from handcal.lab.evaluate.cube_summary import cube_summary
-from handcal.lab.evaluate.cube_test import CubeRow
+from handcal.lab.evaluate.cube_test import CubeRow, cube_summary
 
 
 def row(position: str, drawn: str, error_mm: float) -> CubeRow:

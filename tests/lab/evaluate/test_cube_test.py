@@ -15,8 +15,7 @@ from handcal.core.progress import Progress
 from handcal.core.types import Float64, Intrinsics
 from handcal.io.files import make_folder
 from handcal.io.images import write_png
-from handcal.lab.evaluate.cube import CubeMisalignment
-from handcal.lab.evaluate.cube_test import cube_row, display_warp, judge_captures
+from handcal.lab.evaluate.cube_test import CubeMisalignment, cube_row, display_warp, judge_captures
 from handcal.rig.cube import Cube, find_cube, marker_corners_m
 from handcal.rig.displays.grid import Grid, draw_grid
 from handcal.rig.displays.homography import RotationWarp

@@ -10,10 +10,16 @@ from handcal.core.progress import Progress
 from handcal.core.types import Float64, UInt8
 from handcal.hand.detect import Detections
 from handcal.lab.evaluate.annotations import Photo
-from handcal.lab.evaluate.conditions import Conditions
-from handcal.lab.evaluate.contact_sheet import contact_sheet, write_contact_sheet
-from handcal.lab.evaluate.detector import detect_all, evaluation, found_shares, summary
-from handcal.lab.evaluate.precision import ImageResult
+from handcal.lab.evaluate.detector import (
+    Conditions,
+    ImageResult,
+    contact_sheet,
+    detect_all,
+    evaluation,
+    found_shares,
+    summary,
+    write_contact_sheet,
+)
 
 SMALL, LARGE = [10.0, 10.0, 20.0, 20.0], [30.0, 20.0, 70.0, 60.0]
 

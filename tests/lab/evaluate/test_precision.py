@@ -3,7 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from handcal.lab.evaluate.precision import ImageResult, PrecisionRecall, precision_recall, wilson
+from handcal.lab.evaluate.detector import ImageResult, PrecisionRecall, precision_recall, wilson
 
 HAND = [0.0, 0.0, 10.0, 10.0]
 OTHER = [50.0, 50.0, 70.0, 70.0]

@@ -12,7 +12,8 @@ from handcal.core.errors import CancelledError, FileError, HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, Rig
 from handcal.io.images import write_png
-from handcal.lab.evaluate.run import run_cube_test, run_user_test
+from handcal.lab.evaluate.cube_test import run_cube_test
+from handcal.lab.evaluate.user_test import run_user_test
 from handcal.lab.settings import CubeTestSettings, NoiseStudySettings, UserTestSettings
 from handcal.lab.study.studies import run_noise_study
 from handcal.rig.cube import Cube, write_cube
@@ -124,7 +125,7 @@ def test_a_cube_test_without_captures_renders_them(
         progress.at(0.5, "Rendering centre, pose 1")
         raise FileError("no space left")
 
-    monkeypatch.setattr("handcal.lab.evaluate.run.write_captures", render)
+    monkeypatch.setattr("handcal.lab.evaluate.cube_test.write_captures", render)
     settings = CubeTestSettings(
         eye="right", seed=4, poses=2, alignments=3, output=str(tmp_path / "out")
     )

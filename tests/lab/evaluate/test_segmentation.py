@@ -29,8 +29,7 @@ from handcal.lab.evaluate.masked_frames import (
     scaled,
     subsampled,
 )
-from handcal.lab.evaluate.run import run_segmentation_test
-from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation
+from handcal.lab.evaluate.segmentation import evaluate_frame, evaluation, run_segmentation_test
 from handcal.lab.settings import SegmentationTestSettings
 from handcal.sim.camera import simulated_frame
 

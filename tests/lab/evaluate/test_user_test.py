@@ -15,9 +15,13 @@ from handcal.cli.main import main
 from handcal.core.display import TARGET_DEPTHS_M
 from handcal.core.errors import FileError
 from handcal.core.types import EYES, Float64
-from handcal.lab.evaluate.user_test import UserTest, evaluate_user_test, read_user_test
-from handcal.lab.evaluate.user_test_figures import draw_wearers
-from handcal.lab.evaluate.user_test_report import user_test_report
+from handcal.lab.evaluate.user_test import (
+    UserTest,
+    draw_wearers,
+    evaluate_user_test,
+    read_user_test,
+    user_test_report,
+)
 from handcal.report.cells import median_quartiles
 from handcal.report.document import Table
 from handcal.report.statistics import mean_interval

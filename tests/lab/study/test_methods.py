@@ -7,14 +7,16 @@ from handcal.core.errors import HandcalError
 from handcal.core.geometry import project
 from handcal.core.progress import Progress
 from handcal.core.types import EYES
-from handcal.lab.methods.spaam import solve_spaam
-from handcal.lab.study import wearer_noise
+from handcal.lab.methods import solve_spaam
+from handcal.lab.study import methods
 from handcal.lab.study.methods import (
     HANDCAL_EACH,
     PAPER,
+    PAPER_MEAN_ARCMIN,
     MethodCalibration,
     MethodSettings,
     compare_methods,
+    fit_noise,
     method_rows,
     methods_study,
     rendered,
@@ -24,7 +26,6 @@ from handcal.lab.study.methods import (
 from handcal.lab.study.methods_report import ARCMIN_COLUMNS, methods_report, predicted_cost_arcmin
 from handcal.lab.study.run import Case
 from handcal.lab.study.store import StudyRow
-from handcal.lab.study.wearer_noise import PAPER_MEAN_ARCMIN, fit_noise
 from handcal.lab.study.wearers import align_cube, align_points
 
 ERRORLESS = MethodSettings(
@@ -157,7 +158,7 @@ def test_the_noise_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
         published = np.array([5.0 + 4.0 * settings.noise_scale + wearer])
         return {"paper": published, "paper, best iterate": published - 4.0}
 
-    monkeypatch.setattr(wearer_noise, "_errors_arcmin", grows)
+    monkeypatch.setattr(methods, "_errors_arcmin", grows)
     told: list[str] = []
     found = fit_noise(MethodSettings(), 3, Progress(lambda what, _share: told.append(what)))
     assert found.scale == pytest.approx((PAPER_MEAN_ARCMIN - 6.0) / 4.0, abs=0.02)
@@ -172,7 +173,7 @@ def test_the_noise_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_noise_that_cannot_explain_the_paper_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wearer_noise, "_errors_arcmin", lambda *_: {"paper": np.array([20.0])})
+    monkeypatch.setattr(methods, "_errors_arcmin", lambda *_: {"paper": np.array([20.0])})
     with pytest.raises(HandcalError, match=r"no noise gives the paper's 10.79′ \(20.0′ at 0"):
         fit_noise(MethodSettings(), 2)
 

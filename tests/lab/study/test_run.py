@@ -284,7 +284,7 @@ def test_a_study_without_cases_has_no_rows(tmp_path: Path) -> None:
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere", "tcp://nowhere.invalid:1"])
 def test_no_cluster_there(tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("handcal.lab.study.workers._CONNECT_S", 0.2)
+    monkeypatch.setattr("handcal.lab.study.run._CONNECT_S", 0.2)
     with pytest.raises(HandcalError, match="no Dask scheduler answers"):
         run_study(make_study(), tmp_path, scheduler=address)
 

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from handcal.core.errors import HandcalError
-from handcal.lab.study.workers import OVERSUBSCRIBE, open_workers
+from handcal.lab.study.run import OVERSUBSCRIBE, open_workers
 
 
 def opened_workers(workers: int | None, monkeypatch: pytest.MonkeyPatch) -> list[int]:
@@ -20,7 +20,7 @@ def opened_workers(workers: int | None, monkeypatch: pytest.MonkeyPatch) -> list
             asked.append(workers)
             super().__init__(1)
 
-    monkeypatch.setattr("handcal.lab.study.workers.ProcessPoolExecutor", Pool)
+    monkeypatch.setattr("handcal.lab.study.run.ProcessPoolExecutor", Pool)
     with open_workers(workers, None) as executor:
         assert executor.submit(abs, -3).result() == 3
     return asked
