@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from handcal.calibration.hands import PlacedHand, RecentHands
-from handcal.calibration.hold import merge_hold
+from handcal.calibration.delay import DelayMeter
+from handcal.calibration.hands import PlacedHand, RecentHands, merge_hold
 from handcal.calibration.states import CalibrationSettings, Observation
-from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import INFORM_NS
 from handcal.core.display import view_of_eye
 from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError

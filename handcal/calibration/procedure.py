@@ -44,8 +44,7 @@ from handcal.calibration.aligning import (
 )
 from handcal.calibration.drawing import Drawing
 from handcal.calibration.evidence import Contradiction, Evidence
-from handcal.calibration.hands import PlacedHand
-from handcal.calibration.hold import merge_hold
+from handcal.calibration.hands import PlacedHand, merge_hold
 from handcal.calibration.sight import Sight
 from handcal.calibration.solve_again import solve_again, solve_contents
 from handcal.calibration.states import (

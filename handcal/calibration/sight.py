@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 
+from handcal.calibration.delay import DelayMeter
 from handcal.calibration.evidence import Contradiction, Evidence
 from handcal.calibration.hands import PlacedHand, RecentHands
 from handcal.calibration.states import CalibrationSettings, Observation, State
-from handcal.calibration.timing.delay import DelayMeter
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import HandError, PoseError
 from handcal.core.types import CameraIdentity, Frame, HandCloud, Rig

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from handcal.calibration.delay import DelaySettings
 from handcal.calibration.evidence import Contradiction
 from handcal.calibration.hands import PlacedHand
-from handcal.calibration.timing.delay import DelaySettings
 from handcal.core.errors import HandcalError
 from handcal.core.types import Float64, HandCloud
 from handcal.hand.settings import SegmentSettings

@@ -18,9 +18,9 @@ from typing import Any, Literal
 import numpy as np
 
 from handcal.calibration.evidence import Contradiction
-from handcal.calibration.former import SLIP_M
 from handcal.calibration.plan import PlanSettings, with_eyes
 from handcal.calibration.procedure import Calibration
+from handcal.calibration.solve_again import SLIP_M
 from handcal.calibration.states import Observation
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import HandcalError
@@ -49,7 +49,7 @@ from handcal.sim.sensor import (
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.faults import Fault
-from handcal.station.follow import Patience, deliver, follow_plan
+from handcal.station.run import Patience, deliver, follow_plan
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station

@@ -16,9 +16,9 @@ from handcal.link.invitation import Invitation
 from handcal.link.pairing import OFFER_S
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
+from handcal.station.checks.display_check import pattern_state, send_pattern
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.headset import headset_problem, headset_state
-from handcal.station.checks.pattern import pattern_state, send_pattern
 from handcal_gui.dialogs.paired_devices import PairedDevices
 from handcal_gui.engine.jobs import Job
 from handcal_gui.theme import SPACING_PX, number_font, scale_font

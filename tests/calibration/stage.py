@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from handcal.calibration.delay import DelaySettings
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import CalibrationSettings, Observation, State
-from handcal.calibration.timing.delay import DelaySettings
 from handcal.core.display import projection_matrix
 from handcal.core.errors import PoseError
 from handcal.core.geometry import rigid

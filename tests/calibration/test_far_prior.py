@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.calibration.former import Former
 from handcal.calibration.lab_prior import run_learn_prior
+from handcal.calibration.solve_again import Former
 from handcal.core.types import EYES, Verification
 from handcal.register.nudge import nudged_shift_m
 from handcal.register.prior import MIN_SESSIONS, PriorSettings, eye_prior
@@ -20,8 +20,8 @@ from handcal.register.wearers import MIN_PEOPLE, MIN_SITTINGS, learn_wearers
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.session.session import Session
-from handcal.station.opening import resume_or_create
 from handcal.station.settings import StationSettings
+from handcal.station.station import resume_or_create
 
 RIG = example_rig()
 NEAR_M = (0.0, 0.02, 0.45)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.calibration.former import SLIP_M, read_former
 from handcal.calibration.procedure import Calibration
+from handcal.calibration.solve_again import SLIP_M, read_former
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError
 from handcal.core.types import EYES, Eye, Float64, Verdict

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.calibration.hands import PlacedHand
-from handcal.calibration.hold import merge_hold
+from handcal.calibration.hands import PlacedHand, merge_hold
 from handcal.core.types import Float64
 from tests.calibration.test_hands import cloud
 

@@ -324,7 +324,7 @@ def studio(
 ) -> Iterator[Studio]:
     """Return the parts of a station to be opened with their settings and the pairing key `KEY`."""
     camera = Camera(frames)
-    monkeypatch.setattr("handcal.station.opening.RealSenseCamera", camera)
+    monkeypatch.setattr("handcal.station.station.RealSenseCamera", camera)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         address = probe.getsockname()

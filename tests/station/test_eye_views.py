@@ -12,9 +12,9 @@ from handcal.calibration.hands import PlacedHand
 from handcal.calibration.procedure import Calibration
 from handcal.core.types import EYES, HandCloud
 from handcal.rig.example import example_rig
-from handcal.station import eye_views
-from handcal.station.eye_views import EyeViews
+from handcal.station import wearer_view
 from handcal.station.settings import StationSettings
+from handcal.station.wearer_view import EyeViews
 
 FRAME_NS = 333_000_000
 
@@ -28,8 +28,8 @@ def hand_of(frame: int) -> PlacedHand:
 
 @pytest.fixture
 def views(monkeypatch: pytest.MonkeyPatch) -> EyeViews:
-    monkeypatch.setattr(eye_views, "_PERIOD_S", 0.0)
-    monkeypatch.setattr(eye_views, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    monkeypatch.setattr(wearer_view, "_PERIOD_S", 0.0)
+    monkeypatch.setattr(wearer_view, "time", SimpleNamespace(monotonic=lambda: 0.0))
     offline_m = {eye: np.zeros(3) for eye in EYES}
     calibration = SimpleNamespace(cursor=None, results=None, applied_shift_m=offline_m)
     rig, settings = example_rig(), StationSettings(source="realsense", headset="network")

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import handcal.station.opening
-from handcal.calibration.former import Former
+import handcal.station.station
+from handcal.calibration.delay import DelaySettings
 from handcal.calibration.plan import PlanSettings
+from handcal.calibration.solve_again import Former
 from handcal.calibration.states import CalibrationSettings, ProcedureError, State
-from handcal.calibration.timing.delay import DelaySettings
 from handcal.calibration.verifying import SKIPPED
 from handcal.core.errors import CameraError, FileError, LinkError
 from handcal.core.types import EYES, Alignment, Eye, Float64, Frame
@@ -35,10 +35,9 @@ from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.faults import Fault
-from handcal.station.opening import resume_or_create
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.station import Station
+from handcal.station.station import Station, resume_or_create
 from tests.helpers import Patience, eventually, slow_simulator, write_small_rig
 
 NAIVE_SEED = 3
@@ -277,7 +276,7 @@ class Unplugged(SyntheticCamera):
 def test_a_camera_that_comes_back_finds_the_session_as_it_was(
     settings: StationSettings, begun: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(handcal.station.opening, "SyntheticCamera", Unplugged)
+    monkeypatch.setattr(handcal.station.station, "SyntheticCamera", Unplugged)
     with Station(settings, resume=begun) as station:
         seen = step_until(station, "a frame", lambda s: s.frame is not None, PATIENCE_S)
         assert seen.camera.problem == ""

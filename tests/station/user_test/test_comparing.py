@@ -12,7 +12,7 @@ from handcal.core.types import Eye, Float64
 from handcal.rig.example import example_rig
 from handcal.session.comparison import Drawing, read_comparisons
 from handcal.session.session import Session
-from handcal.station.user_test.comparing import Comparing
+from handcal.station.user_test.trials import Comparing
 
 APPLIED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0]), "right": np.zeros(3)}
 

@@ -22,11 +22,12 @@ from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.wearer import draw_eyes, draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.user_test import cube_trials as user_test
-from handcal.station.user_test.cube_tracking import CubeTracker, run_cube_tracking
-from handcal.station.user_test.cube_trials import (
+from handcal.station.user_test import cube as user_test
+from handcal.station.user_test.cube import (
+    CubeTracker,
     TrialSettings,
     calibrated_shifts_m,
+    run_cube_tracking,
     run_user_trials,
 )
 from tests.helpers import ROOT

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from handcal.calibration.delay import DelayMeter, DelaySettings
 from handcal.calibration.hands import PlacedHand
-from handcal.calibration.timing.delay import DelayMeter, DelaySettings
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import PoseError, PosePendingError
 from handcal.core.geometry import rigid
