@@ -17,7 +17,7 @@ from handcal.core.errors import FileError
 from handcal.core.types import EyePlan
 from handcal.export.export import ExportSettings
 from handcal.io.files import make_folder, read_json, write_json
-from handcal.io.settings import read_settings, settings_json
+from handcal.io.settings import known_settings, read_settings, settings_json
 from handcal.link.pairing import Pairings
 from handcal.station.settings import StationSettings
 from handcal_gui.evaluation_entries import EvaluationEntries
@@ -107,6 +107,8 @@ class PreferencesFile:
                 raise FileError(
                     f"preferences.version is {version!r:.40}, not {PREFERENCES_VERSION}"
                 )
+            if "station" in data:
+                data["station"] = known_settings(StationSettings, data["station"])
             return read_settings(Preferences, data, "preferences"), ""
         except FileError as error:
             bad = self.path.with_name(f"{self.path.name}.bad")

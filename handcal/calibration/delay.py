@@ -310,7 +310,6 @@ _KEPT_FRAMES = 450
 _EVERY_NS, _EVERY_KNOWN_NS = 400_000_000, 5_000_000_000
 """Time between two measurements."""
 _EVERY_FRAME_KNOWN = 3
-_SLOW_S = 0.3
 _LONGEST_NS = 2_000_000_000
 """A frame that arrives later than this, or before its exposure, is of another clock."""
 _CARRY_NS = 50_000_000
@@ -318,21 +317,17 @@ _PLAIN_NS = 10_000_000_000
 """A background that could not be followed for this time is taken to have too little texture."""
 
 
-@dataclass(frozen=True, slots=True)
-class DelaySettings:
-    """Limits of the delay of the camera's pictures."""
-
-    sigma_s: float = 0.008
-    """The delay is known if its standard deviation is at most this."""
-    limit_s: float = 0.12
-    limit_frames: float = 0.15
-    """Largest time from the exposure to the earliest arrival: the sum of both. A busy computer,
-    with few frames per second, is late by a share of the time between two frames, at most 0.3 s of
-    which counts."""
-    assumed_sigma_s: float = 0.03
-    """Standard deviation of a delay that is not measured."""
-    moved_limit_m: float = 0.0015
-    """Largest standard deviation of a hand's place because of the times."""
+ASSUMED_LATENCY_S, ASSUMED_SIGMA_S = 0.03, 0.03
+"""Shortest time from a frame's exposure to its arrival, until it is measured, and its standard
+deviation."""
+_KNOWN_SIGMA_S = 0.008
+"""The delay is known if its standard deviation is at most this."""
+_LIMIT_S, _LIMIT_FRAMES, _SLOW_S = 0.12, 0.15, 0.3
+"""Largest time from the exposure to the earliest arrival: the first, and a share of the time
+between two frames, of which at most the last counts. A busy computer, with few frames per second,
+is late by such a share."""
+MOVED_LIMIT_M = 0.0015
+"""Largest standard deviation of a hand's place because of the times."""
 
 
 class DelayMeter:
@@ -345,7 +340,6 @@ class DelayMeter:
         Returns T_W_H (4, 4) at a host time, or raises PosePendingError or PoseError.
     T_H_D : (4, 4) float64
         From the depth camera to the headset.
-    settings : DelaySettings
     """
 
     def __init__(
@@ -353,19 +347,17 @@ class DelayMeter:
         clock: FrameClock,
         pose_at_host_ns: Callable[[int], Float64],
         T_H_D: Float64,
-        settings: DelaySettings,
     ) -> None:
         self._clock = clock
         self._pose_at_host_ns = pose_at_host_ns
         self._T_H_D = T_H_D
-        self._settings = settings
         self._backgrounds: deque[Background] = deque()
         self._poses: deque[tuple[int, Float64]] = deque()
         self._next_pose_ns = self._next_ns = self._newest_ns = self._frames = 0
         self._looked_ns = -INFORM_NS
         self._followed_ns: int | None = None
         self._is_still = False
-        self._sigma_s = settings.assumed_sigma_s
+        self._sigma_s = ASSUMED_SIGMA_S
 
     @property
     def is_needed(self) -> bool:
@@ -389,7 +381,7 @@ class DelayMeter:
     def largest_delay_s(self) -> float:
         """Largest delay of a camera that is not late."""
         period_s = min(self._clock.period_s, _SLOW_S)
-        return self._settings.limit_s + self._settings.limit_frames * period_s
+        return _LIMIT_S + _LIMIT_FRAMES * period_s
 
     def see(self, frame: Frame) -> bool:
         """Look at a frame that the clock knows; return True if the delay has just become known."""
@@ -401,7 +393,7 @@ class DelayMeter:
         if not is_same_clock or frame.t_camera_ns < self._newest_ns:
             self._backgrounds.clear()
             self._clock.measured_ns = None
-            self._sigma_s = self._settings.assumed_sigma_s
+            self._sigma_s = ASSUMED_SIGMA_S
             self._next_ns, self._is_still, self._followed_ns = 0, False, None
             self._looked_ns = -INFORM_NS
         if frame.t_camera_ns == self._newest_ns:
@@ -428,7 +420,7 @@ class DelayMeter:
         found = measure_offset(
             self._backgrounds, times_ns, poses, self._T_H_D, self._clock.earliest_ns
         )
-        if found is not None and found.sigma_s <= self._settings.sigma_s:
+        if found is not None and found.sigma_s <= _KNOWN_SIGMA_S:
             self._clock.measured_ns = found.offset_ns
             self._sigma_s = found.sigma_s
             self._next_ns = frame.t_host_ns + _EVERY_KNOWN_NS

@@ -15,7 +15,11 @@ from handcal.core.types import Float64, HandCloud
 from handcal.register.rigid import RigidSettings, motion_covariance, register_rigid
 from handcal.register.surface import Surface, describe_surface, mean_point
 
-_KEEP_S = 1.0
+MATCH_NS = 150_000_000
+"""Largest time between a confirmation and the frame that is taken for it."""
+_STEADY_NS, _STEADY_M = 400_000_000, 0.005
+"""A hand is steady if it moved less than this, for this time."""
+_KEPT_NS = _STEADY_NS + 1_000_000_000
 """Placed hands are kept this long, so that a retransmitted confirmation still finds its frame."""
 _HOLD_M = 0.0015
 """Frames in which the hand is this near belong to one hold: not one that still moves, nor one that
@@ -59,22 +63,11 @@ class RecentHands:
         Returns T_W_H (4, 4) at a host time, or raises PosePendingError or PoseError.
     T_H_D : (4, 4) float64
         From the depth camera to the headset.
-    steady_s, steady_m : float
-        A hand is steady if it moved less than `steady_m` for `steady_s`.
     """
 
-    def __init__(
-        self,
-        pose_at_host_ns: Callable[[int], Float64],
-        T_H_D: Float64,
-        steady_s: float,
-        steady_m: float,
-    ) -> None:
+    def __init__(self, pose_at_host_ns: Callable[[int], Float64], T_H_D: Float64) -> None:
         self._pose_at_host_ns = pose_at_host_ns
         self._T_H_D = T_H_D
-        self._steady_ns = round(1e9 * steady_s)
-        self._steady_m = steady_m
-        self._keep_ns = round(1e9 * (steady_s + _KEEP_S))
         self._placed: deque[PlacedHand] = deque()
         self._unplaced: deque[tuple[HandCloud, int, Float64 | None]] = deque()
         self._missed: deque[tuple[int, HandError]] = deque()
@@ -117,23 +110,23 @@ class RecentHands:
             self._unplaced.popleft()
         return hand, problem
 
-    def newest(self, max_age_s: float) -> PlacedHand | None:
-        """Return the newest placed hand unless it is older than this at the newest frame."""
-        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > 1e9 * max_age_s:
+    def newest(self) -> PlacedHand | None:
+        """Return the newest placed hand unless it is too old for a confirmation."""
+        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > MATCH_NS:
             return None
         return self._placed[-1]
 
     def steady(self) -> PlacedHand | None:
         """Return the newest hand if it is in view and has hardly moved for a while, else None."""
-        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > self._steady_ns:
+        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > _STEADY_NS:
             return None
-        since_ns = self._seen_ns - self._steady_ns
+        since_ns = self._seen_ns - _STEADY_NS
         before = [hand.middle_W_m for hand in self._placed if hand.t_host_ns <= since_ns]
         after = [hand.middle_W_m for hand in self._placed if hand.t_host_ns > since_ns]
         # Include the last hand before this period, so that a slow camera has enough of them.
         places = before[-1:] + after
         is_long_enough = bool(before and after)
-        if is_long_enough and float(np.ptp(places, axis=0).max()) < self._steady_m:
+        if is_long_enough and float(np.ptp(places, axis=0).max()) < _STEADY_M:
             return self._placed[-1]
         return None
 
@@ -145,7 +138,7 @@ class RecentHands:
             if one is hand or one.t_host_ns > hand.t_host_ns:
                 continue
             is_near = float(np.linalg.norm(one.middle_W_m - hand.middle_W_m)) < _HOLD_M
-            if not is_near or hand.t_host_ns - one.t_host_ns > self._steady_ns:
+            if not is_near or hand.t_host_ns - one.t_host_ns > _STEADY_NS:
                 break
             held.append(one)
         return held[::-1]
@@ -156,14 +149,12 @@ class RecentHands:
             return self._seen_ns
         return self._placed[-1].t_host_ns if self._placed else 0
 
-    def nearest(self, t_host_ns: int, tolerance_s: float) -> PlacedHand:
-        """Return the hand nearest in time; HandError if none is within the tolerance.
+    def nearest(self, t_host_ns: int) -> PlacedHand:
+        """Return the hand nearest in time; HandError if none is within `MATCH_NS`.
 
         OutOfViewError if the camera saw only a part of it then.
         """
-        near = [
-            hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= 1e9 * tolerance_s
-        ]
+        near = [hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= MATCH_NS]
         if not near:
             missed = min(self._missed, key=lambda one: abs(one[0] - t_host_ns), default=(0, None))
             if isinstance(missed[1], OutOfViewError):
@@ -200,7 +191,7 @@ class RecentHands:
 
     def _forget_old(self) -> None:
         """Forget hands that are too old both for a confirmation and for the steadiness check."""
-        oldest_ns = self._seen_ns - self._keep_ns
+        oldest_ns = self._seen_ns - _KEPT_NS
         while self._placed and self._placed[0].t_host_ns < oldest_ns:
             self._placed.popleft()
         while self._unplaced and self._unplaced[0][1] < oldest_ns:

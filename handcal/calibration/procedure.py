@@ -118,6 +118,8 @@ class Procedure:
     """`refusal` in the past tense, if the live hand shows whether its cause lasts; else empty."""
 
 
+_APPLY_TIMEOUT_S = 5.0
+"""Time for the headset to acknowledge projections."""
 _UNSETTLED = (State.ALIGN, State.VERIFY, State.APPLYING)
 _NO_SHIFT: Mapping[Eye, ArrayLike] = MappingProxyType({})
 
@@ -367,7 +369,7 @@ class Calibration:
             hand = merge_hold(self._sight.hands.held_at(hand), hand)
         self.raised = None if displacement_W_m is None else hand
         hand = hand if displacement_W_m is None else _moved(hand, displacement_W_m)
-        self._aligning = Aligning(hand, self._cursor_id + 1, tuple(eyes), self.rig, self._settings)
+        self._aligning = Aligning(hand, tuple(eyes), self.rig, self._settings.guard)
         self._withdrawn_for = ""
         self._cursor_id += 1
         self.eyes = tuple(eyes)
@@ -513,7 +515,7 @@ class Calibration:
             raise ProcedureError("solve first")
         self._clear_cursor(keeps_hand)
         self._drawing.send(self.results.rendered_shift_m)
-        self._apply_until_s = time.monotonic() + self._settings.apply_timeout_s
+        self._apply_until_s = time.monotonic() + _APPLY_TIMEOUT_S
         self.state = State.APPLYING
 
     def poll_applied(self) -> bool:
@@ -949,7 +951,7 @@ class Calibration:
             if self.is_applied:
                 self.evidence.drawn_otherwise(fits.problem)
             self._link.send_again()
-        judged = verifying.judge(fits, hands, self._settings.match_tolerance_s)
+        judged = verifying.judge(fits, hands)
         if isinstance(judged, str):
             self._refuse_verification(verifying, judged)
         elif verifying.needs_proof:

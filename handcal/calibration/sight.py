@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 
-from handcal.calibration.delay import DelayMeter
+from handcal.calibration.delay import ASSUMED_LATENCY_S, DelayMeter
 from handcal.calibration.evidence import Contradiction, Evidence
 from handcal.calibration.hands import PlacedHand, RecentHands
 from handcal.calibration.states import CalibrationSettings, Observation, State
@@ -43,20 +43,17 @@ class Sight:
     ) -> None:
         self._rig = rig
         self._link = link
-        self._tolerance_s = settings.match_tolerance_s
         self._evidence = evidence
-        self._clock = FrameClock(settings.camera_latency_s)
+        self._clock = FrameClock(ASSUMED_LATENCY_S)
         self._finder = make_finder(settings.segment)
-        self.delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D, settings.delay)
-        self.hands = RecentHands(
-            link.pose_at_host_ns, rig.T_H_D, settings.steady_s, settings.steady_m
-        )
+        self.delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D)
+        self.hands = RecentHands(link.pose_at_host_ns, rig.T_H_D)
         self.frame: Frame | None = None
 
     @property
     def newest_hand(self) -> PlacedHand | None:
         """The newest hand unless it is too old for a confirmation."""
-        return self.hands.newest(self._tolerance_s)
+        return self.hands.newest()
 
     def see(
         self,

@@ -13,7 +13,7 @@ from handcal.calibration.states import CalibrationSettings
 from handcal.core.errors import FileError, HandError
 from handcal.core.progress import Progress
 from handcal.core.types import EYES, METHODS, Eye, EyeDistance, Float64, Method, Rig
-from handcal.io.settings import read_settings
+from handcal.io.settings import known_settings, read_settings
 from handcal.register.prior import LearnedPrior, posterior, widened
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.journal import Damage
@@ -80,7 +80,8 @@ def solve(
 def stored_solve_settings(record: SessionRecord) -> SolveSettings:
     """Return the solve settings of a session; FileError if they cannot be read."""
     where = f"{record.path / 'settings.json'}: calibration"
-    return read_settings(CalibrationSettings, record.settings.get("calibration", {}), where).solve
+    stored = known_settings(CalibrationSettings, record.settings.get("calibration", {}))
+    return read_settings(CalibrationSettings, stored, where).solve
 
 
 def solve_again(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from handcal.calibration.delay import DelaySettings
 from handcal.calibration.evidence import Contradiction
 from handcal.calibration.hands import PlacedHand
 from handcal.core.errors import HandcalError
@@ -41,16 +40,6 @@ class CalibrationSettings:
     segment: SegmentSettings = field(default_factory=SegmentSettings)
     guard: GuardSettings = field(default_factory=GuardSettings)
     solve: SolveSettings = field(default_factory=SolveSettings)
-    camera_latency_s: float = 0.03
-    """Shortest time from a frame's exposure to its arrival, until it is measured."""
-    delay: DelaySettings = field(default_factory=DelaySettings)
-    match_tolerance_s: float = 0.15
-    """Largest time between t_b and the frame of an alignment."""
-    steady_s: float = 0.4
-    steady_m: float = 0.005
-    """The hand is steady if it moved less than `steady_m` for `steady_s`."""
-    apply_timeout_s: float = 5.0
-    """Time for the headset to acknowledge projections (`Calibration.poll_applied`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -152,23 +152,14 @@ class Verifying:
             self.fits = nudge
         return None
 
-    def judge(self, fits: Nudge, hands: RecentHands, tolerance_s: float) -> PlacedHand | str:
-        """Return the hand that the drawing fits, or what the wearer must do before it counts.
-
-        Parameters
-        ----------
-        fits : Nudge
-            The wearer's confirmation.
-        hands : RecentHands
-        tolerance_s : float
-            Largest time between the confirmation and the hand.
-        """
+    def judge(self, fits: Nudge, hands: RecentHands) -> PlacedHand | str:
+        """Return the hand that the drawing fits, or what the wearer must do before it counts."""
         if not fits.is_timed:
             return "The headset's clock was set. Look and confirm again."
         if fits.problem:
             return CHANGED
         try:
-            hand = hands.nearest(fits.t_host_ns, tolerance_s)
+            hand = hands.nearest(fits.t_host_ns)
         except HandError as error:
             return f"{error}. Hold it up and confirm again."
         if hands.steady() is None:

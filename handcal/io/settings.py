@@ -54,6 +54,22 @@ def read_settings(kind: type[Settings], data: object, where: str = "settings") -
         raise FileError(f"{where}: {error}") from error
 
 
+def known_settings(kind: type[Any], data: object) -> object:
+    """Return stored settings without those that are none any more.
+
+    What nobody has ever set becomes a constant, which earlier files name with its value. With
+    `read_settings` alone, the files of a user would not be read any more.
+    """
+    if not isinstance(data, Mapping):
+        return data
+    hints = get_type_hints(kind)
+    return {
+        name: known_settings(hints[name], value) if is_dataclass(hints[name]) else value
+        for name, value in data.items()
+        if name in hints
+    }
+
+
 def _convert(kind: Any, value: object, where: str) -> Any:
     """Convert a JSON value to the declared type of a field."""
     alias = getattr(kind, "__value__", None)

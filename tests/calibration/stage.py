@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from handcal.calibration.delay import DelaySettings
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import CalibrationSettings, Observation, State
 from handcal.core.display import projection_matrix
@@ -34,10 +33,7 @@ CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 RIG = replace(example_rig(), depth_intrinsics=CAMERA)
 SENSOR = SensorSettings()
 LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
-# The stage's times are exact, so a hand may be followed while it moves.
-SETTINGS = CalibrationSettings(
-    camera_latency_s=0.0, delay=DelaySettings(assumed_sigma_s=0.0, moved_limit_m=0.01)
-)
+SETTINGS = CalibrationSettings()
 PERIOD_NS = 80_000_000
 HEADSET_AHEAD_NS = 5_000_000_000
 CAMERA_AHEAD_NS = 7_000_000_000

@@ -7,8 +7,9 @@ import pytest
 
 from handcal.calibration.aligning import ADVISE_EVERY_NS, Aligning, align_prompt
 from handcal.calibration.hands import PlacedHand
-from handcal.calibration.states import CalibrationSettings, Observation, State
+from handcal.calibration.states import Observation, State
 from handcal.core.types import EYES, HandCloud
+from handcal.register.guard import GuardSettings
 from handcal.rig.example import example_rig
 
 TURN_BACK = "Tilt your hand anticlockwise, then confirm."
@@ -37,7 +38,7 @@ class Wearer:
     """Turns the hand about the camera's axis, and reads the advice."""
 
     def __init__(self) -> None:
-        self._aligning = Aligning(hand(0), 1, EYES, example_rig(), CalibrationSettings())
+        self._aligning = Aligning(hand(0), EYES, example_rig(), GuardSettings())
         self._t_ns = 0
 
     def turn(self, angle_deg: float, after_ns: int = ADVISE_EVERY_NS) -> str | None:

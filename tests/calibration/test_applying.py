@@ -19,7 +19,6 @@ from handcal.link.server import HeadsetServer
 from handcal.session.session import Session
 from tests.calibration.stage import (
     RIG,
-    SETTINGS,
     T_D_HAND,
     T_D_NEAR,
     Stage,
@@ -97,10 +96,9 @@ def test_polling_never_waits_and_has_the_same_result(stage: Stage, session: Sess
 
 
 def test_polling_gives_up_when_the_time_is_over(
-    server: HeadsetServer, client: HeadsetClient, session: Session
+    stage: Stage, server: HeadsetServer, client: HeadsetClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stage = Stage(server, client, session)
-    stage.calibration = Calibration(session, server, replace(SETTINGS, apply_timeout_s=0.2))
+    monkeypatch.setattr("handcal.calibration.procedure._APPLY_TIMEOUT_S", 0.2)
     stage.align()
     stage.calibration.solve()
     client.close()

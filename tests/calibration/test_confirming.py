@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from handcal.calibration.aligning import ADVISE_EVERY_NS, align_prompt
-from handcal.calibration.states import CalibrationSettings, ProcedureError, State
+from handcal.calibration.delay import MOVED_LIMIT_M
+from handcal.calibration.states import ProcedureError, State
 from handcal.core.display import view_of_eye
 from handcal.core.errors import HandError
 from handcal.core.geometry import rigid, transform
 from handcal.core.types import EYES, Float64
 from handcal.link.client import HeadsetClient
-from handcal.link.server import HeadsetServer
 from handcal.register.guard import RotationGuard
 from handcal.session.session import Session
 from tests.calibration.stage import (
@@ -178,13 +178,10 @@ def test_the_frame_nearest_the_confirmation_is_taken_at_its_own_pose(stage: Stag
 
 
 def test_a_hand_that_moves_when_it_is_confirmed_is_refused(
-    server: HeadsetServer, client: HeadsetClient, session: Session, monkeypatch: pytest.MonkeyPatch
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At 10 cm/s the hand of a frame a third of a period away is 3 mm off."""
-    monkeypatch.setattr(
-        "tests.calibration.stage.SETTINGS", CalibrationSettings(camera_latency_s=0.0)
-    )
-    stage = Stage(server, client, session)
+    monkeypatch.setattr("handcal.calibration.aligning.MOVED_LIMIT_M", MOVED_LIMIT_M)
     stage.make_cursor()
     for i in range(5):
         stage.see(rigid([-0.2, 0.0, 0.0], [0.008 * i, 0.0, 0.5]))

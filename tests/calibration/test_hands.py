@@ -50,7 +50,7 @@ def poses() -> Poses:
 
 @pytest.fixture
 def hands(poses: Poses) -> RecentHands:
-    return RecentHands(poses, T_H_D, steady_s=0.4, steady_m=0.005)
+    return RecentHands(poses, T_H_D)
 
 
 def test_a_hand_is_placed_in_the_world(hands: RecentHands) -> None:
@@ -58,7 +58,7 @@ def test_a_hand_is_placed_in_the_world(hands: RecentHands) -> None:
     assert hand is not None
     assert problem == ""
     np.testing.assert_allclose(hand.middle_W_m, [0.0, 0.1, 0.5], atol=1e-7)
-    assert hands.newest(0.0) is hand
+    assert hands.newest() is hand
 
 
 def test_a_hand_waits_for_its_pose_and_those_behind_it_wait_too(
@@ -80,7 +80,7 @@ def test_a_hand_whose_pose_is_lost_is_left_out(hands: RecentHands, poses: Poses)
     first, _ = hands.add(cloud(), 1 * PERIOD_NS)
     assert hands.add(cloud(), 2 * PERIOD_NS) == (None, "no pose")
     assert hands.placed_until_ns() == 2 * PERIOD_NS
-    assert hands.newest(1.0) is first
+    assert hands.newest() is first
 
 
 @pytest.mark.parametrize(("step_m", "is_steady"), [(0.0005, True), (0.006, False)])
@@ -101,16 +101,16 @@ def test_a_hand_is_steady_if_it_hardly_moved_for_a_while(
 
 def test_the_hand_nearest_in_time_is_returned_while_it_is_kept(hands: RecentHands) -> None:
     placed = [hands.add(cloud(), number * PERIOD_NS)[0] for number in range(1, 4)]
-    assert hands.nearest(2 * PERIOD_NS + 40_000_000, 0.15) is placed[1]
+    assert hands.nearest(2 * PERIOD_NS + 40_000_000) is placed[1]
     with pytest.raises(HandError, match="did not see your hand"):
-        hands.nearest(4 * PERIOD_NS, 0.05)
-    hands.add(None, 16 * PERIOD_NS)  # the first two are older than 1.4 s now
+        hands.nearest(5 * PERIOD_NS)
+    hands.add(None, 16 * PERIOD_NS)  # the first is older than 1.4 s now
     with pytest.raises(HandError):
-        hands.nearest(PERIOD_NS, 0.05)
-    assert hands.nearest(3 * PERIOD_NS, 0.05) is placed[2]
+        hands.nearest(PERIOD_NS - 60_000_000)
+    assert hands.nearest(3 * PERIOD_NS) is placed[2]
     hands.clear()
     with pytest.raises(HandError):
-        hands.nearest(3 * PERIOD_NS, 0.05)
+        hands.nearest(3 * PERIOD_NS)
 
 
 def test_a_hold_is_what_came_before_the_hand_and_holds_it_even_out_of_order(
@@ -118,7 +118,7 @@ def test_a_hold_is_what_came_before_the_hand_and_holds_it_even_out_of_order(
 ) -> None:
     for number, x_m in enumerate([0.0, 0.1, 0.1, 0.1]):
         hands.add(cloud(x_m), (10 + number) * PERIOD_NS)
-    hand = hands.nearest(13 * PERIOD_NS, 0.05)
+    hand = hands.nearest(13 * PERIOD_NS)
     assert [one.t_host_ns for one in hands.held_at(hand)] == [n * PERIOD_NS for n in (11, 12, 13)]
     # A later frame whose estimated time is earlier, of a hand elsewhere.
     hands.add(cloud(0.2), 13 * PERIOD_NS - 1)

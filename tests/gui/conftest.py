@@ -335,9 +335,10 @@ def studio(
         host=address[0],
         port=address[1],
         sessions=str(tmp_path / "sessions"),
-        # A busy computer gives few frames a second, and a confirmation may lie between two.
-        calibration=CalibrationSettings(match_tolerance_s=0.6, apply_timeout_s=1.0),
     )
+    # A busy computer gives few frames a second, and a confirmation may lie between two.
+    monkeypatch.setattr("handcal.calibration.hands.MATCH_NS", 600_000_000)
+    monkeypatch.setattr("handcal.calibration.procedure._APPLY_TIMEOUT_S", 1.0)
     with Headset(address, KEY) as headset:
         yield Studio(settings, camera, headset)
 

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import handcal.station.station
-from handcal.calibration.delay import DelaySettings
 from handcal.calibration.plan import PlanSettings
 from handcal.calibration.solve_again import Former
 from handcal.calibration.states import CalibrationSettings, ProcedureError, State
@@ -43,16 +42,17 @@ from tests.helpers import Patience, eventually, slow_simulator, write_small_rig
 NAIVE_SEED = 3
 PATIENCE_S = 50.0
 pytestmark = pytest.mark.process
-# A busy computer gives few frames a second, and the wearer's answer lies between two.
-# A busy machine's camera is late, which would be reported instead of what is tested.
-CALIBRATION = CalibrationSettings(
-    apply_timeout_s=0.5, match_tolerance_s=2.0, delay=DelaySettings(limit_s=5.0)
-)
+CALIBRATION = CalibrationSettings()
 
 
 @pytest.fixture
 def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StationSettings:
     slow_simulator(monkeypatch)
+    monkeypatch.setattr("handcal.calibration.procedure._APPLY_TIMEOUT_S", 0.5)
+    # A busy computer gives few frames a second, and the wearer's answer lies between two.
+    monkeypatch.setattr("handcal.calibration.hands.MATCH_NS", 2 * 10**9)
+    # Its camera is late, which would be reported instead of what is tested.
+    monkeypatch.setattr("handcal.calibration.delay._LIMIT_S", 5.0)
     return StationSettings(
         seed=NAIVE_SEED,
         rig=str(write_small_rig(tmp_path / "rig.yaml")),

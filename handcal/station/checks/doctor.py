@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
-from handcal.calibration.states import CalibrationSettings
+from handcal.calibration.delay import ASSUMED_LATENCY_S
 from handcal.camera.camera import Camera
 from handcal.camera.sdk_devices import Device, devices_by_child
 from handcal.camera.usb import explain_absence
@@ -50,7 +50,6 @@ _PACKAGES = (
 )
 CAMERA_EXTRAS = {"oak": ("depthai", "OAK-D"), "orbbec": ("pyorbbecsdk", "Orbbec camera")}
 """Extras that cameras need: the module of each, and the cameras."""
-_CAMERA_LATENCY_S = CalibrationSettings().camera_latency_s
 _SETTLE_S = 2.0
 _POLL_S = 0.05
 _LONGEST_STEP_MS = 1.0
@@ -130,7 +129,7 @@ def examine_headset(
         return found
     what = "Pose stamps"
     try:
-        delay = run_pose_delay(server, camera, rig.T_H_D, _CAMERA_LATENCY_S, progress=progress)
+        delay = run_pose_delay(server, camera, rig.T_H_D, ASSUMED_LATENCY_S, progress=progress)
     except CancelledError:
         raise
     except HandcalError as error:

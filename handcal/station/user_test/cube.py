@@ -18,8 +18,8 @@ from typing import TypeAlias
 import cv2
 import numpy as np
 
+from handcal.calibration.delay import ASSUMED_LATENCY_S
 from handcal.calibration.drawing import Drawing
-from handcal.calibration.states import CalibrationSettings
 from handcal.camera.camera import Camera
 from handcal.camera.clock import FrameClock
 from handcal.core.display import TARGET_DEPTHS_M, view_of_eye
@@ -89,7 +89,7 @@ class CubeTracker:
         self._T_H_D = T_H_D
         self._pose_at_host_ns = pose_at_host_ns
         self._filter = CubeFilter()
-        self._clock = FrameClock(CalibrationSettings().camera_latency_s)
+        self._clock = FrameClock(ASSUMED_LATENCY_S)
         self._waiting: deque[tuple[int, int, Float64]] = deque(maxlen=_WAITING)
 
     def step(self) -> TrackedCube | None:
@@ -338,6 +338,8 @@ Adjust: TypeAlias = Callable[[Eye, Float64, Callable[[Float64], None]], Float64]
 
 PLACE_PROMPT = "Look straight ahead. The cube will be put {:g} m in front of you."
 _ACK_S = 6.0
+_NEAR_M = 0.05
+"""Largest distance of the cube from the wanted one."""
 _POSE_AGE_NS = 60_000_000
 _POSE_PATIENCE_S, _POLL_S = 3.0, 0.02
 
@@ -347,9 +349,6 @@ class TrialSettings:
     """Settings of the trials of one calibration."""
 
     eyes: tuple[Eye, ...] = EYES
-    depths_m: tuple[float, ...] = TARGET_DEPTHS_M
-    near_m: float = 0.05
-    """Largest distance of the cube from the wanted one."""
     patience_s: float = 120.0
     """Longest time until the cube is at rest at the wanted distance."""
 
@@ -471,12 +470,12 @@ def run_user_trials(
     drawing.send({eye: calibrated_m.get(eye, np.zeros(3)) for eye in EYES})
     drawing.wait_acked(_ACK_S)
     try:
-        for round_number, depth_m in enumerate(settings.depths_m):
+        for round_number, depth_m in enumerate(TARGET_DEPTHS_M):
             server.send_prompt(PLACE_PROMPT.format(depth_m))
             place(depth_m)
             cube = wait_for_cube(tracker, server, rig, depth_m, settings, progress)
             for eye in settings.eyes:
-                progress.at(round_number / len(settings.depths_m), f"{eye} eye, {depth_m} m")
+                progress.at(round_number / len(TARGET_DEPTHS_M), f"{eye} eye, {depth_m} m")
 
                 def draw(shift_m: Float64) -> None:
                     drawing.send({eye: shift_m})  # noqa: B023 (called before the next eye's turn)
@@ -549,7 +548,7 @@ def wait_for_cube(
             continue
         T_E_W = view_of_eye(rig.eyes[settings.eyes[0]], _head_now(server))
         seen_m = float((T_E_W @ found.T_W_T)[2, 3])
-        if abs(seen_m - depth_m) > settings.near_m:
+        if abs(seen_m - depth_m) > _NEAR_M:
             why = f"it is {seen_m:.2f} m from the eyes"
         elif found.is_at_rest:
             return found

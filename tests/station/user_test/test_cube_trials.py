@@ -92,11 +92,13 @@ def test_the_tracked_cube_is_drawn_where_it_is(
 
 
 def test_the_trials_measure_the_true_error(
-    session: Session, bench: tuple[HeadsetServer, HeadsetClient, CubeBench]
+    session: Session,
+    bench: tuple[HeadsetServer, HeadsetClient, CubeBench],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     server, client, room = bench
     before = len(Session.open(session.path).trials)
-    settings = TrialSettings(depths_m=(0.4, 0.6))
+    monkeypatch.setattr(user_test, "TARGET_DEPTHS_M", (0.4, 0.6))
     prompts: list[tuple[str, tuple[Eye, ...]]] = []
 
     def adjust(eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Float64:
@@ -104,9 +106,7 @@ def test_the_trials_measure_the_true_error(
         prompts.append((client.state().prompt, client.state().eyes))
         return room.adjust(eye, shift_m, draw)
 
-    made = run_user_trials(
-        session, server, tracker(session, server, room), adjust, room.place, settings
-    )
+    made = run_user_trials(session, server, tracker(session, server, room), adjust, room.place)
     assert [eyes for _, eyes in prompts] == [("left",), ("right",)] * 2
     assert prompts[0][0].startswith("Close your right eye. Say where")
     record = Session.open(session.path)
@@ -129,7 +129,8 @@ def test_a_cube_elsewhere_and_an_unsolved_session_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     server, _, room = bench
-    impatient = TrialSettings(depths_m=(0.6,), patience_s=0.5)
+    monkeypatch.setattr(user_test, "TARGET_DEPTHS_M", (0.6,))
+    impatient = TrialSettings(patience_s=0.5)
     cube = tracker(session, server, room)
     monkeypatch.setattr(cube, "step", lambda: TrackedCube(0, room.T_W_T, True, 9))
     with pytest.raises(HandcalError, match=r"0\.\d+ m from the eyes; put it down there"):
