@@ -19,7 +19,7 @@ Between these steps alignments can be deleted and restored, the wearer's eye dis
 and all can be solved again; φ can be set by hand while no cursor is shown. The procedure only
 combines the other parts: `Sight` finds the hand, `Aligning` and `Verifying` judge what the wearer
 does, `Drawing` sends the projections, and the session holds what was made. One thread drives it:
-`step` for every frame, all other calls in between.
+`Plan.advance`, the way of a frame through all of it, and all other calls in between.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ class Calibration:
     verifying : Verifying or None
         The verification in progress, in the state `verify`.
     camera : CameraIdentity
-        The camera that gives the frames; set it before `step`.
+        The camera that gives the frames; set it before `see`.
     evidence : Evidence
         Evidence from outside the solver against the result.
     unmoved : set of eye
@@ -289,10 +289,8 @@ class Calibration:
         """Return the headset's pose (4, 4) when a hand was seen."""
         return np.asarray(hand.T_W_D @ invert(self.rig.T_H_D))
 
-    def step(self, frame: Frame) -> Observation:
-        """Process a frame: find the hand, guide the wearer, and take what the wearer confirms.
-
-        What the session cannot write is kept in memory; `Session.write_waiting` says so.
+    def see(self, frame: Frame) -> Observation:
+        """Return what a frame shows, and guide the wearer by it.
 
         Raises
         ------
@@ -314,11 +312,27 @@ class Calibration:
             self._withdraw_cursor("The headset's clock was set. Raise your hand again.")
         if self._aligning is not None and self.state is State.ALIGN:
             observation = self._guide(observation, self._aligning)
-            with suppress(FileError):
+        elif self.verifying is not None and observation.hand is not None:
+            hand = observation.hand
+            outline_W_m = transform(hand.T_W_D, hand.cloud.outline_m)
+            self._link.send_live_hand(outline_W_m, False, (self.verifying.eye,), is_outline=True)
+        return observation
+
+    def judge(self, observation: Observation) -> Observation:
+        """Take what the wearer has confirmed or nudged; return the observation with the new state.
+
+        What the session cannot write is kept in memory; `Session.write_waiting` says so.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with suppress(FileError):
+            if self._aligning is not None and self.state is State.ALIGN:
                 self._take_confirmation(self._aligning)
-        elif self.verifying is not None:
-            with suppress(FileError):
-                self._follow_nudges(observation, self.verifying)
+            elif self.verifying is not None:
+                self._follow_nudges(self.verifying)
         return replace(observation, state=self.state)
 
     # Alignments: a cursor, the wearer's confirmation, and what can be undone.
@@ -935,11 +949,8 @@ class Calibration:
         self._drawing.send({verifying.eye: verifying.shift_m})
         self._session.record(VERIFYING, **verifying.event())
 
-    def _follow_nudges(self, observation: Observation, verifying: Verifying) -> None:
-        """Draw the hand's outline for the verified eye, and take the wearer's nudges."""
-        if observation.hand is not None:
-            outline_W_m = transform(observation.hand.T_W_D, observation.hand.cloud.outline_m)
-            self._link.send_live_hand(outline_W_m, False, (verifying.eye,), is_outline=True)
+    def _follow_nudges(self, verifying: Verifying) -> None:
+        """Take the wearer's nudges, and the word that the drawing fits."""
         verify_id = verifying.request.verify_id
         if heard := [one for one in self._link.nudges() if one.verify_id == verify_id]:
             self._hear(heard[-1], verifying)  # it has the sums of all

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.lab_prior import run_learn_prior
-from handcal.calibration.plan import NextStep, Plan, PlanSettings, StepName
+from handcal.calibration.plan import Plan, PlanSettings, StepName
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.solve_again import Former, read_former, stored_solve_settings
 from handcal.calibration.states import Observation, ProcedureError, State
@@ -311,8 +311,6 @@ class Station(Closable):
         self.watch_views = False
         self._watchers: list[Callable[[Snapshot], object]] = []
         self.holds_plan = False
-        self._next_step: NextStep | None = None
-        self._observation: Observation | None = None
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
             self.session, settings = stack.enter_context(
@@ -377,8 +375,8 @@ class Station(Closable):
 
     def step(self) -> Snapshot:
         """Process the next frame, if one arrives soon, and return the new snapshot."""
-        observation = self._observe()
-        self._advance(observation)
+        observation = self._advance(self._feed.read())
+        self.trials.follow_procedure()
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
@@ -387,39 +385,21 @@ class Station(Closable):
             watcher(snapshot)
         return snapshot
 
-    def _observe(self) -> Observation | None:
-        """Return what the next frame shows; None if none arrives."""
-        frame = self._feed.read()
-        if frame is None:
-            return None
-        self._frame = frame
-        self.calibration.camera = self._feed.status.identity
+    def _advance(self, frame: Frame | None) -> Observation | None:
+        """Take a frame through the procedure by the plan; return what it shows."""
+        if frame is not None:
+            self._frame, self.calibration.camera = frame, self._feed.status.identity
         try:
-            observation = self.calibration.step(frame)
-        except LinkError as error:
-            self._not_applied = str(error)
-            return None
-        cloud = observation.cloud
-        self._feed.expose_for(None if cloud is None else cloud.points_m)
-        return observation
-
-    def _advance(self, observation: Observation | None) -> None:
-        """Take what the headset has acknowledged, and the plan's next step if its time has come."""
-        # The session keeps what it cannot write; `_store_waiting` reports the problem.
-        try:
-            if self.calibration.state is State.APPLYING:
-                with suppress(FileError):
-                    self.calibration.poll_applied()
-            if observation is not None:
-                self._observation = observation
-                with suppress(FileError):
-                    self._next_step = self._follow_plan(observation)
+            self.plan.advance(frame, is_held=self.holds_plan)
         except LinkError as error:
             self._not_applied = str(error)
         # An automatic plan sends them again at once; the reason lasts until it has succeeded.
         if self.calibration.state not in (State.SOLVED, State.APPLYING):
             self._not_applied = ""
-        self.trials.follow_procedure()
+        if frame is None or (observation := self.plan.observation) is None:
+            return None
+        self._feed.expose_for(None if observation.cloud is None else observation.cloud.points_m)
+        return observation
 
     def _make_snapshot(self, observation: Observation | None) -> Snapshot:
         self._number += 1
@@ -436,7 +416,7 @@ class Station(Closable):
             record=self.session.contents,
             settings=self.settings.calibration,
             plan=self.plan.settings,
-            next_step=self._next_step,
+            next_step=self.plan.step,
             not_applied=self._not_applied,
             not_stored=self._not_stored,
             contradiction=self._contradiction(observation),
@@ -450,12 +430,6 @@ class Station(Closable):
         """Call `watcher` with every new snapshot, in the station's thread; it must not wait."""
         self._watchers.append(watcher)
 
-    def _follow_plan(self, observation: Observation) -> NextStep:
-        """Take the plan's next step if it is automatic and not held; return it."""
-        if self.holds_plan:
-            return self.plan.next_step(observation.is_steady)
-        return self.plan.follow(observation)
-
     def take_step(self) -> None:
         """Take the next step of a plan that is held.
 
@@ -465,12 +439,11 @@ class Station(Closable):
             If it cannot be taken yet.
         LinkError
             If the link is closed.
-        FileError
-            If the session cannot be written; the step is done anyway.
         """
-        if self._observation is None:
+        self.plan.advance(None, is_pressed=True)
+        step = self.plan.step
+        if step is None:
             raise ProcedureError("wait for the camera's first frame")
-        step = self.plan.advance(self._observation)
         if step.name in (StepName.RAISE, StepName.WAIT):
             raise ProcedureError(step.text)
 

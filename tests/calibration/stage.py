@@ -91,6 +91,19 @@ class Stage:
         thumb_out_rad: float = 0.0,
     ) -> Observation:
         """Step with the next frame, of a hand or none; `told` is the pose it tells."""
+        frame = self.frame(T_D_hand, T, pose=pose, thumb_out_rad=thumb_out_rad)
+        calibration = self.calibration
+        return calibration.judge(calibration.see(replace(frame, T_W_D=told)))
+
+    def frame(
+        self,
+        T_D_hand: Float64 | None = T_D_HAND,
+        T: Float64 = T_W_H,
+        *,
+        pose: bool = True,
+        thumb_out_rad: float = 0.0,
+    ) -> Frame:
+        """Return the next frame."""
         self.t_ns += PERIOD_NS
         self._frames += 1
         if pose:
@@ -98,8 +111,7 @@ class Stage:
         t_camera_ns = self.t_ns + CAMERA_AHEAD_NS
         depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad).copy()
         depth[0, 0] = self._frames % 1000  # a live picture always changes
-        frame = Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
-        return self.calibration.step(replace(frame, T_W_D=told))
+        return Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
 
     def hold(self, T_D_hand: Float64 = T_D_HAND, frames: int = 7) -> Observation:
         """Hold the hand still for a while."""

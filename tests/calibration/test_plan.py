@@ -38,8 +38,18 @@ class Planned:
 
     def advance(self, frames: int = 1) -> NextStep:
         for _ in range(frames):
-            step = self.plan.advance(self.stage.see())
-        return step
+            self.plan.advance(self.stage.frame(), is_pressed=True)
+        return self.step
+
+    def follow(self) -> NextStep:
+        """See a frame; the plan takes its step by itself once it is due."""
+        self.plan.advance(self.stage.frame())
+        return self.step
+
+    @property
+    def step(self) -> NextStep:
+        assert self.plan.step is not None
+        return self.plan.step
 
     def until(self, name: StepName, frames: int = 60) -> NextStep:
         for _ in range(frames):
@@ -229,7 +239,7 @@ def test_a_skipped_eye_is_not_verified_by_the_plan(
     planned.until(StepName.ALIGN)
     planned.confirm()
     planned.until(StepName.NUDGE)
-    planned.plan.skip()
+    planned.plan.skip("left")
     assert planned.stage.state() is State.APPLIED
     planned.until(StepName.DONE)
     assert planned.stage.calibration.verifications == {}
@@ -258,14 +268,14 @@ def test_a_wearer_sees_what_comes_before_the_paper_s_plan_begins_it(
     planned = make(PAPER)
     began_ns, step = 0, planned.plan.next_step(is_steady=False)
     while planned.stage.state() is not State.ALIGN:
-        step = planned.plan.follow(planned.stage.see())
+        step = planned.follow()
         if step.name is StepName.CURSOR:
             began_ns = began_ns or planned.stage.t_ns
     assert began_ns
     assert planned.stage.t_ns - began_ns >= 1_200_000_000
     held = make(replace(PAPER, is_automatic=False))
     for _ in range(30):
-        step = held.plan.follow(held.stage.see())
+        step = held.follow()
     assert step.name is StepName.CURSOR
     assert held.stage.state() is State.SHOW_HAND
 
@@ -321,11 +331,11 @@ def test_an_eye_may_be_skipped_before_its_verification_begins(
             if planned.stage.state() is State.APPLYING:
                 planned.stage.calibration.wait_applied()
         assert step.eyes == (eye,)
-        planned.plan.skip()
+        planned.plan.skip(eye)
     planned.until(StepName.DONE)
     assert skipped_eyes(Session.open(session.path).events) == set(EYES)
-    with pytest.raises(ProcedureError, match="no verification to skip"):
-        planned.plan.skip()
+    with pytest.raises(ProcedureError, match="no verification of the left eye"):
+        planned.plan.skip("left")
 
 
 def test_skipping_a_verification_that_has_just_ended_skips_no_other(
@@ -337,8 +347,12 @@ def test_skipping_a_verification_that_has_just_ended_skips_no_other(
     while planned.stage.state() is State.VERIFY:
         planned.stage.see()
     assert planned.stage.state() is State.APPLYING
-    with pytest.raises(ProcedureError, match="no verification to skip"):
-        planned.plan.skip()
+    with pytest.raises(ProcedureError, match="no verification of the left eye"):
+        planned.plan.skip("left")
+    assert planned.until(StepName.VERIFY).eyes == ("right",)
+    with pytest.raises(ProcedureError, match="no verification of the left eye"):
+        planned.plan.skip("left")
+    assert planned.stage.state() is State.VERIFY
     assert planned.plan.skipped == set()
 
 
@@ -396,11 +410,11 @@ def test_an_eye_that_is_no_longer_chosen_asks_for_nothing(make: Callable[..., Pl
 def test_the_pause_begins_once_the_hand_is_placed(make: Callable[..., Planned]) -> None:
     planned = make(PAPER)
     planned.stage.hold(frames=10)
-    unplaced = replace(planned.stage.see(), hand=None)
     for _ in range(3):
-        assert planned.plan.follow(unplaced).name is StepName.CURSOR
+        planned.plan.advance(planned.stage.frame(pose=False))
+        assert planned.step.name is StepName.CURSOR
         assert planned.stage.state() is State.SHOW_HAND
-    planned.plan.follow(planned.stage.see())
+    planned.follow()
     assert planned.stage.state() is State.SHOW_HAND
 
 

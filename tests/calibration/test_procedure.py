@@ -382,7 +382,7 @@ def test_a_frozen_picture_makes_no_cursor_and_no_alignment(stage: Stage) -> None
         stage.t_ns += PERIOD_NS
         stage.send_poses()
         now = replace(still, t_camera_ns=stage.t_ns + CAMERA_AHEAD_NS, t_host_ns=stage.t_ns)
-        seen = stage.calibration.step(now)
+        seen = stage.calibration.see(now)
     assert seen.contradiction is not None
     assert seen.contradiction.name == "frozen-camera"
     assert "does not change" in seen.problem
