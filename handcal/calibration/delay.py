@@ -387,44 +387,57 @@ class DelayMeter:
         """Look at a frame that the clock knows; return True if the delay has just become known."""
         if frame.color is None:
             return False
-        measured_ns = self._clock.measured_ns
-        late_ns = frame.t_host_ns - frame.t_camera_ns - (measured_ns or 0)
-        is_same_clock = measured_ns is None or 0 <= late_ns < _LONGEST_NS
-        if not is_same_clock or frame.t_camera_ns < self._newest_ns:
-            self._backgrounds.clear()
-            self._clock.measured_ns = None
-            self._sigma_s = ASSUMED_SIGMA_S
-            self._next_ns, self._is_still, self._followed_ns = 0, False, None
-            self._looked_ns = -INFORM_NS
-        if frame.t_camera_ns == self._newest_ns:
-            return False
+        if self._is_of_another_clock(frame):
+            self._forget()
         self._newest_ns = frame.t_camera_ns
         if frame.t_camera_ns - self._looked_ns < INFORM_NS:
             return False
+        was_known = self._clock.measured_ns is not None
+        self._look(frame)
+        if frame.t_host_ns >= self._next_ns:
+            self._measure(frame.t_host_ns)
+        return not was_known and self._clock.measured_ns is not None
+
+    def _is_of_another_clock(self, frame: Frame) -> bool:
+        """Return whether a frame comes before the last, or not soon after its exposure."""
+        measured_ns = self._clock.measured_ns
+        late_ns = 0 if measured_ns is None else frame.t_host_ns - frame.t_camera_ns - measured_ns
+        return not 0 <= late_ns < _LONGEST_NS or frame.t_camera_ns < self._newest_ns
+
+    def _forget(self) -> None:
+        """Measure from the start: the camera was replaced, or opened again."""
+        self._backgrounds.clear()
+        self._clock.measured_ns = None
+        self._sigma_s = ASSUMED_SIGMA_S
+        self._next_ns, self._is_still, self._followed_ns = 0, False, None
+        self._looked_ns = -INFORM_NS
+
+    def _look(self, frame: Frame) -> None:
+        """Follow the background, and keep the poses of the time."""
         self._looked_ns = frame.t_camera_ns
         if self._followed_ns is None:
             self._followed_ns = frame.t_camera_ns
-        is_known = self._clock.measured_ns is not None
         self._frames += 1
-        if not is_known or self._frames % _EVERY_FRAME_KNOWN == 0:
+        if self._clock.measured_ns is None or self._frames % _EVERY_FRAME_KNOWN == 0:
             self._follow(frame)
         self._read_poses()  # those of 5 s at once would take longer than the time between frames
-        if frame.t_host_ns < self._next_ns:
-            return False
-        self._next_ns = frame.t_host_ns + (_EVERY_KNOWN_NS if is_known else _EVERY_NS)
+
+    def _measure(self, now_ns: int) -> None:
+        """Measure the delay from what was followed; plan the next measurement."""
+        is_known = self._clock.measured_ns is not None
+        self._next_ns = now_ns + (_EVERY_KNOWN_NS if is_known else _EVERY_NS)
         times_ns = np.array([t_ns for t_ns, _ in self._poses], dtype=np.int64)
         poses = np.array([T for _, T in self._poses]).reshape(-1, 4, 4)
         self._is_still = is_still(poses)
         if self._is_still:  # its movement would show nothing, after 30 ms of searching
-            return False
-        found = measure_offset(
+            return
+        offset = measure_offset(
             self._backgrounds, times_ns, poses, self._T_H_D, self._clock.earliest_ns
         )
-        if found is not None and found.sigma_s <= _KNOWN_SIGMA_S:
-            self._clock.measured_ns = found.offset_ns
-            self._sigma_s = found.sigma_s
-            self._next_ns = frame.t_host_ns + _EVERY_KNOWN_NS
-        return not is_known and self._clock.measured_ns is not None
+        if offset is not None and offset.sigma_s <= _KNOWN_SIGMA_S:
+            self._clock.measured_ns = offset.offset_ns
+            self._sigma_s = offset.sigma_s
+            self._next_ns = now_ns + _EVERY_KNOWN_NS
 
     def time_sigma_m(
         self, hands: Sequence[PlacedHand], confirmed_ns: int, speed_m_s: float

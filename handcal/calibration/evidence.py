@@ -35,8 +35,15 @@ class Contradiction:
 
     name: str
     """Short name, as in ``handcal demo --fault``."""
-    text: str
-    """A sentence for the technician, with advice."""
+    what: str
+    """What was found."""
+    advice: str = ""
+    """What the technician can do about it."""
+
+    @property
+    def text(self) -> str:
+        """Both in one line."""
+        return f"{self.what}; {self.advice}" if self.advice else self.what
 
 
 class Evidence:
@@ -60,8 +67,8 @@ class Evidence:
         if rig.depth_check is not None and not (finding := depth_finding(rig.depth_check)).is_fine:
             self._add(
                 "depth-bias",
-                f"the rig's depth check found {finding.found}; calibrate the depth camera, or "
-                "check it again",
+                f"the rig's depth check found {finding.found}",
+                "calibrate the depth camera, or check it again",
             )
 
         if rig.display_check is not None:
@@ -91,8 +98,8 @@ class Evidence:
             if differences:
                 self._add(
                     "other-camera",
-                    f"the camera is not the rig's: {'; '.join(differences)}. Connect the rig's "
-                    "camera, or choose the rig file of this one",
+                    f"the camera is not the rig's: {'; '.join(differences)}",
+                    "connect the rig's camera, or choose the rig file of this one",
                 )
         last, self._last = self._last, frame
         is_equal = last is not None and _is_same(last.depth, frame.depth)
@@ -101,7 +108,8 @@ class Evidence:
             return None
         return Contradiction(
             "frozen-camera",
-            "the camera's picture does not change; unplug the camera and plug it in again",
+            "the camera's picture does not change",
+            "unplug the camera and plug it in again",
         )
 
     def see_delay(self, delay_s: float | None, limit_s: float) -> Contradiction | None:
@@ -111,7 +119,8 @@ class Evidence:
         return Contradiction(
             "late-camera",
             f"the camera's pictures arrive {1e3 * delay_s:.0f} ms after their exposure, more than "
-            f"{1e3 * limit_s:.0f} ms; close other programs, and connect the camera directly",
+            f"{1e3 * limit_s:.0f} ms",
+            "close other programs, and connect the camera directly",
         )
 
     def see_delivery(self, is_lost: bool) -> Contradiction | None:
@@ -120,7 +129,8 @@ class Evidence:
             return None
         return Contradiction(
             "lost-start",
-            "the headset does not acknowledge the projections sent to it; restart its app",
+            "the headset does not acknowledge the projections sent to it",
+            "restart its app",
         )
 
     def see_clock(self, step_s: float) -> Contradiction | None:
@@ -129,8 +139,8 @@ class Evidence:
             return None
         return Contradiction(
             "clock-step",
-            f"the headset's clock was set by {step_s:+.2f} s; wait a moment, and if this happens "
-            "again, restart the headset's app",
+            f"the headset's clock was set by {step_s:+.2f} s",
+            "wait a moment, and if this happens again, restart the headset's app",
         )
 
     def see_poses(self, by_camera: Float64, by_app: Float64) -> None:
@@ -150,8 +160,9 @@ class Evidence:
         return Contradiction(
             "other-world",
             f"the camera is {1e3 * apart_m:.0f} mm and {np.degrees(turn_rad):.0f}° from where the "
-            "headset's app and the rig file place it; let the app use the world of hl2ss, and "
-            "measure the camera's pose again (handcal rig make --factory)",
+            "headset's app and the rig file place it",
+            "let the app use the world of hl2ss, and measure the camera's pose again (handcal rig "
+            "make --factory)",
         )
 
     def drawn_otherwise(self, problem: str) -> None:
@@ -160,7 +171,8 @@ class Evidence:
         if self._drawn_otherwise >= _REFUSALS:
             self._add(
                 "stale-headset",
-                f"the headset does not draw what was sent to it ({problem}); restart its app",
+                f"the headset does not draw what was sent to it ({problem})",
+                "restart its app",
             )
 
     @property
@@ -173,8 +185,8 @@ class Evidence:
         self._drawn_otherwise = 0
         self._found.pop("stale-headset", None)
 
-    def _add(self, name: str, text: str) -> None:
-        self._found[name] = Contradiction(name, text)
+    def _add(self, name: str, what: str, advice: str = "") -> None:
+        self._found[name] = Contradiction(name, what, advice)
 
 
 def _is_same(one: UInt16, other: UInt16) -> bool:

@@ -158,7 +158,7 @@ class RecentHands:
         if not near:
             missed = min(self._missed, key=lambda one: abs(one[0] - t_host_ns), default=(0, None))
             if isinstance(missed[1], OutOfViewError):
-                raise OutOfViewError(str(missed[1]))  # the stored one must hold no traceback
+                raise OutOfViewError(*missed[1].args)  # the stored one must hold no traceback
             raise HandError("The camera did not see your hand")
         return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 

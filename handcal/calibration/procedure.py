@@ -370,8 +370,10 @@ class Calibration:
             )
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
-        if full := self._session.full("alignment"):
-            raise ProcedureError(full)
+        try:
+            self._session.require_room("alignment")
+        except FileError as error:
+            raise ProcedureError(*error.args) from error
         if not self.is_applied:
             # The cursor might be drawn with other projections than the solver assumes.
             self._link.send_again()

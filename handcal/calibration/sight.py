@@ -110,11 +110,11 @@ class Sight:
         """Return the hand in a frame, or None and the reason."""
         if contradiction is not None:
             self.hands.clear()
-            return None, HandError(contradiction.text)
+            return None, HandError(contradiction.what, contradiction.advice)
         try:
             cloud = self._finder.find(frame)
         except HandError as error:
-            return None, type(error)(str(error))  # without the traceback, which holds the station
+            return None, type(error)(*error.args)  # without the traceback, which holds the station
         return with_outline(cloud, frame, edges_of(self._rig, camera.model)), None
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:

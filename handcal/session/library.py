@@ -14,7 +14,7 @@ from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye
 from handcal.io.files import make_folder, read_limited, sync_folder
 from handcal.io.lock import FileLock
-from handcal.register.results import read_rendered_shift_m
+from handcal.register.results import RESULTS_VERSION, read_rendered_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.journal import JOURNAL, find_journals, read_journal
 from handcal.session.judged_trials import EyeTrials, judge_trials
@@ -147,7 +147,7 @@ def delete_session(path: Path) -> Path:
     """
     _require_there(path)
     if not (path / JOURNAL).is_file():
-        raise FileError(f"{path} is not a session", "nothing was deleted")
+        raise FileError(f"{path} is not a session, so nothing was deleted")
     FileLock(path / "lock").release()  # only a test, or another program would lose its folder
     folder = path.absolute().parent
     bin_folder = make_folder(folder / DELETED, folder)
@@ -165,7 +165,7 @@ def restore_session(path: Path) -> Path:
     """
     target = path.parent.parent / path.name
     if path.parent.name != DELETED:
-        raise FileError(f"{path} is not in a folder {DELETED}", "nothing was restored")
+        raise FileError(f"{path} is not in a folder {DELETED}, so nothing was restored")
     if target.exists():
         raise FileError(f"{target} exists", "rename it, then restore again")
     return _move(path, target)
@@ -226,6 +226,8 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
 def eye_outcomes(state: SessionState) -> dict[Eye, EyeOutcome]:
     """Return the results of a session's eyes; those that it does not hold are left out."""
     results = (state.results if state.is_solved else None) or {}
+    if results.get("version") != RESULTS_VERSION:  # their numbers may mean something else
+        return {}
     found = results.get("eyes")
     eyes = found if isinstance(found, dict) else {}
     trials = state.trials.active.values()

@@ -157,8 +157,8 @@ def replay(path: Path) -> Replayed:
         try:
             state.apply(event)
         except ValueError as error:
-            what = f"event {event.number} cannot follow those before it: {error}; left out"
-            damaged.append(Damage(JOURNAL, event.number, what))
+            what = f"event {event.number} cannot follow those before it: {error}"
+            damaged.append(Damage(JOURNAL, event.number, what, "left out"))
             state.alignments.has_gaps = state.trials.has_gaps = True
     if damaged:  # a number may be that of an alignment whose event is lost
         stored = (one.stem for one in path.glob("alignments/*.npz"))
@@ -196,7 +196,7 @@ class LoadedSession:
             MappingProxyType({n: self.alignments[n] for n in those if n in self.alignments})
             for those in (state.alignments.active, state.alignments.deleted)
         )
-        is_complete = state.results is not None and len(active) == len(state.alignments.active)
+        is_complete = state.results is not None and len(active) == _solved_count(state)
         return SessionRecord(
             path=self.path,
             rig=self.rig,
@@ -225,6 +225,15 @@ class LoadedSession:
             damaged=self.damaged,
             unwritten=self.unwritten,
         )
+
+
+def _solved_count(state: SessionState) -> int:
+    """Return the number of alignments that the results were solved from.
+
+    It is less than the journal's if some were lost before, and greater if some are lost since.
+    """
+    solved = (state.results or {}).get("alignments")
+    return len(solved) if isinstance(solved, list) else len(state.alignments.active)
 
 
 def load_session(path: Path, rig: Rig | None = None) -> LoadedSession:
@@ -284,7 +293,7 @@ def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
                 f"{file} is damaged: {error}",
                 "repair the session with another copy of the rig file",
             ) from error
-        damaged.append(Damage("rig.yaml", None, f"{error}; the journal's copy was read"))
+        damaged.append(Damage("rig.yaml", None, str(error), "the journal's copy was read"))
         try:
             return parse_rig(state.rig.encode())
         except ValueError as worse:
@@ -305,7 +314,7 @@ def _read_settings(file: Path, state: SessionState, damaged: list[Damage]) -> di
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
         used = "nothing was read" if state.settings is None else "the journal's copy was read"
-        damaged.append(Damage(file.name, None, f"{error}; {used}"))
+        damaged.append(Damage(file.name, None, str(error), used))
         return state.settings or {}
     return settings if state.settings is None else state.settings
 
@@ -318,7 +327,7 @@ def _check_results(file: Path, state: SessionState, damaged: list[Damage]) -> No
         if results not in (None, state.results, *state.older_results):
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
-        damaged.append(Damage(file.name, None, f"{error}; the journal's copy was read"))
+        damaged.append(Damage(file.name, None, str(error), "the journal's copy was read"))
 
 
 def _notes_checksums(replayed: Replayed) -> tuple[str | None, ...]:
@@ -343,7 +352,7 @@ def _read_notes(
             raise FileError("its checksum is not the journal's")
     except FileError as error:
         used = "it was read as it is" if found else "nothing was read"
-        damaged.append(Damage(file.name, None, f"{error}; {used}"))
+        damaged.append(Damage(file.name, None, str(error), used))
         return data.decode(errors="replace"), None
     return data.decode(errors="replace"), found
 
@@ -359,7 +368,7 @@ def _read_alignments(
             alignments[number] = _read_alignment(path, file, checksum)
         except (FileError, ValueError) as error:
             name = file.relative_to(path).as_posix()
-            damaged.append(Damage(name, None, f"{error}; alignment {number} was left out"))
+            damaged.append(Damage(name, None, str(error), f"alignment {number} was left out"))
     return alignments
 
 

@@ -191,13 +191,12 @@ class Session(Closable):
             ).contents()
         return self._contents
 
-    def full(self, kind: Kind) -> str:
-        """Return why no further alignment or trial can be saved; empty if one can."""
+    def require_room(self, kind: Kind) -> None:
+        """Raise FileError if no further alignment or trial can be saved."""
         try:
             self._state.items(kind).next_number()
         except ValueError as error:
-            return f"{self.path} is full: {error}; start another session"
-        return ""
+            raise FileError(f"{self.path} is full: {error}", "start another session") from error
 
     def record(self, event: str, **data: Any) -> None:
         """Append an event of the procedure with JSON-able data to the journal.
@@ -223,12 +222,10 @@ class Session(Closable):
         ValueError
             If it is too large, or the session is full.
         """
-        if full := self.full("alignment"):
-            raise ValueError(full)
+        number = self._state.alignments.next_number()
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise ValueError(f"an alignment of {len(data):,} bytes is too large to be saved")
-        number = self._state.alignments.next_number()
         known = {} if facts is None else {"facts": facts_json(facts)}
         saved = {"number": number, "sha256": sha256(data), **known}
         self._alignments[number] = alignment
@@ -244,8 +241,7 @@ class Session(Closable):
         FileError
             If the journal cannot be written, or the session is full.
         """
-        if full := self.full("trial"):
-            raise FileError(full)
+        self.require_room("trial")
         number = self._state.trials.next_number()
         self._write(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
         return number

@@ -78,15 +78,16 @@ def find_camera_pose(
     if len(found) < _LEAST_SEEN or turn_rad < _LEAST_TURN_RAD:
         raise HandcalError(
             f"the camera's pose was not found ({len(found)} frames, head turned by "
-            f"{np.degrees(turn_rad):.0f}°): turn the head slowly left and right, about 20° each way"
+            f"{np.degrees(turn_rad):.0f}°)",
+            "turn the head slowly left and right, about 20° each way",
         )
     means = [_mean_pose(np.array(column)) for column in zip(*found, strict=True)]
     best = int(np.argmin([spread_m for _, spread_m in means]))
     T_H_D, spread_m = means[best]
     if spread_m > _MOST_SPREAD_M:
         raise HandcalError(
-            f"by the app's poses, the camera moves by {1e3 * spread_m:.0f} mm on the rig: let the "
-            "app use the world of hl2ss"
+            f"by the app's poses, the camera moves by {1e3 * spread_m:.0f} mm on the rig",
+            "let the app use the world of hl2ss",
         )
     return CameraPose(T_H_D, spread_m, float(offsets_s[best]))
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 from handcal.calibration.hands import PlacedHand
@@ -53,7 +54,6 @@ from handcal.station.checks.headset import link_problem
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.user_test.trials import Trials
-from handcal.station.weak import weakly
 from handcal.station.wearer_view import EyeViews
 
 _FIRST_FILES = {"alignments", "rig.yaml", "settings.json", JOURNAL, JOURNAL_END, "lock"}
@@ -202,8 +202,9 @@ def start_headset(
     settings: StationSettings,
     rig_path: Path,
     worn_rig_path: Path,
-    ports: tuple[int, int],
+    port: int,
     pairing_key: str,
+    scene_port: int,
 ) -> VirtualHeadset:
     """Start the virtual headset's process.
 
@@ -212,11 +213,10 @@ def start_headset(
     settings : StationSettings
     rig_path, worn_rig_path : Path
         The rig used by the headset, and the rig of the headset actually worn.
-    ports : tuple of int
-        Ports of the PC's end of the link and of the simulated camera, on this machine.
+    port, scene_port : int
+        Of the PC's end of the link, and of the simulated camera, on this machine.
     pairing_key : str
     """
-    port, scene_port = ports
     return VirtualHeadset(
         rig_path,
         port,
@@ -304,9 +304,10 @@ class Station(Closable):
         if former is not None and resume is None:
             begun = read_former(former, read_rig(settings.rig_path))
         is_virtual = settings.headset == "virtual"
-        if is_virtual or isinstance(pairings, str):
-            key = new_pairing_key() if is_virtual else str(pairings)
-            pairings = Pairings((Pairing(key),))
+        if is_virtual:
+            pairings = new_pairing_key()
+        if isinstance(pairings, str):
+            pairings = Pairings((Pairing(pairings),))
         self._pairings = pairings
         self.watch_views = False
         self._watchers: list[Callable[[Snapshot], object]] = []
@@ -318,15 +319,21 @@ class Station(Closable):
             )
             self.settings = settings
             self.rig = self.worn_rig = self.session.contents.rig
-            self._worn_rig_path = Path(settings.worn_rig or self.session.path / "rig.yaml")
+            rig_path = self.session.path / "rig.yaml"
+            worn_rig_path = Path(settings.worn_rig or rig_path)
             bind = LOOPBACK if is_virtual else (settings.host, settings.port)
             self._link = stack.enter_context(HeadsetServer(pairings, bind))
             if is_virtual:
+                port, key = self._link.address[1], pairings.all[-1].key
+                start = partial(start_headset, settings, rig_path, worn_rig_path, port, key)
                 self._simulation = stack.enter_context(
-                    Simulation(settings.seed, weakly(self._start_headset), settings.side)
+                    Simulation(settings.seed, start, settings.side)
                 )
-                self.worn_rig = read_rig(self._worn_rig_path)
-            self._feed = stack.enter_context(CameraFeed(weakly(self._open_camera)))
+                self.worn_rig = read_rig(worn_rig_path)
+            # Not methods of the station: with it, its parts would be kept until Python collects
+            # garbage, and beside a window's many objects ended stations piled up.
+            camera = partial(open_camera, settings, self._simulation, self.worn_rig)
+            self._feed = stack.enter_context(CameraFeed(camera))
             plan = plan_of_session(self.session, settings.plan, is_resumed=resume is not None)
             if former is not None and resume is None:
                 self.session.save_facts(former=former.name)
@@ -421,9 +428,9 @@ class Station(Closable):
             not_stored=self._not_stored,
             contradiction=self._contradiction(observation),
             # A view of what the headset draws would reveal which drawing is shown.
-            views={} if self.trials.comparing.shown else dict(self._views.shown),
-            comparing=self.trials.comparing.shown,
-            has_compared_both=self.trials.comparing.has_seen_both,
+            views={} if self.trials.compared else dict(self._views.shown),
+            comparing=self.trials.compared,
+            has_compared_both=self.trials.has_compared_both,
         )
 
     def watch(self, watcher: Callable[[Snapshot], object]) -> None:
@@ -450,7 +457,7 @@ class Station(Closable):
     def finish(self) -> None:
         """Record the link statistics and finish the session; FileError if it cannot be written."""
         self.trials.hide_target()
-        self.trials.comparing.end()
+        self.trials.end_comparison()
         self.session.write_waiting()
         self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()
@@ -495,25 +502,13 @@ class Station(Closable):
         """Write pending data and close everything; safe to call twice."""
         self._stack.close()
 
-    def _start_headset(self, scene_port: int) -> VirtualHeadset:
-        return start_headset(
-            self.settings,
-            self.session.path / "rig.yaml",
-            self._worn_rig_path,
-            (self._link.address[1], scene_port),
-            self._pairings.all[-1].key,
-        )
-
-    def _open_camera(self) -> Camera:
-        return open_camera(self.settings, self._simulation, self.worn_rig)
-
     def _show(self, hand: PlacedHand) -> None:
         """Show the live hand in the headset, and render the wearer's views if requested."""
         if self.calibration.state is State.APPLIED:
             # The wearer judges the calibration by this outline on their own hand.
             outline_W_m = transform(hand.T_W_D, hand.cloud.outline_m)
             self._link.send_live_hand(outline_W_m, False, is_outline=True)
-        if self.watch_views and not self.trials.comparing.shown:
+        if self.watch_views and not self.trials.compared:
             self._views.render_next(hand, self.trials.target_E_m, self.trials.is_offline)
 
     def _link_problem(self, link: LinkStatistics) -> str:

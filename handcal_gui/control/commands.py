@@ -93,13 +93,13 @@ def _connect_trials(panels: Panels, submit: Submit) -> None:
     )
     trials.compare_requested.connect(lambda: submit(compare, lambda s: s.trials.compare()))
     trials.end_comparison_requested.connect(
-        lambda: submit(compare, lambda s: s.trials.comparing.end())
+        lambda: submit(compare, lambda s: s.trials.end_comparison())
     )
     trials.show_compared_requested.connect(
-        lambda place: submit(compare, lambda s: s.trials.comparing.show(place))
+        lambda place: submit(compare, lambda s: s.trials.show_compared(place))
     )
     trials.comparison_answered.connect(
-        lambda answer: submit(compare, lambda s: s.trials.comparing.answer(answer))
+        lambda answer: submit(compare, lambda s: s.trials.answer(answer))
     )
 
 

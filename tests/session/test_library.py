@@ -11,6 +11,7 @@ import pytest
 
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment, HeadsetIdentity
+from handcal.register.results import RESULTS_VERSION
 from handcal.rig.example import example_rig
 from handcal.session.library import (
     DELETED,
@@ -25,7 +26,7 @@ from handcal.session.session import Session
 from handcal.session.trial import make_trial
 
 RESULTS = {
-    "version": 2,
+    "version": RESULTS_VERSION,
     "eyes": {
         "left": {
             "verdict": "accept",
@@ -35,6 +36,10 @@ RESULTS = {
         "right": {"verdict": "repeat", "benefit": {"after_arcmin": 16.0}},
     },
 }
+
+
+def solved(**eyes: object) -> dict[str, object]:
+    return {"version": RESULTS_VERSION, "eyes": eyes}
 
 
 @pytest.fixture
@@ -77,7 +82,7 @@ def test_the_trials_of_an_eye_are_those_of_its_calibration(
 
     def found(**results: object) -> float | None:
         with Session(path) as session:
-            session.save_results({"eyes": {"left": results}})
+            session.save_results(solved(left=results))
         trials = read_library(tmp_path)[0].eyes["left"].trials
         assert trials is None or (trials.count, trials.is_over) == (2, False), "no target is known"
         return None if trials is None else trials.mean_arcmin
@@ -98,7 +103,7 @@ def test_a_number_too_large_for_a_float_hides_no_other_session(
 ) -> None:
     make("sound", "Bo")
     with Session(make("one", "Ada", solved=False)) as session:
-        session.save_results({"eyes": {"left": {"verdict": "accept", name: [10**400, 0, 0]}}})
+        session.save_results(solved(left={"verdict": "accept", name: [10**400, 0, 0]}))
     entries = {entry.wearer: entry for entry in read_library(tmp_path)}
     assert entries["Ada"].damaged == 1
     assert not entries["Bo"].damaged
@@ -125,7 +130,7 @@ def test_an_eye_that_keeps_the_offline_calibration_has_its_error(
 ) -> None:
     kept = {"benefit": {"without_arcmin": 6.2, "after_arcmin": 2.7}, "measured_arcmin": [5, 2.7]}
     with Session(make("one", "Ada", solved=False)) as session:
-        session.save_results({"eyes": {"right": {"verdict": "keep", **kept}}})
+        session.save_results(solved(right={"verdict": "keep", **kept}))
     (entry,) = read_library(tmp_path)
     right = entry.eyes["right"]
     assert (right.before_arcmin, right.expected_arcmin, right.remaining_arcmin) == (6.2, 6.2, None)
@@ -139,6 +144,14 @@ def test_results_that_no_longer_hold_are_not_shown(
     (entry,) = read_library(tmp_path)
     assert entry.eyes == {}
     assert not entry.is_finished
+
+
+def test_results_of_another_version_are_not_shown(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    with Session(make("one", "Ada")) as session:
+        session.save_results(RESULTS | {"version": RESULTS_VERSION - 1})
+    assert read_library(tmp_path)[0].eyes == {}
 
 
 def test_a_damaged_session_says_so_and_spares_the_others(
@@ -169,7 +182,7 @@ def test_strange_results_are_no_obstacle(
     make: Callable[..., Path], tmp_path: Path, eyes: object
 ) -> None:
     with Session(make("one", "Ada", solved=False)) as session:
-        session.save_results({"eyes": eyes})
+        session.save_results({"version": RESULTS_VERSION, "eyes": eyes})
     (entry,) = read_library(tmp_path)
     for outcome in entry.eyes.values():
         assert outcome.remaining_arcmin is None

@@ -208,7 +208,7 @@ def test_a_session_of_many_alignments_is_full(session: Session, alignment: Align
     session.delete("alignment", session.save_alignment(alignment))
     for _ in range(MAX_ALIGNMENTS):
         session.save_alignment(alignment)
-    with pytest.raises(ValueError, match="full: no room for more than 100 alignments"):
+    with pytest.raises(ValueError, match="no room for more than 100 alignments"):
         session.save_alignment(alignment)
     with pytest.raises(ValueError, match="no room for more than 100 alignments"):
         session.restore("alignment", 1)

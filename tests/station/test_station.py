@@ -155,9 +155,9 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         compared = station.step()
         assert (compared.comparing, compared.has_compared_both) == ("first", False)
         assert compared.views == {}  # they would tell which drawing is shown
-        station.trials.comparing.show("second")
+        station.trials.show_compared("second")
         assert station.step().has_compared_both
-        station.trials.comparing.answer("second")
+        station.trials.answer("second")
         station.trials.show_offline(True)
         station.trials.show_offline(False)  # nothing else may change
         solved_m = applied_m["left"]

@@ -34,7 +34,7 @@ from handcal.core.errors import (
 )
 from handcal.core.geometry import image_points, invert, transform
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Eye, Float64, Frame, Rig, UInt8
+from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Frame, Rig, UInt8
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Shape
 from handcal.register.results import read_rendered_shift_m
@@ -467,42 +467,44 @@ def run_user_trials(
     drawing = Drawing(rig, server, record.wearer)
     trials: list[Trial] = []
     # A headset draws nothing before it has the projections of both eyes.
-    drawing.send({eye: calibrated_m.get(eye, np.zeros(3)) for eye in EYES})
-    drawing.wait_acked(_ACK_S)
+    _draw(drawing, {eye: calibrated_m.get(eye, np.zeros(3)) for eye in EYES})
     try:
-        for round_number, depth_m in enumerate(TARGET_DEPTHS_M):
+        for number, depth_m in enumerate(TARGET_DEPTHS_M):
             server.send_prompt(PLACE_PROMPT.format(depth_m))
             place(depth_m)
             cube = wait_for_cube(tracker, server, rig, depth_m, settings, progress)
             for eye in settings.eyes:
-                progress.at(round_number / len(TARGET_DEPTHS_M), f"{eye} eye, {depth_m} m")
-
-                def draw(shift_m: Float64) -> None:
-                    drawing.send({eye: shift_m})  # noqa: B023 (called before the next eye's turn)
-                    drawing.wait_acked(_ACK_S)
-
-                draw(calibrated_m[eye])
-                T_E_T = view_of_eye(rig.eyes[eye], _head_now(server)) @ cube.T_W_T
-                corners_W_m = transform(cube.T_W_T, facing_corners_m(tracker.cube, T_E_T))
-                server.wait_acked(server.send_shape(Shape(corners_W_m, (eye,))), _ACK_S)
-                server.wait_acked(server.send_prompt(adjust_prompt(eye), (eye,)), _ACK_S)
-                adjusted_m = adjust(eye, calibrated_m[eye], draw)
-                T_E_W = view_of_eye(rig.eyes[eye], _head_now(server))
-                trial = make_trial(
-                    rig.eyes[eye],
-                    eye,
-                    depth_m,
-                    calibrated_m[eye],
-                    adjusted_m,
-                    transform(T_E_W, corners_W_m),
-                )
-                session.save_trial(trial)
-                trials.append(trial)
-                draw(calibrated_m[eye])
+                progress.at(number / len(TARGET_DEPTHS_M), f"{eye} eye, {depth_m} m")
+                display, shift_m = rig.eyes[eye], calibrated_m[eye]
+                _draw(drawing, {eye: shift_m})
+                corners_W_m = _show_face(server, tracker.cube, cube, eye, display)
+                adjusted_m = adjust(eye, shift_m, lambda m, eye=eye: _draw(drawing, {eye: m}))
+                # The head has moved since: the trial is about where the corners are seen now.
+                corners_E_m = transform(view_of_eye(display, _head_now(server)), corners_W_m)
+                trials.append(make_trial(display, eye, depth_m, shift_m, adjusted_m, corners_E_m))
+                session.save_trial(trials[-1])
+                _draw(drawing, {eye: shift_m})
     finally:
         server.send_shape(None)
         server.send_prompt("")
     return tuple(trials)
+
+
+def _draw(drawing: Drawing, shifts_m: Mapping[Eye, Float64]) -> None:
+    """Have the headset draw with φ, and wait until it does."""
+    drawing.send(shifts_m)
+    drawing.wait_acked(_ACK_S)
+
+
+def _show_face(
+    server: HeadsetServer, cube: Cube, tracked: TrackedCube, eye: Eye, display: EyeDisplay
+) -> Float64:
+    """Draw the corners of the face that an eye sees, and tell the wearer; return them (4, 3)."""
+    T_E_T = view_of_eye(display, _head_now(server)) @ tracked.T_W_T
+    corners_W_m = transform(tracked.T_W_T, facing_corners_m(cube, T_E_T))
+    server.wait_acked(server.send_shape(Shape(corners_W_m, (eye,))), _ACK_S)
+    server.wait_acked(server.send_prompt(adjust_prompt(eye), (eye,)), _ACK_S)
+    return corners_W_m
 
 
 def adjust_prompt(eye: Eye) -> str:
