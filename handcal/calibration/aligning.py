@@ -19,7 +19,7 @@ from handcal.core.types import EYES, Alignment, Eye, Float64, Rig
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.shape import ShapeChange, change_text
-from handcal.session.facts import AlignmentFacts
+from handcal.session.state import AlignmentFacts
 
 KEEP_PROMPT = "Keep your hand up."
 """Shown if the next cursor or verification follows at once."""

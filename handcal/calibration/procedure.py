@@ -88,9 +88,8 @@ from handcal.link.nudges import VerifyRequest
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
 from handcal.register.results import Results, results_json
-from handcal.session.facts import CameraUsed, facts_json
 from handcal.session.session import Session, SessionRecord
-from handcal.session.state import VERIFYING, WENT_BACK
+from handcal.session.state import VERIFYING, WENT_BACK, CameraUsed, facts_json
 
 
 @dataclass(frozen=True, slots=True, eq=False)

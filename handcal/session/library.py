@@ -17,7 +17,6 @@ from handcal.io.lock import FileLock
 from handcal.register.results import RESULTS_VERSION, read_rendered_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.journal import JOURNAL, find_journals, read_journal
-from handcal.session.judged_trials import EyeTrials, judge_trials
 from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
     SessionRecord,
@@ -27,7 +26,7 @@ from handcal.session.record import (
 )
 from handcal.session.session import Session
 from handcal.session.state import ASIDE, VERIFYING, SessionEvent, SessionState, clean_wearer
-from handcal.session.trial import trial_errors_arcmin
+from handcal.session.trial import EyeTrials, judge_trials, trial_errors_arcmin
 
 DELETED = ".deleted"
 """Folder, inside the folder of sessions, to which deleted sessions are moved."""

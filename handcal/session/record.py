@@ -13,10 +13,10 @@ from typing import Any
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment, Eye, Float64, Rig
 from handcal.io.files import read_json, read_limited
+from handcal.register.results import Results, read_rendered_shift_m
 from handcal.register.solve import check_alignment
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.alignment_file import decode_alignment
-from handcal.session.facts import AlignmentFacts, SessionFacts
 from handcal.session.journal import (
     JOURNAL,
     Damage,
@@ -24,8 +24,8 @@ from handcal.session.journal import (
     JournalContent,
     read_journal,
 )
-from handcal.session.state import SessionEvent, SessionState
-from handcal.session.trial import Trial
+from handcal.session.state import AlignmentFacts, SessionEvent, SessionFacts, SessionState
+from handcal.session.trial import EyeTrials, Trial, judge_trials, trial_errors_arcmin
 
 MAX_ALIGNMENT_BYTES = 16 * 2**20
 MAX_NOTES_CHARACTERS = 20_000
@@ -120,6 +120,20 @@ class SessionRecord:
         counts = f"{len(self.alignments)} alignments, {len(self.trials)} trials"
         damaged = f", {len(self.damaged)} parts damaged" if self.damaged else ""
         return f"<SessionRecord {self.path}: {counts}{damaged}>"
+
+
+def eye_trials(
+    results: Results, record: SessionRecord, target_arcmin: float
+) -> dict[Eye, EyeTrials]:
+    """Return the trials of a session's results, of each eye that has some.
+
+    Stored results count, too, if they are of all alignments: another version may have solved them
+    with another φ.
+    """
+    stored_m = read_rendered_shift_m(record.results if record.is_solved else None)
+    trials = (one for one in record.trials.values() if one.eye in results.eyes)
+    errors = trial_errors_arcmin(trials, results.rendered_shift_m, stored_m)
+    return judge_trials(errors, target_arcmin)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

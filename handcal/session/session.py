@@ -46,16 +46,22 @@ from handcal.io.files import (
 from handcal.io.lock import FileLock
 from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
 from handcal.session.alignment_file import encode_alignment
-from handcal.session.comparison import COMPARED, Comparison, comparison_json
-from handcal.session.facts import AlignmentFacts, SessionFacts, facts_json, with_facts
 from handcal.session.in_force import end_at_close
 from handcal.session.journal import JOURNAL, Event, JournalWriter, happens_now, journal_line
 from handcal.session.record import MAX_ALIGNMENT_BYTES as MAX_ALIGNMENT_BYTES
 from handcal.session.record import MAX_NOTES_CHARACTERS as MAX_NOTES_CHARACTERS
 from handcal.session.record import SessionRecord as SessionRecord
 from handcal.session.record import alignment_path, load_session, sha256
-from handcal.session.state import Kind, SessionEvent, clean_wearer
-from handcal.session.trial import Trial, trial_json
+from handcal.session.state import (
+    AlignmentFacts,
+    Kind,
+    SessionEvent,
+    SessionFacts,
+    clean_wearer,
+    facts_json,
+    with_facts,
+)
+from handcal.session.trial import COMPARED, Comparison, Trial, comparison_json, trial_json
 
 
 class Session(Closable):

@@ -12,8 +12,8 @@ from handcal.calibration.states import CalibrationSettings, Observation
 from handcal.camera.feed import CameraStatus
 from handcal.core.types import Eye, Frame
 from handcal.link.statistics import LinkStatistics
-from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
+from handcal.session.trial import Place
 from handcal.station.wearer_view import EyeView
 
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.core.types import Eye
 from handcal.register.results import Results
-from handcal.session.judged_trials import eye_trials
+from handcal.session.record import eye_trials
 from handcal.session.session import SessionRecord
 from handcal_gui.panels.results.residuals_tab import ResidualsTab
 from handcal_gui.theme import SPACING_PX, font_px, scale_font

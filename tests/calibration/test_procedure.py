@@ -21,8 +21,8 @@ from handcal.core.types import EYES, Eye, Float64, Frame, HeadsetIdentity, Heads
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.register.results import results_json
-from handcal.session.facts import facts_json
 from handcal.session.session import Session
+from handcal.session.state import facts_json
 from tests.calibration.stage import (
     CAMERA,
     CAMERA_AHEAD_NS,

@@ -10,7 +10,8 @@ import pytest
 
 from handcal.core.types import Eye, Float64
 from handcal.rig.example import example_rig
-from handcal.session.comparison import (
+from handcal.session.session import Session
+from handcal.session.trial import (
     COMPARED,
     Answer,
     Comparison,
@@ -20,7 +21,6 @@ from handcal.session.comparison import (
     read_comparisons,
     sign_test,
 )
-from handcal.session.session import Session
 
 SHIFT_M: dict[Eye, Float64] = {"left": np.array([1e-3, 2e-3, 3e-3])}
 

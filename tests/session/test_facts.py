@@ -19,8 +19,8 @@ from handcal.core.types import (
     Verification,
 )
 from handcal.rig.example import example_rig
-from handcal.session.facts import AlignmentFacts, CameraUsed, SessionFacts, facts_json
 from handcal.session.session import Session
+from handcal.session.state import AlignmentFacts, CameraUsed, SessionFacts, facts_json
 
 CAMERA = CameraUsed(
     CameraIdentity("D415", "816612062327", "5.13"),

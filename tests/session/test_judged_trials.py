@@ -9,7 +9,7 @@ import pytest
 from handcal.core.types import EYES, Alignment
 from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
-from handcal.session.judged_trials import eye_trials
+from handcal.session.record import eye_trials
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 

@@ -6,9 +6,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from handcal.core.types import EyeDistance, Verification
-from handcal.session.facts import facts_json
 from handcal.session.journal import Event
-from handcal.session.state import NumberedItems, SessionEvent, SessionState
+from handcal.session.state import NumberedItems, SessionEvent, SessionState, facts_json
 
 
 @given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))

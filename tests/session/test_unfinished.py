@@ -5,11 +5,10 @@ import numpy as np
 
 from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
-from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.library import unfinished_and_repaired
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
-from handcal.session.trial import make_trial
+from handcal.session.trial import COMPARED, Comparison, comparison_json, make_trial
 
 
 def make(parent: Path, name: str, wearer: str = "") -> Session:

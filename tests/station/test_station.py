@@ -26,9 +26,9 @@ from handcal.link.pairing import new_pairing_key
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.rig.example import example_rig
-from handcal.session.facts import facts_json
 from handcal.session.journal import JournalContent, read_journal
 from handcal.session.session import Session
+from handcal.session.state import facts_json
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import draw_eyes

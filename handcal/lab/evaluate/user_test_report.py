@@ -13,8 +13,7 @@ from handcal.report.cells import extremes, interval_ends, mean_sd, median_quarti
 from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with
 from handcal.report.statistics import INTERVAL_METHOD
-from handcal.session.comparison import count_comparisons, read_comparisons
-from handcal.session.trial import calibration_numbers
+from handcal.session.trial import calibration_numbers, count_comparisons, read_comparisons
 
 # Wearers in one figure, and the height of each.
 _WEARERS, _WEARER_MM, _FIGURE_MM = 24, 6.0, 30.0

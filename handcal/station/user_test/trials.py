@@ -13,9 +13,8 @@ from handcal.core.display import target_corners_m
 from handcal.core.types import Eye, Float64, Rig
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target
-from handcal.session.comparison import Answer, Comparison, Drawing, Place
 from handcal.session.session import Session
-from handcal.session.trial import make_trial
+from handcal.session.trial import Answer, Comparison, Drawing, Place, make_trial
 
 _SAME_M = 1e-6
 _ORDERS: tuple[Drawing, ...] = ("offline", "applied")

@@ -12,8 +12,8 @@ import pytest
 
 from handcal.calibration.states import ProcedureError, State
 from handcal.rig.example import example_rig
-from handcal.session.comparison import Drawing, read_comparisons
 from handcal.session.session import Session
+from handcal.session.trial import Drawing, read_comparisons
 from handcal.station.user_test.trials import Trials
 
 APPLIED_M = {"left": np.array([1e-3, 0.0, 0.0]), "right": np.zeros(3)}
