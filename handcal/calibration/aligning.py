@@ -10,7 +10,7 @@ import numpy as np
 
 from handcal.calibration.delay import MOVED_LIMIT_M, DelayMeter
 from handcal.calibration.hands import PlacedHand, RecentHands, merge_hold
-from handcal.calibration.states import Observation
+from handcal.calibration.sight import Observation
 from handcal.camera.clock import INFORM_NS
 from handcal.core.display import view_of_eye
 from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError

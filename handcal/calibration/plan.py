@@ -15,7 +15,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from handcal.calibration.procedure import Calibration
-from handcal.calibration.states import Observation, ProcedureError, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError, HandError
 from handcal.core.types import EYES, Eye, EyePlan, Frame, PlanName, Verdict, VerdictName
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification

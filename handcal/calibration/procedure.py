@@ -29,7 +29,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,14 +43,12 @@ from handcal.calibration.aligning import (
     align_prompt,
 )
 from handcal.calibration.drawing import Drawing
-from handcal.calibration.evidence import Contradiction, Evidence
 from handcal.calibration.hands import PlacedHand, merge_hold
-from handcal.calibration.sight import Sight
+from handcal.calibration.sight import Contradiction, Evidence, Observation, Sight
 from handcal.calibration.solve_again import solve_again, solve_contents
 from handcal.calibration.states import (
     MAX_HAND_SET_SHIFT_M,
     CalibrationSettings,
-    Observation,
     ProcedureError,
     State,
 )
@@ -472,10 +470,7 @@ class Calibration:
         if eye_distance == self.eye_distance:
             return
         self._require_settled("the eye distance")
-        if self._session.contents.is_solvable:
-            self._change(lambda: self._session.save_facts(eye_distance=eye_distance))
-        else:
-            self._session.save_facts(eye_distance=eye_distance)
+        self._save_facts(True, eye_distance=eye_distance)
 
     def choose_eyes(self, plan: EyePlan, usable_eyes: tuple[Eye, ...]) -> None:
         """Record which eyes are aligned in which order; the results of other eyes are discarded.
@@ -483,12 +478,8 @@ class Calibration:
         Raises as `set_eye_distance`.
         """
         self._require_settled("the eyes")
-        record = self._session.contents
-        facts = {"plan": plan, "usable_eyes": usable_eyes}
-        if usable_eyes != record.facts.usable_eyes and record.is_solvable:
-            self._change(lambda: self._session.save_facts(**facts))
-        else:
-            self._session.save_facts(**facts)
+        is_other = usable_eyes != self._session.contents.facts.usable_eyes
+        self._save_facts(is_other, plan=plan, usable_eyes=usable_eyes)
 
     # Solving, and sending what was solved.
 
@@ -632,10 +623,6 @@ class Calibration:
         """Undo the last nudge; raises as `nudge`."""
         self._nudge(self._require_verifying().undo)
 
-    def redo_nudge(self) -> None:
-        """Redo the last nudge that was undone; raises as `nudge`."""
-        self._nudge(self._require_verifying().redo)
-
     def verified(self) -> None:
         """Confirm for the wearer, who has told the technician, that the drawing covers the hand.
 
@@ -757,8 +744,9 @@ class Calibration:
 
     def _record_evidence(self) -> None:
         """Record what contradicts the result, with which it is judged."""
-        found, facts = self.evidence.contradictions, self._session.contents.facts
-        names, texts = tuple(one.name for one in found), tuple(one.text for one in found)
+        evidence, facts = self.evidence.contradictions, self._session.contents.facts
+        names = tuple(contradiction.name for contradiction in evidence)
+        texts = tuple(contradiction.text for contradiction in evidence)
         if (names, texts) != (facts.evidence, facts.contradictions):
             with suppress(FileError):  # the results, recorded next, raise it again
                 self._session.save_facts(evidence=names, contradictions=texts)
@@ -898,6 +886,13 @@ class Calibration:
             raise
         self._forget_results()
 
+    def _save_facts(self, changes_results: bool, **facts: Any) -> None:
+        """Save facts; results made from other facts, if there can be any, are discarded."""
+        if changes_results and self._session.contents.is_solvable:
+            self._change(lambda: self._session.save_facts(**facts))
+        else:
+            self._session.save_facts(**facts)
+
     def _forget_results(self) -> None:
         self.results = None
         if self.state is not State.APPLIED:
@@ -1003,11 +998,11 @@ class Calibration:
         if not verifying.is_moved:
             self._end_unmoved(verifying)
             return
-        found = verifying.result(hand_E_m, hand.cloud.outline_sigma_px)
-        found = found.after(self.verifications.get(verifying.eye))
+        verification = verifying.result(hand_E_m, hand.cloud.outline_sigma_px)
+        verification = verification.after(self.verifications.get(verifying.eye))
         self._end_verifying(verifying.shift_m)
         with suppress(FileError):  # the results, recorded next, raise it again
-            self._session.save_facts(verified={verifying.eye: found})
+            self._session.save_facts(verified={verifying.eye: verification})
         try:
             self.solve()
         finally:
@@ -1047,8 +1042,9 @@ def _moved(hand: PlacedHand, displacement_W_m: ArrayLike) -> PlacedHand:
 
 def _is_new(device: HeadsetIdentity, known: HeadsetIdentity) -> bool:
     """Return whether a headset is another one, or tells something that it has not told before."""
+    # Where the views are and how far the eyes are apart changes as the eyes are tracked.
     named, known_name = (
-        facts_json(replace(one, views={}, eye_distance_m=None)) for one in (device, known)
+        facts_json(replace(headset, views={}, eye_distance_m=None)) for headset in (device, known)
     )
     tells_distance = device.eye_distance_m is not None and known.eye_distance_m is None
     return named != known_name or not device.views.keys() <= known.views.keys() or tells_distance

@@ -17,11 +17,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from handcal.calibration.evidence import Contradiction
 from handcal.calibration.plan import PlanSettings, with_eyes
 from handcal.calibration.procedure import Calibration
+from handcal.calibration.sight import Contradiction, Observation
 from handcal.calibration.solve_again import SLIP_M
-from handcal.calibration.states import Observation
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress

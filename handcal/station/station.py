@@ -16,8 +16,9 @@ from handcal.calibration.hands import PlacedHand
 from handcal.calibration.lab_prior import run_learn_prior
 from handcal.calibration.plan import Plan, PlanSettings, StepName
 from handcal.calibration.procedure import Calibration
+from handcal.calibration.sight import Observation
 from handcal.calibration.solve_again import Former, read_former, stored_solve_settings
-from handcal.calibration.states import Observation, ProcedureError, State
+from handcal.calibration.states import ProcedureError, State
 from handcal.calibration.verifying import skipped_eyes
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed

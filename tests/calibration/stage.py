@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from handcal.calibration.procedure import Calibration
-from handcal.calibration.states import CalibrationSettings, Observation, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import CalibrationSettings, State
 from handcal.core.display import projection_matrix
 from handcal.core.errors import PoseError
 from handcal.core.geometry import rigid

@@ -7,7 +7,8 @@ import pytest
 
 from handcal.calibration.aligning import ADVISE_EVERY_NS, Aligning, align_prompt
 from handcal.calibration.hands import PlacedHand
-from handcal.calibration.states import Observation, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import State
 from handcal.core.types import EYES, HandCloud
 from handcal.register.guard import GuardSettings
 from handcal.rig.example import example_rig

@@ -37,25 +37,6 @@ def test_the_offline_projections_come_first(
     eventually(lambda: shows_offline_projections(stage.shown()))
 
 
-def test_a_silent_headset_can_be_applied_to_again_when_it_is_back(
-    stage: Stage, server: HeadsetServer, client: HeadsetClient
-) -> None:
-    stage.align()
-    results = stage.calibration.solve()
-    client.close()
-    eventually(lambda: not server.connected)
-    stage.calibration.apply()
-    with pytest.raises(LinkError, match="not acknowledged"):
-        stage.calibration.wait_applied(0.1)
-    assert stage.state() is State.SOLVED
-    with connect(server) as back:
-        stage.calibration.apply()
-        stage.calibration.wait_applied()
-        for eye in EYES:
-            expected = projection_matrix(RIG.eyes[eye], results.eyes[eye].shift_m)
-            np.testing.assert_array_equal(back.state().projections[eye].P, expected)
-
-
 @pytest.mark.parametrize("name", ["keep", "implausible", "contradicted"])
 def test_a_result_not_used_leaves_the_offline_calibration_in_the_headset(
     stage: Stage, session: Session, name: VerdictName

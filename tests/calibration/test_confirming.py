@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.calibration.aligning import ADVISE_EVERY_NS, align_prompt
 from handcal.calibration.delay import MOVED_LIMIT_M
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.display import view_of_eye
@@ -32,20 +31,6 @@ from tests.calibration.stage import (
     world,
 )
 from tests.helpers import eventually
-
-
-def test_a_hand_turned_by_more_than_three_degrees_is_advised_until_it_is_turned_back(
-    stage: Stage,
-) -> None:
-    stage.make_cursor()
-    stage.see(T_D_HAND @ rigid([0.0, 0.0, np.radians(2.2)]))
-    assert stage.shown().prompt == align_prompt(EYES)
-    turned = stage.see(T_D_HAND @ rigid([0.0, 0.0, np.radians(6.0)]))
-    assert not turned.is_over_limit
-    eventually(lambda: stage.shown().prompt == "Tilt your hand anticlockwise, then confirm.")
-    stage.t_ns += ADVISE_EVERY_NS
-    stage.see(T_D_HAND)
-    eventually(lambda: stage.shown().prompt == align_prompt(EYES))
 
 
 def test_a_turned_hand_is_refused_with_a_prompt_and_may_align_again(

@@ -20,7 +20,7 @@ from handcal.link.nudges import NudgeSum
 from handcal.link.server import HeadsetServer
 from handcal.register.placement import PlacementSettings
 from handcal.session.session import Session
-from tests.calibration.stage import HEADSET_AHEAD_NS, RIG, T_D_HAND, Stage
+from tests.calibration.stage import HEADSET_AHEAD_NS, RIG, Stage
 from tests.helpers import eventually
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)
@@ -150,18 +150,6 @@ def test_every_eye_is_verified_and_then_the_hand_may_be_lowered(
     assert planned.stage.calibration.raised is None
 
 
-def test_one_usable_eye(make: Callable[..., Planned]) -> None:
-    planned = make(PlanSettings("paper", usable_eyes=("right",), is_automatic=True, placement=ONCE))
-    assert planned.until(StepName.CURSOR).eyes == ("right",)
-    planned.confirm()
-    assert planned.until(StepName.VERIFY).eyes == ("right",)
-    planned.fits("right")
-    planned.until(StepName.DONE)
-    assert set(planned.stage.calibration.verifications) == {"right"}
-    assert planned.stage.calibration.results is not None
-    assert set(planned.stage.calibration.results.eyes) == {"right"}
-
-
 def test_a_stored_calibration_is_verified_before_anything_else(
     make: Callable[..., Planned],
 ) -> None:
@@ -176,28 +164,6 @@ def test_a_stored_calibration_is_verified_before_anything_else(
     assert {one.name for one in results.verdicts.values()} <= {"accept", "keep"}
     assert not planned.stage.calibration.alignments
     assert "verdict" in step.text
-
-
-def test_the_paper_s_cursor_is_where_the_hand_is(make: Callable[..., Planned]) -> None:
-    planned = make(PlanSettings("paper", is_automatic=True, verify=False))
-    planned.until(StepName.CURSOR)
-    calibration = planned.stage.calibration
-    assert calibration.eyes == EYES
-    assert calibration.raised is None
-    assert calibration.cursor is not None
-    hand = calibration.steady_hand
-    assert hand is not None
-    assert np.linalg.norm(calibration.cursor.middle_W_m - hand.middle_W_m) < 0.002
-
-
-def test_asking_changes_nothing(make: Callable[..., Planned]) -> None:
-    planned = make()
-    planned.stage.hold(T_D_HAND)
-    eventually(lambda: planned.stage.calibration.is_applied)
-    first = planned.plan.next_step(is_steady=True)
-    second = planned.plan.next_step(is_steady=True)
-    assert first.name is second.name is StepName.CURSOR
-    assert planned.stage.state() is State.SHOW_HAND
 
 
 def test_the_whole_recommended_plan_with_one_usable_eye(make: Callable[..., Planned]) -> None:

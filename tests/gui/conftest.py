@@ -20,7 +20,8 @@ from scipy.spatial.transform import Rotation
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.plan import NextStep, StepName
 from handcal.calibration.procedure import Procedure
-from handcal.calibration.states import CalibrationSettings, Observation, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import CalibrationSettings, State
 from handcal.camera.feed import CameraStatus
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.display import view_of_eye

@@ -252,19 +252,6 @@ def test_a_repaired_copy_keeps_the_names(make: Callable[..., Path], tmp_path: Pa
     assert (copy.wearer, copy.former_wearers, copy.damaged) == ("Ada", ("Adda",), 0)
 
 
-def test_a_crash_leaves_the_former_or_the_corrected_name(
-    make: Callable[..., Path], tmp_path: Path
-) -> None:
-    journal = make("one", "Adda") / "journal.jsonl"
-    begun = len(journal.read_bytes())
-    correct_wearer(journal.parent, "Ada")
-    complete = journal.read_bytes()
-    for length in range(begun, len(complete) + 1):
-        journal.write_bytes(complete[:length])
-        record = Session.open(journal.parent)
-        assert record.wearer == ("Ada" if length == len(complete) else "Adda")
-
-
 def test_a_deleted_session_that_vanishes_while_listed_is_no_obstacle(
     make: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -40,12 +40,6 @@ def test_everything_comes_back(finished: SessionRecord, alignment: Alignment) ->
     assert finished.torn_bytes == 0
 
 
-def test_a_new_session_has_no_results_and_can_be_read_while_written(session: Session) -> None:
-    record = Session.open(session.path)
-    assert record.results is None
-    assert record.alignments == {}
-
-
 def test_a_session_goes_on_where_it_ended(session: Session, alignment: Alignment) -> None:
     assert session.save_alignment(alignment) == 1
     session.close()
@@ -102,30 +96,6 @@ def test_a_closed_session_writes_no_more(session: Session) -> None:
     session.close()
     with pytest.raises(FileError, match="is closed; open the session again"):
         session.record("event")
-
-
-def test_a_deleted_alignment_is_left_out_with_its_results(
-    session: Session, alignment: Alignment
-) -> None:
-    second = replace(alignment, t_b_ns=2)
-    session.save_alignment(alignment)
-    session.save_alignment(second)
-    session.save_results(RESULTS)
-    session.delete("alignment", 2)
-    record = Session.open(session.path)
-    assert [kept.t_b_ns for kept in record.alignments.values()] == [alignment.t_b_ns]
-    assert record.results is None
-
-    session.close()
-    with Session(session.path) as again:
-        assert again.save_alignment(replace(alignment, t_b_ns=3)) == 3
-        again.delete("alignment", 3)
-        again.delete("alignment", 1)
-        with pytest.raises(ValueError, match="there is no alignment 1"):
-            again.delete("alignment", 1)
-        with pytest.raises(ValueError, match="alignment_deleted"):
-            again.record("alignment_deleted")
-    assert Session.open(session.path).alignments == {}
 
 
 def numbers(record: SessionRecord) -> tuple[list[int], list[int]]:

@@ -1,13 +1,11 @@
 import contextlib
-from typing import Any
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from handcal.core.types import EyeDistance, Verification
 from handcal.session.journal import Event
-from handcal.session.state import NumberedItems, SessionEvent, SessionState, facts_json
+from handcal.session.state import NumberedItems, SessionEvent, SessionState
 
 
 @given(st.lists(st.tuples(st.sampled_from(["save", "delete", "restore"]), st.integers(1, 6))))
@@ -61,26 +59,3 @@ def test_an_event_of_others_changes_nothing_but_that_it_goes_on() -> None:
     assert state.is_finished
     state.apply(Event(2, "", "cursor_made", {"shift_m": "nonsense"}))
     assert not state.is_finished
-
-
-@pytest.mark.parametrize(
-    "facts",
-    [
-        {"verified": {"left": Verification((0.0, 0.0, 0.0), (1.0, 0.0), (0.001, 0.0, 0.0))}},
-        {"eye_distance": EyeDistance(0.063)},
-    ],
-    ids=["a verification", "the distance of the eyes"],
-)
-def test_results_end_with_a_fact_that_changes_them(facts: dict[str, Any]) -> None:
-    state = SessionState()
-    for name, data in (
-        (SessionEvent.ALIGNMENT_SAVED, {"number": 1, "sha256": "x"}),
-        (SessionEvent.SOLVED, {"eyes": {}}),
-        (SessionEvent.APPLIED, {"shift_m": {"left": [0.0, 0.0, 0.0]}}),
-        (SessionEvent.FACTS_SAVED, {"plan": "recommended"}),
-    ):
-        state.apply(Event(1, "", name, data))
-    assert (state.is_solved, state.is_applied, state.results) == (True, True, {"eyes": {}})
-    state.apply(Event(2, "", SessionEvent.FACTS_SAVED, facts_json(facts)))
-    assert (state.is_solved, state.is_applied, state.results) == (False, False, None)
-    assert state.older_results == [{"eyes": {}}]

@@ -31,12 +31,8 @@ from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
 from handcal.rig.compare import compare_camera
 from handcal.rig.rig_file import read_rig
-from handcal.station.checks.headset import (
-    STAMP_ADVICE,
-    headset_problem,
-    headset_state,
-    run_pose_delay,
-)
+from handcal.station.checks.headset import headset_problem, headset_state
+from handcal.station.poses import STAMP_ADVICE, run_pose_delay
 
 _PACKAGES = (
     "numpy",

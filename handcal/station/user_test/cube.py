@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
@@ -368,6 +369,7 @@ class StudyLeader:
     """The person who puts the cube down and adjusts φ."""
 
     place: Callable[[float], None]
+    """Called before each distance: asks for the cube there."""
     adjust: Adjust
 
 
@@ -415,18 +417,15 @@ def record_user_trials(
             camera = stack.enter_context(open_camera())
         session = stack.enter_context(Session(order.session))
         tracker = CubeTracker(camera, cube, rig.T_H_D, server.pose_at_host_ns)
-        return run_user_trials(
-            session, server, tracker, leader.adjust, leader.place, order.trials, progress
-        )
+        return run_user_trials(session, server, tracker, leader, order.trials, progress)
 
 
 def run_user_trials(
     session: Session,
     server: HeadsetServer,
     tracker: CubeTracker,
-    adjust: Adjust,
-    place: Callable[[float], None],
-    settings: TrialSettings | None = None,
+    leader: StudyLeader,
+    settings: TrialSettings = TrialSettings(),
     progress: Progress = Progress(),
 ) -> tuple[Trial, ...]:
     """Record a trial for each distance and eye of a session's calibration.
@@ -438,11 +437,8 @@ def run_user_trials(
     server : HeadsetServer
         With a connected headset.
     tracker : CubeTracker
-    adjust : callable
-        See `Adjust`.
-    place : callable
-        Called before each distance: asks for the cube there.
-    settings : TrialSettings, optional
+    leader : StudyLeader
+    settings : TrialSettings
     progress : Progress
 
     Returns
@@ -461,38 +457,39 @@ def run_user_trials(
     CameraError
     CancelledError
     """
-    settings = settings or TrialSettings()
     record = session.contents
     rig, calibrated_m = record.rig, calibrated_shifts_m(record, settings.eyes)
     drawing = Drawing(rig, server, record.wearer)
     trials: list[Trial] = []
     # A headset draws nothing before it has the projections of both eyes.
-    _draw(drawing, {eye: calibrated_m.get(eye, np.zeros(3)) for eye in EYES})
+    drawing.send({eye: calibrated_m.get(eye, np.zeros(3)) for eye in EYES})
+    drawing.wait_acked(_ACK_S)
     try:
         for number, depth_m in enumerate(TARGET_DEPTHS_M):
             server.send_prompt(PLACE_PROMPT.format(depth_m))
-            place(depth_m)
+            leader.place(depth_m)
             cube = wait_for_cube(tracker, server, rig, depth_m, settings, progress)
             for eye in settings.eyes:
                 progress.at(number / len(TARGET_DEPTHS_M), f"{eye} eye, {depth_m} m")
                 display, shift_m = rig.eyes[eye], calibrated_m[eye]
-                _draw(drawing, {eye: shift_m})
+                draw = partial(_draw, drawing, eye)
+                draw(shift_m)
                 corners_W_m = _show_face(server, tracker.cube, cube, eye, display)
-                adjusted_m = adjust(eye, shift_m, lambda m, eye=eye: _draw(drawing, {eye: m}))
+                adjusted_m = leader.adjust(eye, shift_m, draw)
                 # The head has moved since: the trial is about where the corners are seen now.
                 corners_E_m = transform(view_of_eye(display, _head_now(server)), corners_W_m)
                 trials.append(make_trial(display, eye, depth_m, shift_m, adjusted_m, corners_E_m))
                 session.save_trial(trials[-1])
-                _draw(drawing, {eye: shift_m})
+                draw(shift_m)
     finally:
         server.send_shape(None)
         server.send_prompt("")
     return tuple(trials)
 
 
-def _draw(drawing: Drawing, shifts_m: Mapping[Eye, Float64]) -> None:
+def _draw(drawing: Drawing, eye: Eye, shift_m: Float64) -> None:
     """Have the headset draw with φ, and wait until it does."""
-    drawing.send(shifts_m)
+    drawing.send({eye: shift_m})
     drawing.wait_acked(_ACK_S)
 
 

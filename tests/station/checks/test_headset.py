@@ -34,14 +34,8 @@ from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.station.checks import doctor
 from handcal.station.checks.doctor import Health, examine_headset
-from handcal.station.checks.headset import (
-    PoseDelay,
-    find_pose_delay,
-    headset_problem,
-    headset_state,
-    link_problem,
-    run_pose_delay,
-)
+from handcal.station.checks.headset import headset_problem, headset_state, link_problem
+from handcal.station.poses import PoseDelay, find_pose_delay, run_pose_delay
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()
@@ -221,7 +215,7 @@ def turning_head(delay_s: float) -> Iterator[tuple[HeadsetServer, PunctualCamera
 def pass_by_frames(patch: pytest.MonkeyPatch, camera: PunctualCamera, duration_s: float) -> None:
     """Let a duration pass in `FRAMES` frames: a busy machine gives few in a second."""
     clock = SimpleNamespace(monotonic=lambda: camera.frames * duration_s / FRAMES)
-    patch.setattr("handcal.station.checks.headset.time", clock)
+    patch.setattr("handcal.station.poses.time", clock)
 
 
 @pytest.mark.process
