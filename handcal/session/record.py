@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -181,9 +181,9 @@ def replay(path: Path) -> Replayed:
     return Replayed(journal, state, tuple(damaged))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class LoadedSession:
-    """The parts of which `SessionRecord` is made, kept up to date by a session in use."""
+    """The parts of which `SessionRecord` is made; a session in use changes them as it writes."""
 
     path: Path
     rig: Rig
@@ -192,19 +192,15 @@ class LoadedSession:
     notes_sha256: str | None
     """Empty without notes, None if they are damaged."""
     state: SessionState
-    """Changed by each event."""
-    events: Sequence[Event]
-    alignments: Mapping[int, Alignment]
+    events: list[Event]
+    alignments: dict[int, Alignment]
     """All that are sound, deleted ones too."""
     journal: JournalContent
     """As read."""
     damaged: tuple[Damage, ...]
-    journal_bytes: int
-    torn_bytes: int
-    unwritten: tuple[Event, ...] = ()
 
-    def contents(self) -> SessionRecord:
-        """Return the contents as they are now."""
+    def contents(self, unwritten: int = 0) -> SessionRecord:
+        """Return the contents as they are now; `unwritten` events are not on disk yet."""
         state = self.state
         active, deleted = (
             MappingProxyType({n: self.alignments[n] for n in those if n in self.alignments})
@@ -230,14 +226,14 @@ class LoadedSession:
             set_by_hand_m=MappingProxyType(state.set_by_hand_m),
             went_back=state.went_back,
             is_finished=state.is_finished,
-            journal_bytes=self.journal_bytes,
-            torn_bytes=self.torn_bytes,
+            journal_bytes=self.journal.complete_bytes,
+            torn_bytes=self.journal.torn_bytes,
             facts=state.facts,
             verified_now=state.verified_now,
             alignment_facts=MappingProxyType(dict(state.alignment_facts)),
             last_alignment=state.alignments.last(),
             damaged=self.damaged,
-            unwritten=self.unwritten,
+            unwritten=tuple(self.events[len(self.events) - unwritten :]),
         )
 
 
@@ -268,12 +264,10 @@ def load_session(path: Path, rig: Rig | None = None) -> LoadedSession:
         notes=notes,
         notes_sha256=notes_sha256,
         state=state,
-        events=journal.events,
+        events=list(journal.events),
         alignments=alignments,
         journal=journal,
         damaged=tuple(damaged),
-        journal_bytes=journal.complete_bytes,
-        torn_bytes=journal.torn_bytes,
     )
 
 

@@ -103,9 +103,6 @@ class Session(Closable):
             self.close()
             raise
         self._state = self._loaded.state
-        self._events = list(self._loaded.journal.events)
-        self._alignments = dict(self._loaded.alignments)
-        self._notes, self._notes_sha256 = self._loaded.notes, self._loaded.notes_sha256
         self._next_number = self._journal.next_number
         self._waiting: deque[Callable[[], object]] = deque()
         self._is_changed = False
@@ -185,16 +182,8 @@ class Session(Closable):
         """The session as it is now; the same object until it changes."""
         if self._contents is None:
             journal = self._require_open()
-            unwritten = self._next_number - journal.next_number
-            self._contents = replace(
-                self._loaded,
-                events=tuple(self._events),
-                unwritten=tuple(self._events[len(self._events) - unwritten :]),
-                alignments=self._alignments,
-                notes=self._notes,
-                journal_bytes=journal.complete_bytes,
-                torn_bytes=0,
-            ).contents()
+            record = self._loaded.contents(self._next_number - journal.next_number)
+            self._contents = replace(record, journal_bytes=journal.complete_bytes, torn_bytes=0)
         return self._contents
 
     def require_room(self, kind: Kind) -> None:
@@ -234,7 +223,7 @@ class Session(Closable):
             raise ValueError(f"an alignment of {len(data):,} bytes is too large to be saved")
         known = {} if facts is None else {"facts": facts_json(facts)}
         saved = {"number": number, "sha256": sha256(data), **known}
-        self._alignments[number] = alignment
+        self._loaded.alignments[number] = alignment
         file = alignment_path(self.path, number)
         self._keep(SessionEvent.ALIGNMENT_SAVED, saved, before=lambda: write_new(file, data))
         return number
@@ -314,12 +303,13 @@ class Session(Closable):
         if len(text) > MAX_NOTES_CHARACTERS:
             raise ValueError(f"notes may have at most {MAX_NOTES_CHARACTERS:,} characters")
         data = text.encode(errors="replace")
-        before = self._notes_sha256
+        before = self._loaded.notes_sha256
         # Announced first: a crash leaves notes with the one or the other checksum.
         self._write(SessionEvent.NOTES_SAVED, {"sha256": sha256(data), "before_sha256": before})
         write_atomic(file := self.path / "notes.txt", data)
         self._is_sound_again(file)
-        self._notes, self._notes_sha256, self._contents = data.decode(), sha256(data), None
+        self._loaded.notes, self._loaded.notes_sha256 = data.decode(), sha256(data)
+        self._contents = None
 
     def correct_wearer(self, name: str) -> None:
         """Replace the wearer's name or code; ValueError if it is invalid, else as `save_notes`."""
@@ -360,7 +350,7 @@ class Session(Closable):
                 self.write_waiting()
             if self._is_changed:
                 with suppress(FileError):
-                    self._require_own().write_end(self._notes_sha256)
+                    self._require_own().write_end(self._loaded.notes_sha256)
             self._contents = self.contents
             end_at_close(self.path)
         self._journal = None
@@ -406,12 +396,12 @@ class Session(Closable):
 
     def _is_sound_again(self, file: Path) -> None:
         """Forget the damage of a file that was replaced."""
-        damaged = tuple(one for one in self._loaded.damaged if one.file != file.name)
-        self._loaded = replace(self._loaded, damaged=damaged)
+        damaged = self._loaded.damaged
+        self._loaded.damaged = tuple(part for part in damaged if part.file != file.name)
 
     def _apply(self, event: Event) -> None:
         self._state.apply(event)
-        self._events.append(event)
+        self._loaded.events.append(event)
         self._next_number += 1
         self._is_changed = True
         self._contents = None

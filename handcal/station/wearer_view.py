@@ -7,7 +7,7 @@ the calibrated eye position.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,6 @@ from handcal.core.frozen import freeze
 from handcal.core.geometry import invert, project, transform
 from handcal.core.types import EYES, Eye, EyeDisplay, Float64, Rig, UInt8
 from handcal.sim.eyes import TrueEyes
-from handcal.sim.scene import SceneState
 from handcal.sim.simulation import Simulation
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.settings import StationSettings
@@ -142,17 +141,6 @@ _STALE_NS = 2_000_000_000
 """Age of a moment whose second eye is no longer rendered: the hand has been out of sight."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Moment:
-    """The hand, drawings and scene that the views of both eyes show."""
-
-    hand: PlacedHand
-    cursor: PlacedHand | None
-    targets_E_m: Mapping[Eye, Float64]
-    drawn_shift_m: Mapping[Eye, Float64]
-    scene: SceneState | None
-
-
 class EyeViews:
     """Renders the wearer's views, through the true eyes where camera and wearer are simulated.
 
@@ -188,7 +176,8 @@ class EyeViews:
             wearer = WearerSettings(slip_m=settings.slip_m)
             self._true_eyes = TrueEyes(simulation.world, worn_rig, settings.seed, wearer)
         self.shown: Mapping[Eye, EyeView] = {}
-        self._moment: _Moment | None = None
+        self._seen_ns = 0
+        self._see: Callable[[Eye], EyeView] | None = None
         self._seen: dict[Eye, EyeView] = {}
         self._next_s = self._spent_s = 0.0
 
@@ -209,59 +198,58 @@ class EyeViews:
             True while the headset draws with the offline calibration.
         """
         started_s = time.monotonic()
-        moment = self._moment
-        if moment is None or hand.t_host_ns - moment.hand.t_host_ns > _STALE_NS:
+        if self._see is None or hand.t_host_ns - self._seen_ns > _STALE_NS:
             if started_s < self._next_s:
                 return
-            moment = self._moment = self._begin(hand, targets_E_m, is_offline)
-            self._next_s, self._spent_s, self._seen = started_s + _PERIOD_S, 0.0, {}
+            self._see = self._at_moment(hand, dict(targets_E_m), is_offline)
+            self._seen_ns, self._seen = hand.t_host_ns, {}
+            self._next_s, self._spent_s = started_s + _PERIOD_S, 0.0
         eye = EYES[len(self._seen)]
-        self._seen[eye] = self._see(eye, moment)
+        self._seen[eye] = self._see(eye)
         ended_s = time.monotonic()
         self._spent_s += ended_s - started_s
         if len(self._seen) == len(EYES):
-            self.shown, self._moment = self._seen, None
+            self.shown, self._see = self._seen, None
             # On a busy computer frames have priority.
             self._next_s = max(self._next_s, ended_s + 3.0 * self._spent_s)
 
-    def _begin(
+    def _at_moment(
         self, hand: PlacedHand, targets_E_m: Mapping[Eye, Float64], is_offline: bool
-    ) -> _Moment:
-        applied_m = self._calibration.applied_shift_m
-        return _Moment(
-            hand,
-            self._calibration.cursor,
-            dict(targets_E_m),
-            {eye: np.zeros(3) if is_offline else applied_m[eye] for eye in EYES},
-            self._simulation.scene_at(hand.t_host_ns) if self._simulation is not None else None,
-        )
+    ) -> Callable[[Eye], EyeView]:
+        """Return what renders an eye's view of hand, drawings and scene as they are now."""
+        calibration, true_eyes = self._calibration, self._true_eyes
+        results, cursor = calibration.results, calibration.cursor
+        applied_m = calibration.applied_shift_m
+        T_W_H, scene = hand.T_W_D @ invert(self._rig.T_H_D), None
+        if self._simulation is not None:
+            scene = self._simulation.scene_at(hand.t_host_ns)
+        if true_eyes is not None and scene is not None:
+            T_W_H = scene.T_W_D @ invert(self._worn_rig.T_H_D)
 
-    def _see(self, eye: Eye, moment: _Moment) -> EyeView:
-        calibration, display = self._calibration, self._rig.eyes[eye]
-        hand, cursor, drawn_shift_m = moment.hand, moment.cursor, moment.drawn_shift_m[eye]
-        T_W_H = hand.T_W_D @ invert(self._rig.T_H_D)
-        image = None
-        if self._true_eyes is not None:
-            eye_shift_m = self._true_eyes.shift_m[eye]
-            if moment.scene is not None:
-                T_W_H = moment.scene.T_W_D @ invert(self._worn_rig.T_H_D)
-                image = self._true_eyes.look(eye, T_W_H, moment.scene.T_W_hand)
-        elif calibration.results is not None and eye in calibration.results.eyes:
-            eye_shift_m = calibration.results.eyes[eye].shift_m
-        else:
+        def see(eye: Eye) -> EyeView:
+            display, image = self._rig.eyes[eye], None
+            drawn_shift_m = np.zeros(3) if is_offline else applied_m[eye]
             eye_shift_m = drawn_shift_m
-        T_E_W = view_of_eye(display, T_W_H)
-        return render_eye_view(
-            eye,
-            display,
-            eye_shift_m,
-            drawn_shift_m,
-            _outline_E(T_E_W, hand),
-            np.empty((0, 3)) if cursor is None else _outline_E(T_E_W, cursor),
-            moment.targets_E_m.get(eye, np.empty((0, 3))),
-            is_true=image is not None,
-            image=image,
-        )
+            if true_eyes is not None:
+                eye_shift_m = true_eyes.shift_m[eye]
+                if scene is not None:
+                    image = true_eyes.look(eye, T_W_H, scene.T_W_hand)
+            elif results is not None and eye in results.eyes:
+                eye_shift_m = results.eyes[eye].shift_m
+            T_E_W = view_of_eye(display, T_W_H)
+            return render_eye_view(
+                eye,
+                display,
+                eye_shift_m,
+                drawn_shift_m,
+                _outline_E(T_E_W, hand),
+                np.empty((0, 3)) if cursor is None else _outline_E(T_E_W, cursor),
+                targets_E_m.get(eye, np.empty((0, 3))),
+                is_true=image is not None,
+                image=image,
+            )
+
+        return see
 
 
 def _outline_E(T_E_W: Float64, hand: PlacedHand) -> Float64:

@@ -12,7 +12,6 @@ from handcal.calibration.plan import NextStep, Plan, PlanSettings, StepName
 from handcal.calibration.states import ProcedureError, State
 from handcal.calibration.verifying import skipped_eyes
 from handcal.core.display import view_of_eye
-from handcal.core.errors import FileError
 from handcal.core.geometry import transform
 from handcal.core.types import EYES, Eye, EyeDistance
 from handcal.link.client import HeadsetClient
@@ -333,23 +332,6 @@ def test_a_contradicted_result_ends_the_plan(make: Callable[..., Planned]) -> No
     step = planned.until(StepName.DONE)
     assert "does not draw what was sent" in step.text
     assert len(calibration.alignments) == 1
-
-
-def test_eyes_chosen_while_nothing_can_be_written_are_followed(
-    make: Callable[..., Planned], session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    planned = make(PAPER)
-
-    def refuse(*_: object) -> None:
-        raise FileError("the disk is full")
-
-    with monkeypatch.context() as full:
-        full.setattr("handcal.session.journal.JournalWriter.append", refuse)
-        planned.plan.choose("left")
-    assert planned.plan.settings.usable_eyes == ("left",)
-    assert session.contents.facts.usable_eyes == ("left",)
-    session.write_waiting()
-    assert Session.open(session.path).facts.usable_eyes == ("left",)
 
 
 def test_an_eye_that_is_no_longer_chosen_asks_for_nothing(make: Callable[..., Planned]) -> None:

@@ -18,7 +18,7 @@ from handcal.calibration.verifying import (
 from handcal.core.display import projection_matrix
 from handcal.core.errors import FileError
 from handcal.core.geometry import rigid
-from handcal.core.types import EYES, Eye, EyeDistance, Float64
+from handcal.core.types import EYES, Eye, Float64
 from handcal.link.client import HeadsetClient
 from handcal.link.nudges import MAX_NUDGE_ARCMIN, NudgeSum
 from handcal.link.server import HeadsetServer
@@ -357,25 +357,6 @@ def test_drawings_are_moved_farther_than_a_wearer_overlooks_in_every_direction()
     assert abs(np.mean(right)) < 1.5
     assert abs(np.mean(down)) < 1.5
     assert 0.4 < np.mean(size > 0.0) < 0.6
-
-
-def test_nothing_else_can_be_done_meanwhile(stage: Stage) -> None:
-    with pytest.raises(ProcedureError, match="hold the hand up"):
-        stage.calibration.verify("left")
-    begin(stage)
-    calibration = stage.calibration
-    for act in (
-        calibration.solve,
-        calibration.apply,
-        calibration.make_cursor,
-        calibration.redo,
-        lambda: calibration.delete_alignment(1),
-        lambda: calibration.set_shift({"left": np.zeros(3)}),
-        lambda: calibration.set_eye_distance(EyeDistance(0.063)),
-    ):
-        with pytest.raises(ProcedureError):
-            act()
-    assert stage.state() is State.VERIFY
 
 
 @pytest.mark.parametrize("is_aside", [False, True])

@@ -354,7 +354,3 @@ def test_a_damaged_session_knows_of_its_repaired_copy(tmp_path: Path, alignment:
         session.path.name: session.is_repaired for session in unfinished_and_repaired(tmp_path)[0]
     }
     assert found == {"one": True, "other": False}
-
-
-def test_a_folder_that_is_not_there_has_none(tmp_path: Path) -> None:
-    assert unfinished_and_repaired(tmp_path / "missing")[0] == []

@@ -13,7 +13,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from handcal.core.types import (
-    Alignment,
     CameraIdentity,
     EyeDistance,
     HeadsetIdentity,
@@ -163,15 +162,6 @@ def test_impossible_values_are_refused() -> None:
     ):
         with pytest.raises(ValueError, match="must"):
             make()
-
-
-def test_facts_of_an_alignment_come_back(tmp_path: Path, alignment: Alignment) -> None:
-    facts = AlignmentFacts(0.011, 0.001, 0.002, 1e-17)
-    with Session.create(tmp_path, example_rig(), {}) as session:
-        session.save_alignment(alignment, facts)
-        session.save_alignment(alignment)
-    record = Session.open(session.path)
-    assert record.alignment_facts == {1: facts, 2: AlignmentFacts()}
 
 
 def test_results_go_with_another_eye_distance_only(tmp_path: Path) -> None:
