@@ -14,7 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import handcal
-from handcal.calibration.states import Observation, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import State
 from handcal.cli.terminal import errors_in_one_line
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from handcal.calibration.hands import PlacedHand, RecentHands
-from handcal.calibration.hold import merge_hold
-from handcal.calibration.states import CalibrationSettings, Observation
-from handcal.calibration.timing.delay import DelayMeter
+from handcal.calibration.delay import MOVED_LIMIT_M, DelayMeter
+from handcal.calibration.hands import PlacedHand, RecentHands, merge_hold
+from handcal.calibration.sight import Observation
 from handcal.camera.clock import INFORM_NS
 from handcal.core.display import view_of_eye
 from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError
@@ -20,7 +19,7 @@ from handcal.core.types import EYES, Alignment, Eye, Float64, Rig
 from handcal.link.server import Confirmation, HeadsetServer
 from handcal.register.guard import GuardSettings, RotationGuard, turn_advice
 from handcal.register.shape import ShapeChange, change_text
-from handcal.session.facts import AlignmentFacts
+from handcal.session.state import AlignmentFacts
 
 KEEP_PROMPT = "Keep your hand up."
 """Shown if the next cursor or verification follows at once."""
@@ -64,11 +63,10 @@ class Aligning:
     ----------
     cursor : PlacedHand
         The frozen hand.
-    cursor_id : int
     eyes : tuple of eye
         The eyes to keep open.
     rig : Rig
-    settings : CalibrationSettings
+    limits : GuardSettings
 
     Attributes
     ----------
@@ -88,19 +86,16 @@ class Aligning:
     def __init__(
         self,
         cursor: PlacedHand,
-        cursor_id: int,
         eyes: tuple[Eye, ...],
         rig: Rig,
-        settings: CalibrationSettings,
+        limits: GuardSettings,
     ) -> None:
         self.cursor = cursor
-        self.cursor_id = cursor_id
         self.eyes = eyes
         self.confirmation: Confirmation | None = None
         self.refusal = self.refused_for = ""
         self._rig = rig
-        self._settings = settings
-        self._limits: GuardSettings = settings.guard
+        self._limits = limits
         self._guard = RotationGuard(cursor.points_W_m, cursor.cloud.is_cut)
         self._shape: ShapeChange | None = None
         self._shape_ns = 0
@@ -181,7 +176,7 @@ class Aligning:
                 "drawn otherwise",
             )
         try:
-            hand = hands.nearest(confirmation.t_host_ns, self._settings.match_tolerance_s)
+            hand = hands.nearest(confirmation.t_host_ns)
             hand = merge_hold(hands.held_at(hand), hand)
             rotation_W = self._guard.rotation(hand.points_W_m, hand.cloud.is_cut)
             if hand.is_posed_by_camera:
@@ -206,7 +201,7 @@ class Aligning:
         hands_used = self.cursor, hand
         speed_m_s = hands.speed_m_s(hand)
         time_sigma_m = delay.time_sigma_m(hands_used, confirmation.t_host_ns, speed_m_s)
-        if time_sigma_m > self._settings.delay.moved_limit_m:
+        if time_sigma_m > MOVED_LIMIT_M:
             return Refused(
                 "Your hand or your head moved too fast. Hold both still and confirm again.", "moved"
             )

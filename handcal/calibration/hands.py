@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError
-from handcal.core.geometry import transform
+from handcal.core.geometry import invert, rotation_vector, transform
 from handcal.core.types import Float64, HandCloud
+from handcal.register.rigid import RigidSettings, motion_covariance, register_rigid
+from handcal.register.surface import Surface, describe_surface, mean_point
 
-_KEEP_S = 1.0
+MATCH_NS = 150_000_000
+"""Largest time between a confirmation and the frame that is taken for it."""
+_STEADY_NS, _STEADY_M = 400_000_000, 0.005
+"""A hand is steady if it moved less than this, for this time."""
+_KEPT_NS = _STEADY_NS + 1_000_000_000
 """Placed hands are kept this long, so that a retransmitted confirmation still finds its frame."""
 _HOLD_M = 0.0015
 """Frames in which the hand is this near belong to one hold: not one that still moves, nor one that
@@ -56,22 +63,11 @@ class RecentHands:
         Returns T_W_H (4, 4) at a host time, or raises PosePendingError or PoseError.
     T_H_D : (4, 4) float64
         From the depth camera to the headset.
-    steady_s, steady_m : float
-        A hand is steady if it moved less than `steady_m` for `steady_s`.
     """
 
-    def __init__(
-        self,
-        pose_at_host_ns: Callable[[int], Float64],
-        T_H_D: Float64,
-        steady_s: float,
-        steady_m: float,
-    ) -> None:
+    def __init__(self, pose_at_host_ns: Callable[[int], Float64], T_H_D: Float64) -> None:
         self._pose_at_host_ns = pose_at_host_ns
         self._T_H_D = T_H_D
-        self._steady_ns = round(1e9 * steady_s)
-        self._steady_m = steady_m
-        self._keep_ns = round(1e9 * (steady_s + _KEEP_S))
         self._placed: deque[PlacedHand] = deque()
         self._unplaced: deque[tuple[HandCloud, int, Float64 | None]] = deque()
         self._missed: deque[tuple[int, HandError]] = deque()
@@ -114,23 +110,23 @@ class RecentHands:
             self._unplaced.popleft()
         return hand, problem
 
-    def newest(self, max_age_s: float) -> PlacedHand | None:
-        """Return the newest placed hand unless it is older than this at the newest frame."""
-        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > 1e9 * max_age_s:
+    def newest(self) -> PlacedHand | None:
+        """Return the newest placed hand unless it is too old for a confirmation."""
+        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > MATCH_NS:
             return None
         return self._placed[-1]
 
     def steady(self) -> PlacedHand | None:
         """Return the newest hand if it is in view and has hardly moved for a while, else None."""
-        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > self._steady_ns:
+        if not self._placed or self._seen_ns - self._placed[-1].t_host_ns > _STEADY_NS:
             return None
-        since_ns = self._seen_ns - self._steady_ns
+        since_ns = self._seen_ns - _STEADY_NS
         before = [hand.middle_W_m for hand in self._placed if hand.t_host_ns <= since_ns]
         after = [hand.middle_W_m for hand in self._placed if hand.t_host_ns > since_ns]
         # Include the last hand before this period, so that a slow camera has enough of them.
         places = before[-1:] + after
         is_long_enough = bool(before and after)
-        if is_long_enough and float(np.ptp(places, axis=0).max()) < self._steady_m:
+        if is_long_enough and float(np.ptp(places, axis=0).max()) < _STEADY_M:
             return self._placed[-1]
         return None
 
@@ -142,7 +138,7 @@ class RecentHands:
             if one is hand or one.t_host_ns > hand.t_host_ns:
                 continue
             is_near = float(np.linalg.norm(one.middle_W_m - hand.middle_W_m)) < _HOLD_M
-            if not is_near or hand.t_host_ns - one.t_host_ns > self._steady_ns:
+            if not is_near or hand.t_host_ns - one.t_host_ns > _STEADY_NS:
                 break
             held.append(one)
         return held[::-1]
@@ -153,18 +149,16 @@ class RecentHands:
             return self._seen_ns
         return self._placed[-1].t_host_ns if self._placed else 0
 
-    def nearest(self, t_host_ns: int, tolerance_s: float) -> PlacedHand:
-        """Return the hand nearest in time; HandError if none is within the tolerance.
+    def nearest(self, t_host_ns: int) -> PlacedHand:
+        """Return the hand nearest in time; HandError if none is within `MATCH_NS`.
 
         OutOfViewError if the camera saw only a part of it then.
         """
-        near = [
-            hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= 1e9 * tolerance_s
-        ]
+        near = [hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= MATCH_NS]
         if not near:
             missed = min(self._missed, key=lambda one: abs(one[0] - t_host_ns), default=(0, None))
             if isinstance(missed[1], OutOfViewError):
-                raise OutOfViewError(str(missed[1]))  # the stored one must hold no traceback
+                raise OutOfViewError(*missed[1].args)  # the stored one must hold no traceback
             raise HandError("The camera did not see your hand")
         return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 
@@ -197,10 +191,101 @@ class RecentHands:
 
     def _forget_old(self) -> None:
         """Forget hands that are too old both for a confirmation and for the steadiness check."""
-        oldest_ns = self._seen_ns - self._keep_ns
+        oldest_ns = self._seen_ns - _KEPT_NS
         while self._placed and self._placed[0].t_host_ns < oldest_ns:
             self._placed.popleft()
         while self._unplaced and self._unplaced[0][1] < oldest_ns:
             self._unplaced.popleft()
         while self._missed and self._missed[0][0] < oldest_ns:
             self._missed.popleft()
+
+
+# More frames take longer than the time between two frames, and lower the noise little.
+_MOST_FRAMES = 7
+# Another frame sees the surface at a point if it has one within this many point spacings.
+_REACH = 1.5
+# The surface is where at least this share of the frames sees it.
+_SEEN = 0.5
+# A hand is where it was unless noise explains the movement found with less than 0.1 %: the quantile
+# of χ² with six degrees of freedom.
+_MOVED = 22.5
+_SETTINGS = RigidSettings(max_points=700, tolerance_m=5e-5)
+
+
+def merge_hold(hands: Sequence[PlacedHand], reference: PlacedHand) -> PlacedHand:
+    """Return the median surface of the frames with the hand in one place, and the movement of all.
+
+    Each point of the reference stays on its ray, at the median of the depths that the frames
+    measure there, unless fewer than half of them see anything: then it is a flying pixel.
+
+    Parameters
+    ----------
+    hands : sequence of PlacedHand
+    reference : PlacedHand
+        One of them; time, pose, contour and mask are its own.
+    """
+    middles = np.array([hand.middle_W_m for hand in hands])
+    movement_m = float(np.linalg.norm(np.ptp(middles, axis=0)))
+    some = [hand for hand in hands if hand is not reference]
+    some = some[:: max(1, -(-len(some) // (_MOST_FRAMES - 1)))]
+    some = _in_one_place(some, reference)
+    if not some:
+        return replace(reference, movement_m=movement_m)
+    T_D_W = invert(reference.T_W_D)
+    points_m = transform(T_D_W, reference.points_W_m)
+    rays = points_m[:, :2] / points_m[:, 2:]
+    apart, _ = cKDTree(rays).query(rays, k=2)
+    reach = _REACH * float(np.median(np.asarray(apart)[:, 1]))
+    depths_m = np.full((1 + len(some), len(points_m)), np.nan)
+    is_cut = np.zeros_like(depths_m, dtype=np.bool_)
+    depths_m[0], is_cut[0] = points_m[:, 2], reference.cloud.is_cut
+    for row, hand in enumerate(some, start=1):
+        seen_m = transform(T_D_W, hand.points_W_m)
+        found = cKDTree(seen_m[:, :2] / seen_m[:, 2:]).query(rays, distance_upper_bound=reach)
+        is_seen, index = np.isfinite(found[0]), np.asarray(found[1])
+        depths_m[row, is_seen] = seen_m[index[is_seen], 2]
+        is_cut[row, is_seen] = hand.cloud.is_cut[index[is_seen]]
+    measured = np.isfinite(depths_m)
+    kept = measured.mean(axis=0) >= _SEEN
+    median_m = np.nanmedian(depths_m[:, kept], axis=0)
+    merged_m = points_m[kept] * (median_m / points_m[kept, 2])[:, None]
+    colors = reference.cloud.colors
+    cloud = replace(
+        reference.cloud,
+        points_m=merged_m.astype(np.float32),
+        is_cut=(is_cut.sum(axis=0) >= _SEEN * measured.sum(axis=0))[kept],
+        colors=None if colors is None else colors[kept],
+    )
+    return replace(
+        reference,
+        cloud=cloud,
+        points_W_m=transform(reference.T_W_D, merged_m),
+        frames=1 + len(some),
+        movement_m=movement_m,
+    )
+
+
+def _in_one_place(hands: Sequence[PlacedHand], reference: PlacedHand) -> list[PlacedHand]:
+    """Return the hands that are where the reference is, except for noise.
+
+    None if almost all points of one lie at cut edges.
+    """
+    try:
+        place, *seen = [
+            describe_surface(hand.points_W_m, hand.cloud.is_cut, _SETTINGS.max_points)
+            for hand in (reference, *hands)
+        ]
+    except HandError:
+        return []
+    return [hand for hand, surface in zip(hands, seen, strict=True) if _is_at(surface, place)]
+
+
+def _is_at(surface: Surface, place: Surface) -> bool:
+    """Return True if noise explains the movement from one surface to the other."""
+    fit = register_rigid(surface, place, _SETTINGS, np.eye(4))
+    T = fit.T_target_source
+    middle_m = mean_point(surface.points_m)
+    moved_m = transform(T, middle_m[None])[0] - middle_m
+    moved = np.concatenate([rotation_vector(T[:3, :3]), moved_m])
+    noise = motion_covariance(fit.rows, surface, T)
+    return float(moved @ np.linalg.solve(noise, moved)) < _MOVED

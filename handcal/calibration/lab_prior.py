@@ -27,9 +27,9 @@ from handcal.register.prior import (
 from handcal.register.results import RESULTS_VERSION
 from handcal.register.sitting import SittingSettings, sitting_prior
 from handcal.rig.rig_file import read_rig
-from handcal.session.facts import read_facts
 from handcal.session.journal import find_journals
 from handcal.session.record import replay
+from handcal.session.state import read_facts
 
 MAX_SESSIONS = 300
 """Only the newest sessions count: a headset's fit and a lab's wearers change."""

@@ -15,9 +15,10 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from handcal.calibration.procedure import Calibration
-from handcal.calibration.states import Observation, ProcedureError, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError, HandError
-from handcal.core.types import EYES, Eye, EyePlan, PlanName, Verdict, VerdictName
+from handcal.core.types import EYES, Eye, EyePlan, Frame, PlanName, Verdict, VerdictName
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.verdict import Advice, planned_eyes
 
@@ -105,7 +106,7 @@ class NextStep:
 
 
 class Plan:
-    """Follows a plan with one calibration.
+    """Leads one calibration by a plan, frame by frame.
 
     Parameters
     ----------
@@ -120,6 +121,10 @@ class Plan:
     ----------
     settings : PlanSettings
     skipped : set of eye
+    observation : Observation or None
+        Of the newest frame; None before the first.
+    step : NextStep or None
+        The step that was next at that frame, or was taken then.
     """
 
     def __init__(
@@ -130,13 +135,81 @@ class Plan:
         skipped: Collection[Eye] = (),
     ) -> None:
         self.settings = settings
+        self.skipped = set(skipped)
+        self.observation: Observation | None = None
+        self.step: NextStep | None = None
         self._calibration = calibration
         self._verifies_first = verifies_first
-        self._decided: tuple[object, Planned | None] | None = None
+        self._placed: tuple[object, Planned | None] | None = None
         self._is_over = False
         self._requested: tuple[Eye, ...] = ()
-        self._waiting: tuple[object, int] = None, 0
-        self.skipped = set(skipped)
+        self._next_since: tuple[object, int] = None, 0
+
+    def advance(
+        self, frame: Frame | None, *, is_held: bool = False, is_pressed: bool = False
+    ) -> None:
+        """Take a frame through the calibration, from the picture to the projections.
+
+        Every calibration goes this way from top to bottom, each frame as far as it is due. What the
+        session cannot write is kept in memory; `Session.write_waiting` says so.
+
+        Parameters
+        ----------
+        frame : Frame or None
+            None if none has arrived since the last.
+        is_held : bool
+            True if the plan takes no step by itself now.
+        is_pressed : bool
+            True if a person has the next step taken.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed, or projections were not acknowledged in time.
+        """
+        calibration = self._calibration
+        if frame is not None:
+            # Frame → hand → observation. The head's pose at the exposure may arrive some frames
+            # later, so the hand that is placed now may be of an earlier frame.
+            observation = calibration.see(frame)
+            # Observation → alignment or verification → journal. The wearer's press was some time
+            # ago, so the hand of that time is judged, not the newest.
+            self.observation = calibration.judge(observation)
+        if self.observation is None:
+            return
+        # Procedure. The plan only chooses; the calibration refuses what is out of turn.
+        self.step = step = self.next_step(self.observation.is_steady)
+        is_automatic = frame is not None and not is_held and self._is_due(step, self.observation)
+        try:
+            match step.name if is_pressed or is_automatic else None:
+                case StepName.CURSOR:
+                    # Hand → cursor: where the hand is, or where an alignment tells most.
+                    place_m = None if step.planned is None else step.planned.displacement_W_m
+                    calibration.make_cursor(step.eyes, place_m)
+                case StepName.SOLVE:
+                    # Alignments → φ → verdict → journal. Each is solved alone, all are fused with
+                    # the prior and the verifications by their covariances; the verdict asks for
+                    # evidence from outside, because residuals cannot tell that φ is right.
+                    if calibration.state is State.ALIGNED:
+                        self._requested = ()
+                    calibration.solve()
+                case StepName.APPLY:
+                    # φ → projections → link. An eye that is not to be used keeps its offline one.
+                    calibration.apply(keeps_hand=self.settings.name == "recommended")
+                case StepName.VERIFY:
+                    # Projections → wearer, whose nudges of the drawing are one more observation.
+                    calibration.verify(step.eyes[0])
+                case StepName.DONE if not self._is_over:
+                    calibration.release_hand()
+            if is_pressed or is_automatic:
+                self._is_over = step.name is StepName.DONE
+            if calibration.state is State.APPLYING:
+                # Link → journal. Only what the headset has acknowledged is applied.
+                calibration.poll_applied()
+        except (ProcedureError, HandError) as error:
+            self.step = replace(step, name=StepName.WAIT, text=str(error), planned=None)
+        except FileError:
+            pass  # the session keeps it, and the station says so
 
     def next_step(self, is_steady: bool) -> NextStep:
         """Return the next step; nothing changes. `is_steady`: the hand is in view and still."""
@@ -158,45 +231,6 @@ class Plan:
         if self.settings.name == "paper":
             return self._next_of_paper(unverified, is_steady)
         return self._next_of_recommended(unverified, is_steady)
-
-    def follow(self, observation: Observation) -> NextStep:
-        """Take the next step if it is automatic and its time has come; return it."""
-        step = self.next_step(observation.is_steady)
-        if not self.settings.is_automatic or self._is_early(step, observation):
-            return step
-        return self.advance(observation)
-
-    def advance(self, observation: Observation) -> NextStep:
-        """Take the next step if nobody has to act; return it. The next frame may have another.
-
-        Raises
-        ------
-        LinkError
-            If the link is closed.
-        FileError
-            If the session cannot be written; the step is done anyway.
-        """
-        calibration = self._calibration
-        step = self.next_step(observation.is_steady)
-        try:
-            match step.name:
-                case StepName.CURSOR:
-                    place_m = None if step.planned is None else step.planned.displacement_W_m
-                    calibration.make_cursor(step.eyes, place_m)
-                case StepName.SOLVE:
-                    if calibration.state is State.ALIGNED:
-                        self._requested = ()
-                    calibration.solve()
-                case StepName.APPLY:
-                    calibration.apply(keeps_hand=self.settings.name == "recommended")
-                case StepName.VERIFY:
-                    calibration.verify(step.eyes[0])
-                case StepName.DONE if not self._is_over:
-                    calibration.release_hand()
-        except (ProcedureError, HandError) as error:
-            return NextStep(StepName.WAIT, step.eyes, str(error), is_requested=step.is_requested)
-        self._is_over = step.name is StepName.DONE
-        return step
 
     def request(self, eyes: tuple[Eye, ...] = ()) -> None:
         """Make one more alignment next; the plan chooses the eyes unless they are given."""
@@ -221,25 +255,24 @@ class Plan:
             self._calibration.choose_eyes(eyes, chosen.usable_eyes)
         self.settings, self._requested = chosen, ()
 
-    def skip(self) -> None:
-        """Verify an eye no further: the one being verified, or the one that would be next.
+    def skip(self, eye: Eye) -> None:
+        """Verify an eye no further, whether its verification is in progress or would be next.
 
         Raises
         ------
         ProcedureError
-            If no eye is.
+            If it is neither: the wearer may just have ended it.
         FileError
             If the session cannot be written; the verification ends anyway.
         """
         calibration = self._calibration
-        if calibration.verifying is not None:
-            self.skipped.add(calibration.verifying.eye)
+        if calibration.verifying is not None and calibration.verifying.eye == eye:
+            self.skipped.add(eye)
             calibration.skip_verification()
             return
-        eye = next(iter(self._unverified()), None) or self._next_verification()
-        # While a verification that has just ended is applied, the other eye's is not meant.
-        if eye is None or calibration.state not in (State.SHOW_HAND, State.APPLIED):
-            raise ProcedureError("there is no verification to skip")
+        is_next = eye == (next(iter(self._unverified()), None) or self._next_verification())
+        if not is_next or calibration.state not in (State.SHOW_HAND, State.APPLIED):
+            raise ProcedureError(f"there is no verification of the {eye} eye to skip")
         self.skipped.add(eye)
         calibration.record_skipped(eye)
 
@@ -274,17 +307,19 @@ class Plan:
             return self._with_hand(StepName.VERIFY, (eye,), is_steady)
         return NextStep(StepName.DONE, (), self._takes())
 
-    def _is_early(self, step: NextStep, observation: Observation) -> bool:
-        """Return True while the wearer is given time to see what comes."""
+    def _is_due(self, step: NextStep, observation: Observation) -> bool:
+        """Return whether the plan takes a step by itself now; the wearer first sees what comes."""
+        if not self.settings.is_automatic:
+            return False
         pause_ns = _PAUSE_NS[self.settings.name]
         if pause_ns == 0 or step.name not in (StepName.CURSOR, StepName.VERIFY):
-            self._waiting = None, 0
-            return False
-        if observation.hand is None:  # its pose is still on its way
+            self._next_since = None, 0
             return True
-        if self._waiting[0] != (step.name, step.eyes):
-            self._waiting = (step.name, step.eyes), observation.hand.t_host_ns
-        return observation.hand.t_host_ns - self._waiting[1] < pause_ns
+        if observation.hand is None:  # its pose is still on its way
+            return False
+        if self._next_since[0] != (step.name, step.eyes):
+            self._next_since = (step.name, step.eyes), observation.hand.t_host_ns
+        return observation.hand.t_host_ns - self._next_since[1] >= pause_ns
 
     def _turn(self) -> tuple[Eye, ...]:
         """Return whose turn it is in the next alignment."""
@@ -326,9 +361,10 @@ class Plan:
         newest = calibration.newest_hand or hand
         assert hand is not None
         assert newest is not None
+        # Hands and results are the same only as objects. The search takes longer than a frame.
         key = calibration.results, tuple(calibration.alignments), calibration.raised, hand
-        if self._decided is None or self._decided[0] != key:
-            self._decided = (
+        if self._placed is None or self._placed[0] != key:
+            self._placed = (
                 key,
                 next_alignment(
                     hand.points_W_m,
@@ -344,7 +380,7 @@ class Plan:
                     solve=calibration.settings.solve,
                 ),
             )
-        return self._decided[1]
+        return self._placed[1]
 
     def _unverified(self) -> tuple[Eye, ...]:
         """Return the eyes to verify that have not been, nor were skipped."""

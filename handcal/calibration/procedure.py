@@ -19,7 +19,7 @@ Between these steps alignments can be deleted and restored, the wearer's eye dis
 and all can be solved again; φ can be set by hand while no cursor is shown. The procedure only
 combines the other parts: `Sight` finds the hand, `Aligning` and `Verifying` judge what the wearer
 does, `Drawing` sends the projections, and the session holds what was made. One thread drives it:
-`step` for every frame, all other calls in between.
+`Plan.advance`, the way of a frame through all of it, and all other calls in between.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,15 +43,12 @@ from handcal.calibration.aligning import (
     align_prompt,
 )
 from handcal.calibration.drawing import Drawing
-from handcal.calibration.evidence import Contradiction, Evidence
-from handcal.calibration.hands import PlacedHand
-from handcal.calibration.hold import merge_hold
-from handcal.calibration.sight import Sight
+from handcal.calibration.hands import PlacedHand, merge_hold
+from handcal.calibration.sight import Contradiction, Evidence, Observation, Sight
 from handcal.calibration.solve_again import solve_again, solve_contents
 from handcal.calibration.states import (
     MAX_HAND_SET_SHIFT_M,
     CalibrationSettings,
-    Observation,
     ProcedureError,
     State,
 )
@@ -89,9 +86,8 @@ from handcal.link.nudges import VerifyRequest
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import Confirmation, HeadsetServer, Nudge
 from handcal.register.results import Results, results_json
-from handcal.session.facts import CameraUsed, facts_json
 from handcal.session.session import Session, SessionRecord
-from handcal.session.state import VERIFYING, WENT_BACK
+from handcal.session.state import VERIFYING, WENT_BACK, CameraUsed, facts_json
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,6 +115,8 @@ class Procedure:
     """`refusal` in the past tense, if the live hand shows whether its cause lasts; else empty."""
 
 
+_APPLY_TIMEOUT_S = 5.0
+"""Time for the headset to acknowledge projections."""
 _UNSETTLED = (State.ALIGN, State.VERIFY, State.APPLYING)
 _NO_SHIFT: Mapping[Eye, ArrayLike] = MappingProxyType({})
 
@@ -160,7 +158,7 @@ class Calibration:
     verifying : Verifying or None
         The verification in progress, in the state `verify`.
     camera : CameraIdentity
-        The camera that gives the frames; set it before `step`.
+        The camera that gives the frames; set it before `see`.
     evidence : Evidence
         Evidence from outside the solver against the result.
     unmoved : set of eye
@@ -288,10 +286,8 @@ class Calibration:
         """Return the headset's pose (4, 4) when a hand was seen."""
         return np.asarray(hand.T_W_D @ invert(self.rig.T_H_D))
 
-    def step(self, frame: Frame) -> Observation:
-        """Process a frame: find the hand, guide the wearer, and take what the wearer confirms.
-
-        What the session cannot write is kept in memory; `Session.write_waiting` says so.
+    def see(self, frame: Frame) -> Observation:
+        """Return what a frame shows, and guide the wearer by it.
 
         Raises
         ------
@@ -313,11 +309,27 @@ class Calibration:
             self._withdraw_cursor("The headset's clock was set. Raise your hand again.")
         if self._aligning is not None and self.state is State.ALIGN:
             observation = self._guide(observation, self._aligning)
-            with suppress(FileError):
+        elif self.verifying is not None and observation.hand is not None:
+            hand = observation.hand
+            outline_W_m = transform(hand.T_W_D, hand.cloud.outline_m)
+            self._link.send_live_hand(outline_W_m, False, (self.verifying.eye,), is_outline=True)
+        return observation
+
+    def judge(self, observation: Observation) -> Observation:
+        """Take what the wearer has confirmed or nudged; return the observation with the new state.
+
+        What the session cannot write is kept in memory; `Session.write_waiting` says so.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with suppress(FileError):
+            if self._aligning is not None and self.state is State.ALIGN:
                 self._take_confirmation(self._aligning)
-        elif self.verifying is not None:
-            with suppress(FileError):
-                self._follow_nudges(observation, self.verifying)
+            elif self.verifying is not None:
+                self._follow_nudges(self.verifying)
         return replace(observation, state=self.state)
 
     # Alignments: a cursor, the wearer's confirmation, and what can be undone.
@@ -355,8 +367,10 @@ class Calibration:
             )
         if tuple(eyes) not in (("left",), ("right",), ("left", "right"), ("right", "left")):
             raise ValueError(f"one eye must be open, or both, not {tuple(eyes)}")
-        if full := self._session.full("alignment"):
-            raise ProcedureError(full)
+        try:
+            self._session.require_room("alignment")
+        except FileError as error:
+            raise ProcedureError(*error.args) from error
         if not self.is_applied:
             # The cursor might be drawn with other projections than the solver assumes.
             self._link.send_again()
@@ -368,7 +382,7 @@ class Calibration:
             hand = merge_hold(self._sight.hands.held_at(hand), hand)
         self.raised = None if displacement_W_m is None else hand
         hand = hand if displacement_W_m is None else _moved(hand, displacement_W_m)
-        self._aligning = Aligning(hand, self._cursor_id + 1, tuple(eyes), self.rig, self._settings)
+        self._aligning = Aligning(hand, tuple(eyes), self.rig, self._settings.guard)
         self._withdrawn_for = ""
         self._cursor_id += 1
         self.eyes = tuple(eyes)
@@ -456,10 +470,7 @@ class Calibration:
         if eye_distance == self.eye_distance:
             return
         self._require_settled("the eye distance")
-        if self._session.contents.is_solvable:
-            self._change(lambda: self._session.save_facts(eye_distance=eye_distance))
-        else:
-            self._session.save_facts(eye_distance=eye_distance)
+        self._save_facts(True, eye_distance=eye_distance)
 
     def choose_eyes(self, plan: EyePlan, usable_eyes: tuple[Eye, ...]) -> None:
         """Record which eyes are aligned in which order; the results of other eyes are discarded.
@@ -467,12 +478,8 @@ class Calibration:
         Raises as `set_eye_distance`.
         """
         self._require_settled("the eyes")
-        record = self._session.contents
-        facts = {"plan": plan, "usable_eyes": usable_eyes}
-        if usable_eyes != record.facts.usable_eyes and record.is_solvable:
-            self._change(lambda: self._session.save_facts(**facts))
-        else:
-            self._session.save_facts(**facts)
+        is_other = usable_eyes != self._session.contents.facts.usable_eyes
+        self._save_facts(is_other, plan=plan, usable_eyes=usable_eyes)
 
     # Solving, and sending what was solved.
 
@@ -514,7 +521,7 @@ class Calibration:
             raise ProcedureError("solve first")
         self._clear_cursor(keeps_hand)
         self._drawing.send(self.results.rendered_shift_m)
-        self._apply_until_s = time.monotonic() + self._settings.apply_timeout_s
+        self._apply_until_s = time.monotonic() + _APPLY_TIMEOUT_S
         self.state = State.APPLYING
 
     def poll_applied(self) -> bool:
@@ -615,10 +622,6 @@ class Calibration:
     def undo_nudge(self) -> None:
         """Undo the last nudge; raises as `nudge`."""
         self._nudge(self._require_verifying().undo)
-
-    def redo_nudge(self) -> None:
-        """Redo the last nudge that was undone; raises as `nudge`."""
-        self._nudge(self._require_verifying().redo)
 
     def verified(self) -> None:
         """Confirm for the wearer, who has told the technician, that the drawing covers the hand.
@@ -741,8 +744,9 @@ class Calibration:
 
     def _record_evidence(self) -> None:
         """Record what contradicts the result, with which it is judged."""
-        found, facts = self.evidence.contradictions, self._session.contents.facts
-        names, texts = tuple(one.name for one in found), tuple(one.text for one in found)
+        evidence, facts = self.evidence.contradictions, self._session.contents.facts
+        names = tuple(contradiction.name for contradiction in evidence)
+        texts = tuple(contradiction.text for contradiction in evidence)
         if (names, texts) != (facts.evidence, facts.contradictions):
             with suppress(FileError):  # the results, recorded next, raise it again
                 self._session.save_facts(evidence=names, contradictions=texts)
@@ -882,6 +886,13 @@ class Calibration:
             raise
         self._forget_results()
 
+    def _save_facts(self, changes_results: bool, **facts: Any) -> None:
+        """Save facts; results made from other facts, if there can be any, are discarded."""
+        if changes_results and self._session.contents.is_solvable:
+            self._change(lambda: self._session.save_facts(**facts))
+        else:
+            self._session.save_facts(**facts)
+
     def _forget_results(self) -> None:
         self.results = None
         if self.state is not State.APPLIED:
@@ -934,11 +945,8 @@ class Calibration:
         self._drawing.send({verifying.eye: verifying.shift_m})
         self._session.record(VERIFYING, **verifying.event())
 
-    def _follow_nudges(self, observation: Observation, verifying: Verifying) -> None:
-        """Draw the hand's outline for the verified eye, and take the wearer's nudges."""
-        if observation.hand is not None:
-            outline_W_m = transform(observation.hand.T_W_D, observation.hand.cloud.outline_m)
-            self._link.send_live_hand(outline_W_m, False, (verifying.eye,), is_outline=True)
+    def _follow_nudges(self, verifying: Verifying) -> None:
+        """Take the wearer's nudges, and the word that the drawing fits."""
         verify_id = verifying.request.verify_id
         if heard := [one for one in self._link.nudges() if one.verify_id == verify_id]:
             self._hear(heard[-1], verifying)  # it has the sums of all
@@ -950,7 +958,7 @@ class Calibration:
             if self.is_applied:
                 self.evidence.drawn_otherwise(fits.problem)
             self._link.send_again()
-        judged = verifying.judge(fits, hands, self._settings.match_tolerance_s)
+        judged = verifying.judge(fits, hands)
         if isinstance(judged, str):
             self._refuse_verification(verifying, judged)
         elif verifying.needs_proof:
@@ -990,11 +998,11 @@ class Calibration:
         if not verifying.is_moved:
             self._end_unmoved(verifying)
             return
-        found = verifying.result(hand_E_m, hand.cloud.outline_sigma_px)
-        found = found.after(self.verifications.get(verifying.eye))
+        verification = verifying.result(hand_E_m, hand.cloud.outline_sigma_px)
+        verification = verification.after(self.verifications.get(verifying.eye))
         self._end_verifying(verifying.shift_m)
         with suppress(FileError):  # the results, recorded next, raise it again
-            self._session.save_facts(verified={verifying.eye: found})
+            self._session.save_facts(verified={verifying.eye: verification})
         try:
             self.solve()
         finally:
@@ -1034,8 +1042,9 @@ def _moved(hand: PlacedHand, displacement_W_m: ArrayLike) -> PlacedHand:
 
 def _is_new(device: HeadsetIdentity, known: HeadsetIdentity) -> bool:
     """Return whether a headset is another one, or tells something that it has not told before."""
+    # Where the views are and how far the eyes are apart changes as the eyes are tracked.
     named, known_name = (
-        facts_json(replace(one, views={}, eye_distance_m=None)) for one in (device, known)
+        facts_json(replace(headset, views={}, eye_distance_m=None)) for headset in (device, known)
     )
     tells_distance = device.eye_distance_m is not None and known.eye_distance_m is None
     return named != known_name or not device.views.keys() <= known.views.keys() or tells_distance

@@ -1,20 +1,241 @@
-"""The hand in each frame, found and placed in the world, and the evidence against a frame."""
+"""What each frame shows: the hand, found and placed in the world, and the evidence against it.
+
+The solver's residuals cannot show that the picture was frozen, that another camera than the rig's
+gave it, or that the headset did not draw what the PC believes. Each of these is watched for
+while the calibration runs. What is found refuses alignments while it lasts, or contradicts the
+result, and is named.
+"""
 
 from __future__ import annotations
 
 import time
+from collections import deque
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 
-from handcal.calibration.evidence import Contradiction, Evidence
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handcal.calibration.delay import ASSUMED_LATENCY_S, DelayMeter
 from handcal.calibration.hands import PlacedHand, RecentHands
-from handcal.calibration.states import CalibrationSettings, Observation, State
-from handcal.calibration.timing.delay import DelayMeter
+from handcal.calibration.states import CalibrationSettings, State
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import HandError, PoseError
-from handcal.core.types import CameraIdentity, Frame, HandCloud, Rig
+from handcal.core.geometry import invert
+from handcal.core.types import CameraIdentity, Float64, Frame, HandCloud, Intrinsics, Rig, UInt16
 from handcal.hand.outline import edges_of, with_outline
 from handcal.hand.shipped import make_finder
 from handcal.link.server import HeadsetServer
+from handcal.rig.compare import compare_camera
+from handcal.rig.findings import depth_finding, display_finding
+
+FROZEN_FRAMES = 4
+"""Equal pictures in a row, after which the camera counts as frozen: noise changes every picture."""
+_REFUSALS = 2
+_COMPARED = 20
+_APART_M, _APART_RAD = 0.02, np.radians(2.0)
+"""Poses of one rig in one world agree better at least once in this many frames, even while the head
+moves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contradiction:
+    """One piece of evidence against a calibration."""
+
+    name: str
+    """Short name, as in ``handcal demo --fault``."""
+    what: str
+    """What was found."""
+    advice: str = ""
+    """What the technician can do about it."""
+
+    @property
+    def text(self) -> str:
+        """Both in one line."""
+        return f"{self.what}; {self.advice}" if self.advice else self.what
+
+
+class Evidence:
+    """Collects evidence during one calibration.
+
+    Parameters
+    ----------
+    rig : Rig
+    earlier : sequence of Contradiction
+        Evidence found before the session was interrupted.
+    """
+
+    def __init__(self, rig: Rig, earlier: Sequence[Contradiction] = ()) -> None:
+        self._rig = rig
+        self._found = {one.name: one for one in earlier}
+        self._camera: tuple[CameraIdentity, Intrinsics] | None = None
+        self._last: Frame | None = None
+        self._equal = 0
+        self._drawn_otherwise = 0
+        self._apart: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
+        if rig.depth_check is not None and not (finding := depth_finding(rig.depth_check)).is_fine:
+            self._add(
+                "depth-bias",
+                f"the rig's depth check found {finding.found}",
+                "calibrate the depth camera, or check it again",
+            )
+
+        if rig.display_check is not None:
+            shown = display_finding(rig.display_check)
+            if not shown.is_fine:
+                self._add("disobeying-display", f"the headset does not obey: {shown.found}")
+
+    @property
+    def contradictions(self) -> tuple[Contradiction, ...]:
+        """All evidence so far against the result."""
+        return tuple(self._found.values())
+
+    def see(
+        self, frame: Frame, identity: CameraIdentity, *, is_used: bool = True
+    ) -> Contradiction | None:
+        """Look at a frame; return what forbids using it, if anything does.
+
+        A frozen picture passes by, so it forbids frames only while it lasts. Another camera
+        contradicts the whole calibration, unless it is replaced before any frame `is_used` in an
+        alignment.
+        """
+        if (identity, frame.depth_intrinsics) != self._camera:
+            self._camera = identity, frame.depth_intrinsics
+            differences = compare_camera(self._rig, identity, frame.depth_intrinsics)
+            if not is_used:
+                self._found.pop("other-camera", None)
+            if differences:
+                self._add(
+                    "other-camera",
+                    f"the camera is not the rig's: {'; '.join(differences)}",
+                    "connect the rig's camera, or choose the rig file of this one",
+                )
+        last, self._last = self._last, frame
+        is_equal = last is not None and _is_same(last.depth, frame.depth)
+        self._equal = self._equal + 1 if is_equal else 0
+        if self._equal < FROZEN_FRAMES:
+            return None
+        return Contradiction(
+            "frozen-camera",
+            "the camera's picture does not change",
+            "unplug the camera and plug it in again",
+        )
+
+    def see_delay(self, delay_s: float | None, limit_s: float) -> Contradiction | None:
+        """Return what forbids using frames that arrive this long after their exposure."""
+        if delay_s is None or delay_s <= limit_s:
+            return None
+        return Contradiction(
+            "late-camera",
+            f"the camera's pictures arrive {1e3 * delay_s:.0f} ms after their exposure, more than "
+            f"{1e3 * limit_s:.0f} ms",
+            "close other programs, and connect the camera directly",
+        )
+
+    def see_delivery(self, is_lost: bool) -> Contradiction | None:
+        """Return what forbids using frames while it is unknown what a connected headset draws."""
+        if not is_lost:
+            return None
+        return Contradiction(
+            "lost-start",
+            "the headset does not acknowledge the projections sent to it",
+            "restart its app",
+        )
+
+    def see_clock(self, step_s: float) -> Contradiction | None:
+        """Return what forbids using frames just after the headset's clock was set."""
+        if step_s == 0.0:
+            return None
+        return Contradiction(
+            "clock-step",
+            f"the headset's clock was set by {step_s:+.2f} s",
+            "wait a moment, and if this happens again, restart the headset's app",
+        )
+
+    def see_poses(self, by_camera: Float64, by_app: Float64) -> None:
+        """Compare T_W_D (4, 4) as the camera reports it and as it follows from the app's pose."""
+        difference = invert(by_camera) @ by_app
+        turn_rad = float(Rotation.from_matrix(difference[:3, :3]).magnitude())
+        self._apart.append((float(np.linalg.norm(difference[:3, 3])), turn_rad))
+
+    @property
+    def other_world(self) -> Contradiction | None:
+        """Evidence that forbids frames while camera and app refer to different worlds or rigs."""
+        if len(self._apart) < _COMPARED:
+            return None
+        apart_m, turn_rad = (min(values) for values in zip(*self._apart, strict=True))
+        if apart_m <= _APART_M and turn_rad <= _APART_RAD:
+            return None
+        return Contradiction(
+            "other-world",
+            f"the camera is {1e3 * apart_m:.0f} mm and {np.degrees(turn_rad):.0f}° from where the "
+            "headset's app and the rig file place it",
+            "let the app use the world of hl2ss, and measure the camera's pose again (handcal rig "
+            "make --factory)",
+        )
+
+    def drawn_otherwise(self, problem: str) -> None:
+        """Note that a confirmation was refused because the headset drew something else."""
+        self._drawn_otherwise += 1
+        if self._drawn_otherwise >= _REFUSALS:
+            self._add(
+                "stale-headset",
+                f"the headset does not draw what was sent to it ({problem})",
+                "restart its app",
+            )
+
+    @property
+    def is_drawn_otherwise(self) -> bool:
+        """True if the last confirmation from the headset was refused for what it drew."""
+        return self._drawn_otherwise > 0
+
+    def drawn_as_sent(self) -> None:
+        """Note that a confirmation was drawn as it was sent."""
+        self._drawn_otherwise = 0
+        self._found.pop("stale-headset", None)
+
+    def _add(self, name: str, what: str, advice: str = "") -> None:
+        self._found[name] = Contradiction(name, what, advice)
+
+
+def _is_same(one: UInt16, other: UInt16) -> bool:
+    """Compare two pictures; a few rows tell those of a live camera apart in a tenth of the time."""
+    return all(np.array_equal(one[::every], other[::every]) for every in (16, 1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """The result of one procedure step: state, hand, rotation, timings."""
+
+    state: State
+    """After the step."""
+    hand: PlacedHand | None
+    """The newest hand placed in this step, possibly from an earlier frame; None if none was."""
+    problem: str
+    """Reason why there is no hand; empty if there is one."""
+    is_steady: bool
+    """True if a cursor can be made now."""
+    cloud: HandCloud | None = None
+    """The hand in this step's own frame, placed or not."""
+    rotation_rad: Float64 | None = None
+    """(3,); rotation from the cursor to the live hand, about D's axes, while aligning."""
+    shape_change_m: float | None = None
+    """Change of the hand's shape since the cursor, rms, while aligning; measured a few times a
+    second."""
+    shape_text: str = ""
+    """The part that changed most, in words."""
+    has_changed: bool = False
+    """True if that change exceeds the guard's limit."""
+    is_over_limit: bool = False
+    """True if the rotation or the change of shape exceeds the guard's limit."""
+    segment_ms: float | None = None
+    guard_ms: float | None = None
+    """Durations of these stages; None if one did not run in this step."""
+    contradiction: Contradiction | None = None
+    """Evidence that forbids using this frame."""
+    needs_delay: bool = False
+    """True if no cursor can be made before the wearer has looked around (`DelayMeter`)."""
 
 
 class Sight:
@@ -42,20 +263,17 @@ class Sight:
     ) -> None:
         self._rig = rig
         self._link = link
-        self._tolerance_s = settings.match_tolerance_s
         self._evidence = evidence
-        self._clock = FrameClock(settings.camera_latency_s)
+        self._clock = FrameClock(ASSUMED_LATENCY_S)
         self._finder = make_finder(settings.segment)
-        self.delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D, settings.delay)
-        self.hands = RecentHands(
-            link.pose_at_host_ns, rig.T_H_D, settings.steady_s, settings.steady_m
-        )
+        self.delay = DelayMeter(self._clock, link.pose_at_host_ns, rig.T_H_D)
+        self.hands = RecentHands(link.pose_at_host_ns, rig.T_H_D)
         self.frame: Frame | None = None
 
     @property
     def newest_hand(self) -> PlacedHand | None:
         """The newest hand unless it is too old for a confirmation."""
-        return self.hands.newest(self._tolerance_s)
+        return self.hands.newest()
 
     def see(
         self,
@@ -112,11 +330,11 @@ class Sight:
         """Return the hand in a frame, or None and the reason."""
         if contradiction is not None:
             self.hands.clear()
-            return None, HandError(contradiction.text)
+            return None, HandError(contradiction.what, contradiction.advice)
         try:
             cloud = self._finder.find(frame)
         except HandError as error:
-            return None, type(error)(str(error))  # without the traceback, which holds the station
+            return None, type(error)(*error.args)  # without the traceback, which holds the station
         return with_outline(cloud, frame, edges_of(self._rig, camera.model)), None
 
     def _see_world(self, frame: Frame, t_host_ns: int) -> Contradiction | None:

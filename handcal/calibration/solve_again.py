@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
+from handcal.calibration.lab_prior import rig_numbers
 from handcal.calibration.states import CalibrationSettings
 from handcal.core.errors import FileError, HandError
 from handcal.core.progress import Progress
-from handcal.core.types import METHODS, EyeDistance, Method
+from handcal.core.types import EYES, METHODS, Eye, EyeDistance, Float64, Method, Rig
 from handcal.io.settings import known_settings, read_settings
+from handcal.register.prior import LearnedPrior, posterior, widened
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.journal import Damage
 from handcal.session.repair import SessionCheck, check_session, without_unsolvable
@@ -170,3 +175,45 @@ def solve_contents(
         plan="recommended" if record.facts.plan == "recommended" else None,
         usable_eyes=record.facts.usable_eyes,
     )
+
+
+SLIP_M = (0.002, 0.0015, 0.003)
+"""Change of a headset's fit when the same wearer puts it on again, standard deviation along
+E's axes. As much as the simulated wearers differ; for a real headset it is not known."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Former:
+    """The end of a stored session."""
+
+    shift_m: Mapping[Eye, Float64] = field(default_factory=dict)
+    """each (3,); φ that the headset rendered with last, solved or set by hand."""
+    prior: LearnedPrior | None = None
+    """Prior of the eyes after the headset was moved; None if there is no stored session."""
+
+
+def read_former(path: Path, rig: Rig) -> Former:
+    """Read the session that another one starts from.
+
+    Raises
+    ------
+    FileError
+        If the session cannot be read or solved, was contradicted, or is of another rig.
+    """
+    record = Session.open(path)
+    if rig_numbers(record.rig) != rig_numbers(rig):
+        raise FileError(f"{path} was calibrated with another rig", "start without it")
+    results = solve_again(record, stored_solve_settings(record))
+    if results is None:
+        raise FileError(f"{path} has no alignment", "start without it")
+    faulty = [one for one in results.verdicts.values() if one.name in _FAULTY]
+    if faulty:
+        raise FileError(f"{path} is not a calibration to start from: {faulty[0].reason}")
+    fused = results.fused
+    known = [one.at(fused.wearer_scale) for one in fused.all_observed]
+    mean_m, covariance_m2 = posterior(fused.prior, known)
+    shift_m = {eye: np.zeros(3) for eye in EYES} | dict(record.applied_shift_m)
+    return Former(shift_m, widened(mean_m[:6], covariance_m2[:6, :6], SLIP_M))
+
+
+_FAULTY = ("contradicted", "implausible")

@@ -52,7 +52,6 @@ class VerifyingView:
     shift_m: tuple[float, float, float]
     """φ before the verification, and with the movement so far."""
     can_undo: bool
-    can_redo: bool
     began_host_ns: int = 0
     """Time of its first frame; 0 if it was resumed."""
     is_set_aside: bool = False
@@ -107,8 +106,7 @@ class Verifying:
         self._began_host_ns = began_host_ns
         self._heard = NudgeSum()
         self._session = 0
-        self._done: list[NudgeSum] = []
-        self._undone: list[NudgeSum] = []
+        self._earlier: list[NudgeSum] = []
 
     @property
     def eye(self) -> Eye:
@@ -122,16 +120,16 @@ class Verifying:
             self.moved,
             _triple(self.before_m),
             _triple(self.shift_m),
-            can_undo=bool(self._done),
-            can_redo=bool(self._undone),
+            can_undo=bool(self._earlier),
             began_host_ns=self._began_host_ns,
             is_set_aside=self.offset != NudgeSum(),
         )
 
     def nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:
         """Move the drawing; ValueError if it is moved too far."""
-        self._move(self.moved.plus(right_arcmin, down_arcmin, size))
-        self._undone.clear()
+        before = self.moved
+        self._draw(before.plus(right_arcmin, down_arcmin, size))
+        self._earlier.append(before)
 
     def hear(self, nudge: Nudge) -> tuple[float, float, float] | None:
         """Take the wearer's sums; return what they add to the last ones, None if nothing.
@@ -152,23 +150,14 @@ class Verifying:
             self.fits = nudge
         return None
 
-    def judge(self, fits: Nudge, hands: RecentHands, tolerance_s: float) -> PlacedHand | str:
-        """Return the hand that the drawing fits, or what the wearer must do before it counts.
-
-        Parameters
-        ----------
-        fits : Nudge
-            The wearer's confirmation.
-        hands : RecentHands
-        tolerance_s : float
-            Largest time between the confirmation and the hand.
-        """
+    def judge(self, fits: Nudge, hands: RecentHands) -> PlacedHand | str:
+        """Return the hand that the drawing fits, or what the wearer must do before it counts."""
         if not fits.is_timed:
             return "The headset's clock was set. Look and confirm again."
         if fits.problem:
             return CHANGED
         try:
-            hand = hands.nearest(fits.t_host_ns, tolerance_s)
+            hand = hands.nearest(fits.t_host_ns)
         except HandError as error:
             return f"{error}. Hold it up and confirm again."
         if hands.steady() is None:
@@ -192,16 +181,9 @@ class Verifying:
 
     def undo(self) -> None:
         """Undo the last nudge; ValueError if there is none."""
-        if not self._done:
+        if not self._earlier:
             raise ValueError("there is no nudge to undo")
-        self._undone.append(self.moved)
-        self._draw(self._done.pop())
-
-    def redo(self) -> None:
-        """Redo the last nudge that was undone; ValueError if there is none."""
-        if not self._undone:
-            raise ValueError("there is no nudge to redo")
-        self._move(self._undone.pop())
+        self._draw(self._earlier.pop())
 
     def result(self, hand_E_m: Float64, outline_sigma_px: float) -> Verification:
         """Return the verification, with the hand and its outline when the drawing fitted."""
@@ -227,11 +209,6 @@ class Verifying:
             "offset_arcmin": [self.offset.right_arcmin, self.offset.down_arcmin],
             "offset_size": self.offset.size,
         }
-
-    def _move(self, moved: NudgeSum) -> None:
-        before = self.moved
-        self._draw(moved)
-        self._done.append(before)
 
     def _draw(self, moved: NudgeSum) -> None:
         total = moved.plus(self.offset.right_arcmin, self.offset.down_arcmin, self.offset.size)
@@ -275,9 +252,10 @@ def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Veri
     """Return the verification that a session was in when it ended, or None."""
     last: Event | None = None
     for event in events:
+        is_result = event.name == SessionEvent.FACTS_SAVED and "verified" in event.data
         if event.name == VERIFYING:
             last = event
-        elif event.name in _ENDS or event.name.startswith("alignment_") or _is_result(event):
+        elif event.name in _ENDS or event.name.startswith("alignment_") or is_result:
             last = None
     if last is None:
         return None
@@ -295,10 +273,6 @@ def resumed(events: Iterable[Event], displays: Mapping[Eye, EyeDisplay]) -> Veri
     except (KeyError, TypeError, ValueError):
         return None  # the eye is verified from the start
     return verifying
-
-
-def _is_result(event: Event) -> bool:
-    return event.name == SessionEvent.FACTS_SAVED and "verified" in event.data
 
 
 def skipped_eyes(events: Iterable[Event]) -> set[Eye]:

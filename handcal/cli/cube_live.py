@@ -64,7 +64,7 @@ _CUBE = (
 )
 def track(arguments: argparse.Namespace) -> None:
     """Track a cube with the depth camera, and have the headset draw it where it is."""
-    from handcal.station.user_test.cube_tracking import TrackingOrder, track_cube
+    from handcal.station.user_test.cube import TrackingOrder, track_cube
 
     with until_interrupted() as is_stopped, show_progress(is_stopped) as progress:
         found = track_cube(
@@ -113,7 +113,7 @@ def track(arguments: argparse.Namespace) -> None:
 def trials(arguments: argparse.Namespace) -> None:
     """Record the user test's trials with a cube in the room, for a calibrated session."""
     from handcal.session.trial import trial_json
-    from handcal.station.user_test.cube_trials import (
+    from handcal.station.user_test.cube import (
         StudyLeader,
         TrialOrder,
         TrialSettings,

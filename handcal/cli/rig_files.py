@@ -99,7 +99,7 @@ def _with_factory_pose(rig: Rig, arguments: argparse.Namespace) -> Rig:
     from handcal.camera.hololens2 import HoloLens2Camera, hololens2_settings
     from handcal.cli.display_check import network_server
     from handcal.rig.assemble import with_factory_pose
-    from handcal.station.camera_pose import run_camera_pose
+    from handcal.station.poses import run_camera_pose
 
     settings = hololens2_settings(arguments.factory)
     if settings is None or settings.realsense_rig is not None:

@@ -132,7 +132,7 @@ def check(arguments: argparse.Namespace) -> None:
     save(arguments.json, asdict(found))
     for damage in found.damaged:
         # The message that it is not a session names its folder itself.
-        console.print(damage.what if found.state == "none" else str(damage))
+        console.print(damage.text if found.state == "none" else str(damage), markup=False)
     if found.state == "sound":
         console.print("The session is sound.")
     elif found.state == "damaged":

@@ -30,8 +30,8 @@ from handcal.register.results import Results
 from handcal.report.cells import length_mm
 from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
-from handcal.session.comparison import read_comparisons
-from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
+from handcal.session.record import eye_trials
+from handcal.session.trial import EyeTrials, is_doubted, read_comparisons
 
 _ORIGINS: Mapping[ShiftOrigin, str] = {
     "fine_tuned": "fine-tuned by hand",

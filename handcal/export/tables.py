@@ -13,8 +13,7 @@ from handcal.export.outcome import SessionOutcome, ShiftOrigin
 from handcal.io.files import write_atomic
 from handcal.register.benefit import expected_error_arcmin
 from handcal.report.cells import rows_csv
-from handcal.session.comparison import Comparison, read_comparisons
-from handcal.session.trial import Trial
+from handcal.session.trial import Comparison, Trial, read_comparisons
 
 _WHOSE = ("session", "wearer")
 _PARAMETERS = (

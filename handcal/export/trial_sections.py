@@ -12,9 +12,14 @@ from handcal.export.tables import corner_rows
 from handcal.report.cells import extremes, interval_ends, length_mm, mean_sd, median_quartiles
 from handcal.report.document import Column, Figure, Section, Table
 from handcal.report.statistics import mean_interval
-from handcal.session.comparison import Comparison, count_comparisons
-from handcal.session.judged_trials import eye_trials
-from handcal.session.trial import ErrorStatistics, calibration_numbers, summarise_trials
+from handcal.session.record import eye_trials
+from handcal.session.trial import (
+    Comparison,
+    ErrorStatistics,
+    calibration_numbers,
+    count_comparisons,
+    summarise_trials,
+)
 
 
 def user_test_section(outcome: SessionOutcome) -> Section:

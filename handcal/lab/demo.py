@@ -17,11 +17,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from handcal.calibration.evidence import Contradiction
-from handcal.calibration.former import SLIP_M
 from handcal.calibration.plan import PlanSettings, with_eyes
 from handcal.calibration.procedure import Calibration
-from handcal.calibration.states import Observation
+from handcal.calibration.sight import Contradiction, Observation
+from handcal.calibration.solve_again import SLIP_M
 from handcal.core.display import reprojection_arcmin
 from handcal.core.errors import HandcalError
 from handcal.core.progress import Progress
@@ -34,7 +33,7 @@ from handcal.sim.sensor import EDGE_SIGMA_PX, PHASE_BORDER_PX, SensorName, borde
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.faults import Fault
-from handcal.station.follow import Patience, deliver, follow_plan
+from handcal.station.run import Patience, deliver, follow_plan
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station

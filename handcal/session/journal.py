@@ -44,11 +44,17 @@ class Damage:
     line: int | None
     """Number of the journal's line, from 1; None for another file."""
     what: str
-    """The damage, and what was done instead."""
+    instead: str = ""
+    """What was done instead; empty for nothing."""
+
+    @property
+    def text(self) -> str:
+        """The damage, and what was done instead."""
+        return f"{self.what}; {self.instead}" if self.instead else self.what
 
     def __str__(self) -> str:
         where = self.file if self.line is None else f"{self.file}, line {self.line}"
-        return f"{where}: {self.what}"
+        return f"{where}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +117,7 @@ def read_journal(path: Path) -> JournalContent:
             if event.number <= (events[-1].number if events else 0):
                 raise ValueError("is not the event expected there")
         except ValueError as error:
-            damaged.append(Damage(path.name, place, f"{error}; left out"))
+            damaged.append(Damage(path.name, place, str(error), "left out"))
             expected += 1
         else:
             if event.number > expected:
@@ -120,7 +126,7 @@ def read_journal(path: Path) -> JournalContent:
             expected = event.number + 1
         done_bytes += len(line) + 1
     if not events:
-        why = damaged[0].what.removesuffix("; left out") if damaged else "is missing"
+        why = damaged[0].what if damaged else "is missing"
         raise FileError(f"{path} does not begin as the journal of a session: line 1 {why}")
     ended, notes_sha256 = _read_end(path.with_name(JOURNAL_END), damaged)
     if ended >= expected:
@@ -285,7 +291,7 @@ def _read_end(path: Path, damaged: list[Damage]) -> tuple[int, str | None]:
         if type(number) is not int or not isinstance(notes_sha256, str | None):
             raise ValueError("holds no number or no checksum")
     except (FileError, ValueError, KeyError) as error:
-        damaged.append(Damage(path.name, None, f"{error}; not used"))
+        damaged.append(Damage(path.name, None, str(error), "not used"))
         return 0, None
     return number, notes_sha256
 

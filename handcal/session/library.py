@@ -14,19 +14,19 @@ from handcal.core.progress import Progress
 from handcal.core.types import EYES, Eye
 from handcal.io.files import make_folder, read_limited, sync_folder
 from handcal.io.lock import FileLock
-from handcal.register.results import read_rendered_shift_m
+from handcal.register.results import RESULTS_VERSION, read_rendered_shift_m
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
-from handcal.session.journal import JOURNAL, find_journals
-from handcal.session.judged_trials import EyeTrials, judge_trials
+from handcal.session.journal import JOURNAL, find_journals, read_journal
 from handcal.session.record import (
     MAX_ALIGNMENT_BYTES,
+    SessionRecord,
     alignment_path,
     replay,
     sha256,
 )
 from handcal.session.session import Session
-from handcal.session.state import SessionEvent, SessionState, clean_wearer
-from handcal.session.trial import trial_errors_arcmin
+from handcal.session.state import ASIDE, VERIFYING, SessionEvent, SessionState, clean_wearer
+from handcal.session.trial import EyeTrials, judge_trials, trial_errors_arcmin
 
 DELETED = ".deleted"
 """Folder, inside the folder of sessions, to which deleted sessions are moved."""
@@ -146,7 +146,7 @@ def delete_session(path: Path) -> Path:
     """
     _require_there(path)
     if not (path / JOURNAL).is_file():
-        raise FileError(f"{path} is not a session", "nothing was deleted")
+        raise FileError(f"{path} is not a session, so nothing was deleted")
     FileLock(path / "lock").release()  # only a test, or another program would lose its folder
     folder = path.absolute().parent
     bin_folder = make_folder(folder / DELETED, folder)
@@ -164,7 +164,7 @@ def restore_session(path: Path) -> Path:
     """
     target = path.parent.parent / path.name
     if path.parent.name != DELETED:
-        raise FileError(f"{path} is not in a folder {DELETED}", "nothing was restored")
+        raise FileError(f"{path} is not in a folder {DELETED}, so nothing was restored")
     if target.exists():
         raise FileError(f"{target} exists", "rename it, then restore again")
     return _move(path, target)
@@ -225,6 +225,8 @@ def _read(path: Path, stamp: tuple[int, int]) -> LibraryEntry:
 def eye_outcomes(state: SessionState) -> dict[Eye, EyeOutcome]:
     """Return the results of a session's eyes; those that it does not hold are left out."""
     results = (state.results if state.is_solved else None) or {}
+    if results.get("version") != RESULTS_VERSION:  # their numbers may mean something else
+        return {}
     found = results.get("eyes")
     eyes = found if isinstance(found, dict) else {}
     trials = state.trials.active.values()
@@ -289,3 +291,91 @@ def _outcome(one: Mapping[str, Any], trials: EyeTrials | None) -> EyeOutcome:
 def _number(value: object) -> float | None:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return float(value) if is_number and math.isfinite(value) else None  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True)
+class UnfinishedSession:
+    """A session whose journal does not end in `finished`, but for what is `ASIDE`."""
+
+    path: Path
+    started: str = ""
+    """UTC, ISO 8601; empty if unknown."""
+    wearer: str = ""
+    alignments: int = 0
+    trials: int = 0
+    """Numbers of those that are not deleted."""
+    verified: int = 0
+    """Number of verified eyes; after a slipped headset they are all there is."""
+    is_verifying: bool = False
+    """True if a verification was begun, of which nothing else may remain."""
+    damaged: int = 0
+    """Number of damaged parts, which are left out when it is resumed."""
+    problem: str = ""
+    """Reason why it cannot be resumed, such as another program; empty if it can."""
+    is_repaired: bool = False
+    """True if a repaired copy of this damaged session is in the same folder."""
+
+    @property
+    def is_worth_resuming(self) -> bool:
+        """True if it holds an alignment, a trial or a verification, be it one only begun."""
+        return bool(self.alignments or self.trials or self.verified or self.is_verifying)
+
+
+def summarize(
+    record: SessionRecord, started: str = "", *, has_copy: bool = False
+) -> UnfinishedSession:
+    """Return what an unfinished session holds; `has_copy`: a repaired copy is beside it."""
+    return UnfinishedSession(
+        record.path,
+        started,
+        record.wearer,
+        len(record.alignments),
+        len(record.trials),
+        len(record.facts.verified),
+        any(event.name == VERIFYING for event in record.events),
+        len(record.damaged),
+        is_repaired=bool(record.damaged) and has_copy,
+    )
+
+
+def unfinished_and_repaired(parent: Path) -> tuple[list[UnfinishedSession], set[Path]]:
+    """Return the unfinished sessions among the folders in `parent`, the newest first.
+
+    Also return the folders of all sessions, finished or not, of which it holds a repaired copy.
+    """
+    outlines = {journal.parent: _outline(journal) for journal in find_journals(parent)}
+    copied = {began for began, names in outlines.values() if SessionEvent.REPAIRED in names}
+    repaired = {
+        path
+        for path, (began, names) in outlines.items()
+        if began in copied and SessionEvent.REPAIRED not in names
+    }
+    found = [_inspect(path, *outline, path in repaired) for path, outline in outlines.items()]
+    unfinished = sorted(
+        (session for session in found if session is not None),
+        key=lambda session: (session.started, session.path.name),
+        reverse=True,
+    )
+    return unfinished, repaired
+
+
+def _outline(journal: Path) -> tuple[str, tuple[str, ...]]:
+    """Return the beginning of a session and the names of its events; empty if unreadable."""
+    try:
+        events = read_journal(journal).events
+    except FileError:  # `_inspect` says why
+        return "", ()
+    return events[0].time, tuple(event.name for event in events)
+
+
+def _inspect(
+    path: Path, started: str, names: tuple[str, ...], has_copy: bool
+) -> UnfinishedSession | None:
+    if [name for name in names if name not in ASIDE][-1:] == [SessionEvent.FINISHED]:
+        return None
+    try:
+        FileLock(path / "lock").release()  # only a test: reading takes too long to hold it
+        record = Session.open(path)
+    except FileError as error:
+        return UnfinishedSession(path, started, problem=str(error))
+    return summarize(record, started, has_copy=has_copy)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -13,10 +13,10 @@ from typing import Any
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment, Eye, Float64, Rig
 from handcal.io.files import read_json, read_limited
+from handcal.register.results import Results, read_rendered_shift_m
 from handcal.register.solve import check_alignment
 from handcal.rig.rig_file import MAX_RIG_BYTES, parse_rig
 from handcal.session.alignment_file import decode_alignment
-from handcal.session.facts import AlignmentFacts, SessionFacts
 from handcal.session.journal import (
     JOURNAL,
     Damage,
@@ -24,8 +24,8 @@ from handcal.session.journal import (
     JournalContent,
     read_journal,
 )
-from handcal.session.state import SessionEvent, SessionState
-from handcal.session.trial import Trial
+from handcal.session.state import AlignmentFacts, SessionEvent, SessionFacts, SessionState
+from handcal.session.trial import EyeTrials, Trial, judge_trials, trial_errors_arcmin
 
 MAX_ALIGNMENT_BYTES = 16 * 2**20
 MAX_NOTES_CHARACTERS = 20_000
@@ -122,6 +122,20 @@ class SessionRecord:
         return f"<SessionRecord {self.path}: {counts}{damaged}>"
 
 
+def eye_trials(
+    results: Results, record: SessionRecord, target_arcmin: float
+) -> dict[Eye, EyeTrials]:
+    """Return the trials of a session's results, of each eye that has some.
+
+    Stored results count, too, if they are of all alignments: another version may have solved them
+    with another φ.
+    """
+    stored_m = read_rendered_shift_m(record.results if record.is_solved else None)
+    trials = (one for one in record.trials.values() if one.eye in results.eyes)
+    errors = trial_errors_arcmin(trials, results.rendered_shift_m, stored_m)
+    return judge_trials(errors, target_arcmin)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Replayed:
     """A session's journal, and the state that its events lead to."""
@@ -157,8 +171,8 @@ def replay(path: Path) -> Replayed:
         try:
             state.apply(event)
         except ValueError as error:
-            what = f"event {event.number} cannot follow those before it: {error}; left out"
-            damaged.append(Damage(JOURNAL, event.number, what))
+            what = f"event {event.number} cannot follow those before it: {error}"
+            damaged.append(Damage(JOURNAL, event.number, what, "left out"))
             state.alignments.has_gaps = state.trials.has_gaps = True
     if damaged:  # a number may be that of an alignment whose event is lost
         stored = (one.stem for one in path.glob("alignments/*.npz"))
@@ -167,9 +181,9 @@ def replay(path: Path) -> Replayed:
     return Replayed(journal, state, tuple(damaged))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class LoadedSession:
-    """The parts of which `SessionRecord` is made, kept up to date by a session in use."""
+    """The parts of which `SessionRecord` is made; a session in use changes them as it writes."""
 
     path: Path
     rig: Rig
@@ -178,25 +192,21 @@ class LoadedSession:
     notes_sha256: str | None
     """Empty without notes, None if they are damaged."""
     state: SessionState
-    """Changed by each event."""
-    events: Sequence[Event]
-    alignments: Mapping[int, Alignment]
+    events: list[Event]
+    alignments: dict[int, Alignment]
     """All that are sound, deleted ones too."""
     journal: JournalContent
     """As read."""
     damaged: tuple[Damage, ...]
-    journal_bytes: int
-    torn_bytes: int
-    unwritten: tuple[Event, ...] = ()
 
-    def contents(self) -> SessionRecord:
-        """Return the contents as they are now."""
+    def contents(self, unwritten: int = 0) -> SessionRecord:
+        """Return the contents as they are now; `unwritten` events are not on disk yet."""
         state = self.state
         active, deleted = (
             MappingProxyType({n: self.alignments[n] for n in those if n in self.alignments})
             for those in (state.alignments.active, state.alignments.deleted)
         )
-        is_complete = state.results is not None and len(active) == len(state.alignments.active)
+        is_complete = state.results is not None and len(active) == _solved_count(state)
         return SessionRecord(
             path=self.path,
             rig=self.rig,
@@ -216,15 +226,24 @@ class LoadedSession:
             set_by_hand_m=MappingProxyType(state.set_by_hand_m),
             went_back=state.went_back,
             is_finished=state.is_finished,
-            journal_bytes=self.journal_bytes,
-            torn_bytes=self.torn_bytes,
+            journal_bytes=self.journal.complete_bytes,
+            torn_bytes=self.journal.torn_bytes,
             facts=state.facts,
             verified_now=state.verified_now,
             alignment_facts=MappingProxyType(dict(state.alignment_facts)),
             last_alignment=state.alignments.last(),
             damaged=self.damaged,
-            unwritten=self.unwritten,
+            unwritten=tuple(self.events[len(self.events) - unwritten :]),
         )
+
+
+def _solved_count(state: SessionState) -> int:
+    """Return the number of alignments that the results were solved from.
+
+    It is less than the journal's if some were lost before, and greater if some are lost since.
+    """
+    solved = (state.results or {}).get("alignments")
+    return len(solved) if isinstance(solved, list) else len(state.alignments.active)
 
 
 def load_session(path: Path, rig: Rig | None = None) -> LoadedSession:
@@ -245,12 +264,10 @@ def load_session(path: Path, rig: Rig | None = None) -> LoadedSession:
         notes=notes,
         notes_sha256=notes_sha256,
         state=state,
-        events=journal.events,
+        events=list(journal.events),
         alignments=alignments,
         journal=journal,
         damaged=tuple(damaged),
-        journal_bytes=journal.complete_bytes,
-        torn_bytes=journal.torn_bytes,
     )
 
 
@@ -284,7 +301,7 @@ def _read_rig(path: Path, state: SessionState, damaged: list[Damage]) -> Rig:
                 f"{file} is damaged: {error}",
                 "repair the session with another copy of the rig file",
             ) from error
-        damaged.append(Damage("rig.yaml", None, f"{error}; the journal's copy was read"))
+        damaged.append(Damage("rig.yaml", None, str(error), "the journal's copy was read"))
         try:
             return parse_rig(state.rig.encode())
         except ValueError as worse:
@@ -305,7 +322,7 @@ def _read_settings(file: Path, state: SessionState, damaged: list[Damage]) -> di
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
         used = "nothing was read" if state.settings is None else "the journal's copy was read"
-        damaged.append(Damage(file.name, None, f"{error}; {used}"))
+        damaged.append(Damage(file.name, None, str(error), used))
         return state.settings or {}
     return settings if state.settings is None else state.settings
 
@@ -318,7 +335,7 @@ def _check_results(file: Path, state: SessionState, damaged: list[Damage]) -> No
         if results not in (None, state.results, *state.older_results):
             raise FileError(f"{file} is not what the journal holds")
     except FileError as error:
-        damaged.append(Damage(file.name, None, f"{error}; the journal's copy was read"))
+        damaged.append(Damage(file.name, None, str(error), "the journal's copy was read"))
 
 
 def _notes_checksums(replayed: Replayed) -> tuple[str | None, ...]:
@@ -343,7 +360,7 @@ def _read_notes(
             raise FileError("its checksum is not the journal's")
     except FileError as error:
         used = "it was read as it is" if found else "nothing was read"
-        damaged.append(Damage(file.name, None, f"{error}; {used}"))
+        damaged.append(Damage(file.name, None, str(error), used))
         return data.decode(errors="replace"), None
     return data.decode(errors="replace"), found
 
@@ -359,7 +376,7 @@ def _read_alignments(
             alignments[number] = _read_alignment(path, file, checksum)
         except (FileError, ValueError) as error:
             name = file.relative_to(path).as_posix()
-            damaged.append(Damage(name, None, f"{error}; alignment {number} was left out"))
+            damaged.append(Damage(name, None, str(error), f"alignment {number} was left out"))
     return alignments
 
 

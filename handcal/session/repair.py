@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, TypeAlias
@@ -55,8 +55,8 @@ def without_unsolvable(
             fuse_alignments([(alignment, shifts)], record.rig, settings.fuse)
         except (ValueError, HandError) as error:
             del alignments[number]
-            text = f"it cannot be solved: {error}; alignment {number} was left out"
-            damaged.append(Damage(f"alignments/{number}.npz", None, text))
+            what, instead = f"it cannot be solved: {error}", f"alignment {number} was left out"
+            damaged.append(Damage(f"alignments/{number}.npz", None, what, instead))
     if len(alignments) == len(record.alignments):
         return record
     return replace(record, alignments=MappingProxyType(alignments), damaged=tuple(damaged))
@@ -131,8 +131,8 @@ def _events(record: SessionRecord, folder: Path) -> Iterator[Event]:
         "wearer": record.wearer,
     }
     yield Event(1, record.events[0].time, SessionEvent.CREATED, created)
-    damaged = {"damaged": [asdict(damage) for damage in record.damaged]}
-    yield happens_now(2, SessionEvent.REPAIRED, damaged)
+    damaged = [{"file": one.file, "line": one.line, "what": one.text} for one in record.damaged]
+    yield happens_now(2, SessionEvent.REPAIRED, {"damaged": damaged})
     state = SessionState()
     state.alignments.has_gaps = state.trials.has_gaps = True
     for event in record.events:

@@ -46,16 +46,22 @@ from handcal.io.files import (
 from handcal.io.lock import FileLock
 from handcal.rig.rig_file import MAX_RIG_BYTES, write_rig
 from handcal.session.alignment_file import encode_alignment
-from handcal.session.comparison import COMPARED, Comparison, comparison_json
-from handcal.session.facts import AlignmentFacts, SessionFacts, facts_json, with_facts
 from handcal.session.in_force import end_at_close
 from handcal.session.journal import JOURNAL, Event, JournalWriter, happens_now, journal_line
 from handcal.session.record import MAX_ALIGNMENT_BYTES as MAX_ALIGNMENT_BYTES
 from handcal.session.record import MAX_NOTES_CHARACTERS as MAX_NOTES_CHARACTERS
 from handcal.session.record import SessionRecord as SessionRecord
 from handcal.session.record import alignment_path, load_session, sha256
-from handcal.session.state import Kind, SessionEvent, clean_wearer
-from handcal.session.trial import Trial, trial_json
+from handcal.session.state import (
+    AlignmentFacts,
+    Kind,
+    SessionEvent,
+    SessionFacts,
+    clean_wearer,
+    facts_json,
+    with_facts,
+)
+from handcal.session.trial import COMPARED, Comparison, Trial, comparison_json, trial_json
 
 
 class Session(Closable):
@@ -97,9 +103,6 @@ class Session(Closable):
             self.close()
             raise
         self._state = self._loaded.state
-        self._events = list(self._loaded.journal.events)
-        self._alignments = dict(self._loaded.alignments)
-        self._notes, self._notes_sha256 = self._loaded.notes, self._loaded.notes_sha256
         self._next_number = self._journal.next_number
         self._waiting: deque[Callable[[], object]] = deque()
         self._is_changed = False
@@ -179,25 +182,16 @@ class Session(Closable):
         """The session as it is now; the same object until it changes."""
         if self._contents is None:
             journal = self._require_open()
-            unwritten = self._next_number - journal.next_number
-            self._contents = replace(
-                self._loaded,
-                events=tuple(self._events),
-                unwritten=tuple(self._events[len(self._events) - unwritten :]),
-                alignments=self._alignments,
-                notes=self._notes,
-                journal_bytes=journal.complete_bytes,
-                torn_bytes=0,
-            ).contents()
+            record = self._loaded.contents(self._next_number - journal.next_number)
+            self._contents = replace(record, journal_bytes=journal.complete_bytes, torn_bytes=0)
         return self._contents
 
-    def full(self, kind: Kind) -> str:
-        """Return why no further alignment or trial can be saved; empty if one can."""
+    def require_room(self, kind: Kind) -> None:
+        """Raise FileError if no further alignment or trial can be saved."""
         try:
             self._state.items(kind).next_number()
         except ValueError as error:
-            return f"{self.path} is full: {error}; start another session"
-        return ""
+            raise FileError(f"{self.path} is full: {error}", "start another session") from error
 
     def record(self, event: str, **data: Any) -> None:
         """Append an event of the procedure with JSON-able data to the journal.
@@ -223,15 +217,13 @@ class Session(Closable):
         ValueError
             If it is too large, or the session is full.
         """
-        if full := self.full("alignment"):
-            raise ValueError(full)
+        number = self._state.alignments.next_number()
         data = encode_alignment(alignment)
         if len(data) > MAX_ALIGNMENT_BYTES:
             raise ValueError(f"an alignment of {len(data):,} bytes is too large to be saved")
-        number = self._state.alignments.next_number()
         known = {} if facts is None else {"facts": facts_json(facts)}
         saved = {"number": number, "sha256": sha256(data), **known}
-        self._alignments[number] = alignment
+        self._loaded.alignments[number] = alignment
         file = alignment_path(self.path, number)
         self._keep(SessionEvent.ALIGNMENT_SAVED, saved, before=lambda: write_new(file, data))
         return number
@@ -244,8 +236,7 @@ class Session(Closable):
         FileError
             If the journal cannot be written, or the session is full.
         """
-        if full := self.full("trial"):
-            raise FileError(full)
+        self.require_room("trial")
         number = self._state.trials.next_number()
         self._write(SessionEvent.TRIAL_SAVED, {"number": number, "trial": trial_json(trial)})
         return number
@@ -312,12 +303,13 @@ class Session(Closable):
         if len(text) > MAX_NOTES_CHARACTERS:
             raise ValueError(f"notes may have at most {MAX_NOTES_CHARACTERS:,} characters")
         data = text.encode(errors="replace")
-        before = self._notes_sha256
+        before = self._loaded.notes_sha256
         # Announced first: a crash leaves notes with the one or the other checksum.
         self._write(SessionEvent.NOTES_SAVED, {"sha256": sha256(data), "before_sha256": before})
         write_atomic(file := self.path / "notes.txt", data)
         self._is_sound_again(file)
-        self._notes, self._notes_sha256, self._contents = data.decode(), sha256(data), None
+        self._loaded.notes, self._loaded.notes_sha256 = data.decode(), sha256(data)
+        self._contents = None
 
     def correct_wearer(self, name: str) -> None:
         """Replace the wearer's name or code; ValueError if it is invalid, else as `save_notes`."""
@@ -358,7 +350,7 @@ class Session(Closable):
                 self.write_waiting()
             if self._is_changed:
                 with suppress(FileError):
-                    self._require_own().write_end(self._notes_sha256)
+                    self._require_own().write_end(self._loaded.notes_sha256)
             self._contents = self.contents
             end_at_close(self.path)
         self._journal = None
@@ -404,12 +396,12 @@ class Session(Closable):
 
     def _is_sound_again(self, file: Path) -> None:
         """Forget the damage of a file that was replaced."""
-        damaged = tuple(one for one in self._loaded.damaged if one.file != file.name)
-        self._loaded = replace(self._loaded, damaged=damaged)
+        damaged = self._loaded.damaged
+        self._loaded.damaged = tuple(part for part in damaged if part.file != file.name)
 
     def _apply(self, event: Event) -> None:
         self._state.apply(event)
-        self._events.append(event)
+        self._loaded.events.append(event)
         self._next_number += 1
         self._is_changed = True
         self._contents = None

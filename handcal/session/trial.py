@@ -1,24 +1,29 @@
-"""Trials of the user test: the error of the calibrated projection as the wearer sees it.
+"""The user test: trials, what they say about a verdict, and blinded comparisons.
 
 As in Hu et al. 2021 (user test): φ is adjusted by hand until the virtual target covers the real
-one; the corners drawn with that φ are the ground truth.
+one; the corners drawn with that φ are the ground truth. In a blinded comparison of the offline
+calibration against the applied φ the wearer sees both in a hidden random order, and says which fits
+the hand better. The order is in the journal, and only the report shows it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handcal.core.display import arcmin_from_px, eye_projection, target_corners_m
+from handcal.core.display import arcmin_from_px, as_shifts, eye_projection, target_corners_m
 from handcal.core.frozen import freeze
 from handcal.core.geometry import project
 from handcal.core.types import EYES, Eye, EyeDisplay, Float64
 from handcal.report import statistics
 from handcal.report.statistics import Summary
+from handcal.session.journal import Event
 
 _SHAPES: dict[str, tuple[int, ...]] = {
     "corners_E_m": (4, 3),
@@ -264,3 +269,109 @@ def _errors(trials: Collection[Trial]) -> ErrorStatistics:
     return ErrorStatistics(
         len(trials), len(px), statistics.summarise(px), statistics.summarise(arcmin)
     )
+
+
+@dataclass(frozen=True, slots=True)
+class EyeTrials:
+    """The trials of one eye's φ, against the lab's target."""
+
+    count: int
+    mean_arcmin: float
+    target_arcmin: float
+
+    @property
+    def is_over(self) -> bool:
+        """True if the mean error is over the target."""
+        return self.mean_arcmin > self.target_arcmin
+
+
+def judge_trials(
+    errors_arcmin: Mapping[Eye, Sequence[float]], target_arcmin: float
+) -> dict[Eye, EyeTrials]:
+    """Return the trials of each eye by their errors."""
+    return {
+        eye: EyeTrials(len(found), sum(found) / len(found), target_arcmin)
+        for eye, found in errors_arcmin.items()
+    }
+
+
+def is_doubted(verdict: str, trials: EyeTrials | None) -> bool:
+    """Return whether trials over the target contradict an acceptance."""
+    return verdict == "accept" and trials is not None and trials.is_over
+
+
+Drawing: TypeAlias = Literal["offline", "applied"]
+Place: TypeAlias = Literal["first", "second"]
+Answer: TypeAlias = Literal["first", "second", "neither"]
+COMPARED = "compared"
+"""Name of the event."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """One answer of the wearer."""
+
+    first: Drawing
+    """The drawing that was shown first; the other one was shown second."""
+    answer: Answer
+    """The one that fits better."""
+    applied_shift_m: Mapping[Eye, Float64]
+    """each (3,); φ of the drawing *applied*."""
+    time: str = ""
+    """UTC, ISO 8601; empty before it is saved."""
+
+    @property
+    def better(self) -> Drawing | None:
+        """The drawing that fits better; None if neither does."""
+        if self.answer == "neither":
+            return None
+        if self.answer == "first":
+            return self.first
+        return "applied" if self.first == "offline" else "offline"
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonCounts:
+    """Answers of several comparisons."""
+
+    applied: int
+    offline: int
+    neither: int
+    p_value: float
+    """Two-sided sign test of *applied* against *offline*; 1 without either. Answers of one wearer
+    say nothing about other wearers."""
+
+
+def comparison_json(comparison: Comparison) -> dict[str, Any]:
+    """Return the data of the event of a comparison."""
+    shifts_m = {eye: shift_m.tolist() for eye, shift_m in comparison.applied_shift_m.items()}
+    return {"first": comparison.first, "answer": comparison.answer, "applied_shift_m": shifts_m}
+
+
+def read_comparisons(events: Iterable[Event]) -> list[Comparison]:
+    """Return the comparisons of a session's events; those that lack something are left out."""
+    found = []
+    for event in events:
+        first: Any = event.data.get("first")
+        answer: Any = event.data.get("answer")
+        is_sound = first in get_args(Drawing) and answer in get_args(Answer)
+        if event.name != COMPARED or not is_sound:
+            continue
+        with suppress(KeyError, TypeError, ValueError, AttributeError):
+            shifts_m = as_shifts(event.data["applied_shift_m"])
+            found.append(Comparison(first, answer, shifts_m, event.time))
+    return found
+
+
+def count_comparisons(comparisons: Iterable[Comparison]) -> ComparisonCounts:
+    """Return how often each drawing was the better one."""
+    better = [one.better for one in comparisons]
+    applied, offline = better.count("applied"), better.count("offline")
+    return ComparisonCounts(applied, offline, better.count(None), sign_test(applied, offline))
+
+
+def sign_test(first: int, second: int) -> float:
+    """Return the two-sided p-value of two counts that are equally likely by chance, exactly."""
+    total = first + second
+    tail = sum(math.comb(total, k) for k in range(min(first, second) + 1))
+    return float(min(1.0, 2 * tail / 2**total))

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from handcal.calibration.plan import NextStep, PlanSettings
 from handcal.calibration.procedure import Procedure
-from handcal.calibration.states import CalibrationSettings, Observation
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import CalibrationSettings
 from handcal.camera.feed import CameraStatus
 from handcal.core.types import Eye, Frame
 from handcal.link.statistics import LinkStatistics
-from handcal.session.comparison import Place
 from handcal.session.session import SessionRecord
+from handcal.session.trial import Place
 from handcal.station.wearer_view import EyeView
 
 

@@ -6,42 +6,255 @@ One thread owns a station: it calls `step` repeatedly, and other methods in betw
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
-from dataclasses import asdict
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
-from handcal.calibration.former import Former, read_former
 from handcal.calibration.hands import PlacedHand
-from handcal.calibration.plan import NextStep, Plan, StepName
+from handcal.calibration.lab_prior import run_learn_prior
+from handcal.calibration.plan import Plan, PlanSettings, StepName
 from handcal.calibration.procedure import Calibration
-from handcal.calibration.states import Observation, ProcedureError, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.solve_again import Former, read_former, stored_solve_settings
+from handcal.calibration.states import ProcedureError, State
 from handcal.calibration.verifying import skipped_eyes
 from handcal.camera.camera import Camera
 from handcal.camera.feed import CameraFeed
-from handcal.core.errors import FileError, LinkError
+from handcal.camera.live import open_hololens2, open_live
+from handcal.camera.realsense import RealSenseCamera
+from handcal.camera.recordings import open_recording
+from handcal.core.errors import CameraError, FileError, LinkError
 from handcal.core.geometry import transform
-from handcal.core.types import Frame, HeadsetIdentity
+from handcal.core.types import EYES, Frame, HeadsetIdentity, PlanName, Rig
 from handcal.io.closable import Closable
+from handcal.io.settings import settings_json
 from handcal.link.pairing import Pairing, Pairings, new_pairing_key
 from handcal.link.server import LOOPBACK, HeadsetServer
 from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import reachable_address
+from handcal.register.fuse import FuseSettings
+from handcal.register.prior import fit_wearers
+from handcal.register.sitting import sitting_prior
 from handcal.rig.rig_file import read_rig
-from handcal.session.state import Kind
+from handcal.session.in_force import end_at_begin
+from handcal.session.journal import JOURNAL, JOURNAL_END
+from handcal.session.record import replay
+from handcal.session.session import Session
+from handcal.session.state import Kind, SessionEvent
+from handcal.sim.camera import (
+    CAMERA_FAULTS,
+    SyntheticCamera,
+    SyntheticSettings,
+    sensor_settings,
+)
 from handcal.sim.simulation import Simulation, VirtualHeadset
 from handcal.station.checks.headset import link_problem
-from handcal.station.eye_views import EyeViews
-from handcal.station.opening import (
-    open_camera,
-    plan_of_session,
-    resume_or_create,
-    start_headset,
-)
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.user_test.trials import Trials
-from handcal.station.weak import weakly
+from handcal.station.wearer_view import EyeViews
+
+_FIRST_FILES = {"alignments", "rig.yaml", "settings.json", JOURNAL, JOURNAL_END, "lock"}
+_FIRST_EVENTS = {SessionEvent.CREATED, SessionEvent.FACTS_SAVED, SessionEvent.FINE_TUNED}
+
+
+@contextmanager
+def resume_or_create(
+    settings: StationSettings, wearer: str, resume: Path | None, begun: Former
+) -> Iterator[tuple[Session, StationSettings]]:
+    """Resume a session, or create one, which is removed if its station cannot be opened.
+
+    Also return the settings with the session's priors: a session keeps those that it began with,
+    so that resuming does not change its results. A resumed one keeps the lab's target, too.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read or created.
+    """
+    if resume is not None:
+        with Session(resume) as session:
+            _end_former(settings, session)
+            stored = stored_solve_settings(session.contents)
+            target_arcmin = stored.verdict.target_arcmin
+            yield session, _with_fuse(settings, stored.fuse, target_arcmin)
+        return
+    solve = settings.calibration.solve
+    if begun.prior is not None:
+        fuse = replace(solve.fuse, prior=replace(solve.fuse.prior, learned=begun.prior))
+    else:
+        fuse = _lab_fuse(settings)
+    settings = _with_fuse(settings, fuse, solve.verdict.target_arcmin)
+    rig = read_rig(settings.rig_path)
+    station = settings_json(settings)
+    stored_settings = {"calibration": station.pop("calibration"), "station": station}
+    with Session.create(settings.sessions_path, rig, stored_settings, wearer=wearer) as session:
+        _end_former(settings, session)
+        try:
+            yield session, settings
+        except BaseException:
+            session.close()
+            _discard_if_empty(session.path)
+            raise
+
+
+def _end_former(settings: StationSettings, session: Session) -> None:
+    """End the calibration in force of another wearer; a simulated one wears nothing."""
+    if settings.headset != "virtual":
+        end_at_begin(session.path)
+
+
+def _with_fuse(
+    settings: StationSettings, fuse: FuseSettings, target_arcmin: float
+) -> StationSettings:
+    calibration = settings.calibration
+    solve = replace(
+        calibration.solve,
+        fuse=fuse,
+        verdict=replace(calibration.solve.verdict, target_arcmin=target_arcmin),
+    )
+    return replace(settings, calibration=replace(calibration, solve=solve))
+
+
+def _discard_if_empty(path: Path) -> None:
+    """Remove a session, unless it holds more than what a station stores as it is opened."""
+    with suppress(FileError, OSError):
+        events = {event.name for event in replay(path).journal.events}
+        files = {file.name for file in path.iterdir()}
+        if events <= _FIRST_EVENTS and files <= _FIRST_FILES:
+            (path / "alignments").rmdir()  # first: it fails if there are any
+            for name in files - {"alignments"}:
+                (path / name).unlink()
+            path.rmdir()
+
+
+def plan_of_session(session: Session, plan: PlanSettings, *, is_resumed: bool) -> PlanSettings:
+    """Return the plan that a resumed session has, or record that of a new one and return it.
+
+    Parameters
+    ----------
+    session : Session
+    plan : PlanSettings
+        The plan of a new session; a resumed one keeps its name, its eyes and their order.
+    is_resumed : bool
+
+    Raises
+    ------
+    FileError
+        If the session cannot be written.
+    """
+    if not is_resumed:
+        if plan.name != "paper":
+            session.save_facts(plan=plan.name)
+        elif plan.in_turn:
+            session.save_facts(plan=plan.eyes)
+        if plan.usable_eyes != EYES:
+            session.save_facts(usable_eyes=plan.usable_eyes)
+        return plan
+    facts = session.contents.facts
+    name: PlanName = "recommended" if facts.plan == "recommended" else "paper"
+    return replace(plan, name=name, usable_eyes=facts.usable_eyes, in_turn=facts.plan == "each")
+
+
+def open_camera(settings: StationSettings, simulation: Simulation | None, worn_rig: Rig) -> Camera:
+    """Open a station's camera.
+
+    Parameters
+    ----------
+    settings : StationSettings
+    simulation : Simulation or None
+        What the simulated camera sees; None without the virtual headset.
+    worn_rig : Rig
+        Rig of the headset actually worn, with the simulated camera's intrinsics.
+
+    Raises
+    ------
+    CameraError
+        If it cannot be opened.
+    FileError
+        If the recording cannot be read.
+    """
+    if settings.source == "realsense":
+        return RealSenseCamera(settings.realsense)
+    if settings.source == "hololens2":
+        return open_hololens2(settings.hololens2)
+    if settings.source in ("oak", "orbbec"):
+        return open_live(f"{settings.source}:{settings.serial}")
+    if settings.source == "recording":
+        return open_recording(Path(settings.recording), settings.playback)
+    if simulation is None:
+        raise CameraError("the simulated camera needs the virtual headset, with its wearer")
+    return SyntheticCamera(
+        simulation.world,
+        simulation.scene,
+        depth_intrinsics=worn_rig.depth_intrinsics,
+        seed=settings.seed,
+        settings=replace(
+            CAMERA_FAULTS.get(settings.fault, SyntheticSettings()),
+            sensor=sensor_settings(settings.sensor, settings.fatten_px),
+        ),
+    )
+
+
+def start_headset(
+    settings: StationSettings,
+    rig_path: Path,
+    worn_rig_path: Path,
+    port: int,
+    pairing_key: str,
+    scene_port: int,
+) -> VirtualHeadset:
+    """Start the virtual headset's process.
+
+    Parameters
+    ----------
+    settings : StationSettings
+    rig_path, worn_rig_path : Path
+        The rig used by the headset, and the rig of the headset actually worn.
+    port, scene_port : int
+        Of the PC's end of the link, and of the simulated camera, on this machine.
+    pairing_key : str
+    """
+    return VirtualHeadset(
+        rig_path,
+        port,
+        scene_port,
+        pairing_key,
+        seed=settings.seed,
+        worn_rig_path=worn_rig_path,
+        loss=settings.loss,
+        reorder=settings.reorder,
+        is_stale=settings.fault == "stale-headset",
+        loses_start=settings.fault == "lost-start",
+        steps_clock=settings.fault == "clock-step",
+        eye_distance_m=settings.eye_distance_m,
+        side=settings.side,
+        slip_m=settings.slip_m,
+    )
+
+
+def _lab_fuse(settings: StationSettings) -> FuseSettings:
+    """Return the priors for a new session, learned from the lab's earlier ones if wanted.
+
+    One whose mean is far from the viewpoint is only shown, unless somebody has confirmed it.
+    """
+    fuse = settings.calibration.solve.fuse
+    if not (settings.learn_prior or settings.learn_wearers):
+        return fuse
+    prior, sitting = fuse.prior, fuse.sitting
+    rig = read_rig(settings.rig_path)
+    found = run_learn_prior(settings.sessions_path, rig, prior)
+    if settings.learn_prior and prior.learned is None and found.learned is not None:
+        if settings.use_far_prior or not found.learned.warning:
+            prior = replace(prior, learned=found.learned)
+        else:
+            prior = replace(prior, unconfirmed=found.learned)
+    if settings.learn_wearers and sitting.learned is None:
+        sitting = replace(sitting, learned=fit_wearers(found.repeated, sitting_prior(rig, sitting)))
+    return replace(fuse, prior=prior, sitting=sitting)
+
 
 _STORE_PERIOD_S = 1.0
 
@@ -91,15 +304,14 @@ class Station(Closable):
         if former is not None and resume is None:
             begun = read_former(former, read_rig(settings.rig_path))
         is_virtual = settings.headset == "virtual"
-        if is_virtual or isinstance(pairings, str):
-            key = new_pairing_key() if is_virtual else str(pairings)
-            pairings = Pairings((Pairing(key),))
+        if is_virtual:
+            pairings = new_pairing_key()
+        if isinstance(pairings, str):
+            pairings = Pairings((Pairing(pairings),))
         self._pairings = pairings
         self.watch_views = False
         self._watchers: list[Callable[[Snapshot], object]] = []
         self.holds_plan = False
-        self._next_step: NextStep | None = None
-        self._observation: Observation | None = None
         self._simulation: Simulation | None = None
         with ExitStack() as stack:
             self.session, settings = stack.enter_context(
@@ -107,15 +319,21 @@ class Station(Closable):
             )
             self.settings = settings
             self.rig = self.worn_rig = self.session.contents.rig
-            self._worn_rig_path = Path(settings.worn_rig or self.session.path / "rig.yaml")
+            rig_path = self.session.path / "rig.yaml"
+            worn_rig_path = Path(settings.worn_rig or rig_path)
             bind = LOOPBACK if is_virtual else (settings.host, settings.port)
             self._link = stack.enter_context(HeadsetServer(pairings, bind))
             if is_virtual:
+                port, key = self._link.address[1], pairings.all[-1].key
+                start = partial(start_headset, settings, rig_path, worn_rig_path, port, key)
                 self._simulation = stack.enter_context(
-                    Simulation(settings.seed, weakly(self._start_headset), settings.side)
+                    Simulation(settings.seed, start, settings.side)
                 )
-                self.worn_rig = read_rig(self._worn_rig_path)
-            self._feed = stack.enter_context(CameraFeed(weakly(self._open_camera)))
+                self.worn_rig = read_rig(worn_rig_path)
+            # Not methods of the station: with it, its parts would be kept until Python collects
+            # garbage, and beside a window's many objects ended stations piled up.
+            camera = partial(open_camera, settings, self._simulation, self.worn_rig)
+            self._feed = stack.enter_context(CameraFeed(camera))
             plan = plan_of_session(self.session, settings.plan, is_resumed=resume is not None)
             if former is not None and resume is None:
                 self.session.save_facts(former=former.name)
@@ -164,8 +382,8 @@ class Station(Closable):
 
     def step(self) -> Snapshot:
         """Process the next frame, if one arrives soon, and return the new snapshot."""
-        observation = self._observe()
-        self._advance(observation)
+        observation = self._advance(self._feed.read())
+        self.trials.follow_procedure()
         self._store_waiting()
         if observation is not None and observation.hand is not None:
             self._show(observation.hand)
@@ -174,39 +392,21 @@ class Station(Closable):
             watcher(snapshot)
         return snapshot
 
-    def _observe(self) -> Observation | None:
-        """Return what the next frame shows; None if none arrives."""
-        frame = self._feed.read()
-        if frame is None:
-            return None
-        self._frame = frame
-        self.calibration.camera = self._feed.status.identity
+    def _advance(self, frame: Frame | None) -> Observation | None:
+        """Take a frame through the procedure by the plan; return what it shows."""
+        if frame is not None:
+            self._frame, self.calibration.camera = frame, self._feed.status.identity
         try:
-            observation = self.calibration.step(frame)
-        except LinkError as error:
-            self._not_applied = str(error)
-            return None
-        cloud = observation.cloud
-        self._feed.expose_for(None if cloud is None else cloud.points_m)
-        return observation
-
-    def _advance(self, observation: Observation | None) -> None:
-        """Take what the headset has acknowledged, and the plan's next step if its time has come."""
-        # The session keeps what it cannot write; `_store_waiting` reports the problem.
-        try:
-            if self.calibration.state is State.APPLYING:
-                with suppress(FileError):
-                    self.calibration.poll_applied()
-            if observation is not None:
-                self._observation = observation
-                with suppress(FileError):
-                    self._next_step = self._follow_plan(observation)
+            self.plan.advance(frame, is_held=self.holds_plan)
         except LinkError as error:
             self._not_applied = str(error)
         # An automatic plan sends them again at once; the reason lasts until it has succeeded.
         if self.calibration.state not in (State.SOLVED, State.APPLYING):
             self._not_applied = ""
-        self.trials.follow_procedure()
+        if frame is None or (observation := self.plan.observation) is None:
+            return None
+        self._feed.expose_for(None if observation.cloud is None else observation.cloud.points_m)
+        return observation
 
     def _make_snapshot(self, observation: Observation | None) -> Snapshot:
         self._number += 1
@@ -223,25 +423,19 @@ class Station(Closable):
             record=self.session.contents,
             settings=self.settings.calibration,
             plan=self.plan.settings,
-            next_step=self._next_step,
+            next_step=self.plan.step,
             not_applied=self._not_applied,
             not_stored=self._not_stored,
             contradiction=self._contradiction(observation),
             # A view of what the headset draws would reveal which drawing is shown.
-            views={} if self.trials.comparing.shown else dict(self._views.shown),
-            comparing=self.trials.comparing.shown,
-            has_compared_both=self.trials.comparing.has_seen_both,
+            views={} if self.trials.compared else dict(self._views.shown),
+            comparing=self.trials.compared,
+            has_compared_both=self.trials.has_compared_both,
         )
 
     def watch(self, watcher: Callable[[Snapshot], object]) -> None:
         """Call `watcher` with every new snapshot, in the station's thread; it must not wait."""
         self._watchers.append(watcher)
-
-    def _follow_plan(self, observation: Observation) -> NextStep:
-        """Take the plan's next step if it is automatic and not held; return it."""
-        if self.holds_plan:
-            return self.plan.next_step(observation.is_steady)
-        return self.plan.follow(observation)
 
     def take_step(self) -> None:
         """Take the next step of a plan that is held.
@@ -252,19 +446,18 @@ class Station(Closable):
             If it cannot be taken yet.
         LinkError
             If the link is closed.
-        FileError
-            If the session cannot be written; the step is done anyway.
         """
-        if self._observation is None:
+        self.plan.advance(None, is_pressed=True)
+        step = self.plan.step
+        if step is None:
             raise ProcedureError("wait for the camera's first frame")
-        step = self.plan.advance(self._observation)
         if step.name in (StepName.RAISE, StepName.WAIT):
             raise ProcedureError(step.text)
 
     def finish(self) -> None:
         """Record the link statistics and finish the session; FileError if it cannot be written."""
         self.trials.hide_target()
-        self.trials.comparing.end()
+        self.trials.end_comparison()
         self.session.write_waiting()
         self.session.record("link", **asdict(self._link.statistics()))
         self.session.finish()
@@ -309,25 +502,13 @@ class Station(Closable):
         """Write pending data and close everything; safe to call twice."""
         self._stack.close()
 
-    def _start_headset(self, scene_port: int) -> VirtualHeadset:
-        return start_headset(
-            self.settings,
-            self.session.path / "rig.yaml",
-            self._worn_rig_path,
-            (self._link.address[1], scene_port),
-            self._pairings.all[-1].key,
-        )
-
-    def _open_camera(self) -> Camera:
-        return open_camera(self.settings, self._simulation, self.worn_rig)
-
     def _show(self, hand: PlacedHand) -> None:
         """Show the live hand in the headset, and render the wearer's views if requested."""
         if self.calibration.state is State.APPLIED:
             # The wearer judges the calibration by this outline on their own hand.
             outline_W_m = transform(hand.T_W_D, hand.cloud.outline_m)
             self._link.send_live_hand(outline_W_m, False, is_outline=True)
-        if self.watch_views and not self.trials.comparing.shown:
+        if self.watch_views and not self.trials.compared:
             self._views.render_next(hand, self.trials.target_E_m, self.trials.is_offline)
 
     def _link_problem(self, link: LinkStatistics) -> str:

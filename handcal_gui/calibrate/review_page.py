@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from handcal.core.types import Eye
 from handcal.register.results import Results
-from handcal.session.judged_trials import eye_trials
+from handcal.session.record import eye_trials
 from handcal.session.session import SessionRecord
 from handcal_gui.app.theme import SPACING_PX, font_px, scale_font
 from handcal_gui.app.translation import tr

@@ -16,9 +16,9 @@ from handcal.link.invitation import Invitation
 from handcal.link.pairing import OFFER_S
 from handcal.link.reliable import Delivery, Outgoing
 from handcal.link.server import HeadsetServer
+from handcal.station.checks.display_check import pattern_state, send_pattern
 from handcal.station.checks.doctor import Finding, Health
 from handcal.station.checks.headset import headset_problem, headset_state
-from handcal.station.checks.pattern import pattern_state, send_pattern
 from handcal_gui.app.theme import SPACING_PX, number_font, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.connect.paired_devices import PairedDevices

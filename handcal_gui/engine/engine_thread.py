@@ -14,7 +14,7 @@ from PySide6.QtCore import QObject, Signal
 
 from handcal.bridge.bridges import BridgeSettings, open_bridges
 from handcal.core.errors import HandcalError
-from handcal.session.unfinished import summarize
+from handcal.session.library import summarize
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.app.translation import tr

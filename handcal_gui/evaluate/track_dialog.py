@@ -17,7 +17,7 @@ from handcal.core.progress import Progress
 from handcal.core.types import Float64
 from handcal.io.files import user_path
 from handcal.station.checks.doctor import Finding, Health
-from handcal.station.user_test.cube_tracking import (
+from handcal.station.user_test.cube import (
     CubeSight,
     CubeTracking,
     TrackingOrder,

@@ -20,7 +20,7 @@ from handcal.session.journal import JOURNAL
 from handcal.session.session import Session
 from handcal.session.trial import Trial
 from handcal.station.checks.doctor import Finding, Health
-from handcal.station.user_test.cube_trials import StudyLeader, TrialOrder, record_user_trials
+from handcal.station.user_test.cube import StudyLeader, TrialOrder, record_user_trials
 from handcal_gui.app.theme import SPACING_PX, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.evaluate.devices import depth_camera, paired_headset

@@ -15,8 +15,8 @@ from PySide6.QtCore import (
 )
 
 from handcal.core.types import EYES, VerdictName
-from handcal.session.judged_trials import is_doubted
 from handcal.session.library import EyeOutcome, LibraryEntry
+from handcal.session.trial import is_doubted
 from handcal_gui.app.theme import number_font
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.error_bars import after_arcmin, error_bars, error_text, picture_text

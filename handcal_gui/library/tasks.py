@@ -78,7 +78,7 @@ def _require_sound(path: Path) -> None:
         return
     damaged = found.damaged[:_MOST_NAMED]
     # Where nothing can be read, the reason names the folder itself.
-    named = "; ".join(one.what if found.state == "none" else str(one) for one in damaged)
+    named = "; ".join(one.text if found.state == "none" else str(one) for one in damaged)
     more = len(found.damaged) - _MOST_NAMED
     others = tr(" (and {} more)").format(more) if more > 0 else ""
     if found.state == "none":

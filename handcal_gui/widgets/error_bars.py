@@ -10,8 +10,8 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPixmap
 
 from handcal.core.types import EYES, Eye, VerdictName
-from handcal.session.judged_trials import is_doubted
 from handcal.session.library import EyeOutcome
+from handcal.session.trial import is_doubted
 from handcal_gui.app.theme import Colors, colors
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS

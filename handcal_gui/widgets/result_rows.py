@@ -11,9 +11,8 @@ import numpy as np
 from handcal.core.types import EYES, Eye, EyeShift, VerdictName
 from handcal.register.results import Results
 from handcal.report.cells import signed
-from handcal.session.judged_trials import EyeTrials, is_doubted
 from handcal.session.record import SessionRecord
-from handcal.session.trial import SAME_SHIFT_M, Trial
+from handcal.session.trial import SAME_SHIFT_M, EyeTrials, Trial, is_doubted
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize

@@ -12,7 +12,8 @@ import pytest
 
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.procedure import Procedure
-from handcal.calibration.states import Observation, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import State
 from handcal.camera.feed import CameraStatus
 from handcal.core.geometry import rigid, transform
 from handcal.core.types import Eye, Float64, HandCloud

@@ -17,6 +17,10 @@ from tests.calibration.stage import KEY, LINK, RIG, Stage, connect
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[HeadsetServer]:
     # The stage's time runs ahead of the real one, as it waits for nothing.
     monkeypatch.setattr("handcal.link.server._AHEAD_NS", 10**12)
+    # The stage's times are exact, so a hand may be followed while it moves.
+    monkeypatch.setattr("handcal.calibration.sight.ASSUMED_LATENCY_S", 0.0)
+    monkeypatch.setattr("handcal.calibration.delay.ASSUMED_SIGMA_S", 0.0)
+    monkeypatch.setattr("handcal.calibration.aligning.MOVED_LIMIT_M", 0.01)
     with HeadsetServer(KEY, settings=LINK) as server:
         yield server
 

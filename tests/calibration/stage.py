@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from handcal.calibration.procedure import Calibration
-from handcal.calibration.states import CalibrationSettings, Observation, State
-from handcal.calibration.timing.delay import DelaySettings
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import CalibrationSettings, State
 from handcal.core.display import projection_matrix
 from handcal.core.errors import PoseError
 from handcal.core.geometry import rigid
@@ -34,10 +34,7 @@ CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 RIG = replace(example_rig(), depth_intrinsics=CAMERA)
 SENSOR = SensorSettings()
 LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
-# The stage's times are exact, so a hand may be followed while it moves.
-SETTINGS = CalibrationSettings(
-    camera_latency_s=0.0, delay=DelaySettings(assumed_sigma_s=0.0, moved_limit_m=0.01)
-)
+SETTINGS = CalibrationSettings()
 PERIOD_NS = 80_000_000
 HEADSET_AHEAD_NS = 5_000_000_000
 CAMERA_AHEAD_NS = 7_000_000_000
@@ -95,6 +92,19 @@ class Stage:
         thumb_out_rad: float = 0.0,
     ) -> Observation:
         """Step with the next frame, of a hand or none; `told` is the pose it tells."""
+        frame = self.frame(T_D_hand, T, pose=pose, thumb_out_rad=thumb_out_rad)
+        calibration = self.calibration
+        return calibration.judge(calibration.see(replace(frame, T_W_D=told)))
+
+    def frame(
+        self,
+        T_D_hand: Float64 | None = T_D_HAND,
+        T: Float64 = T_W_H,
+        *,
+        pose: bool = True,
+        thumb_out_rad: float = 0.0,
+    ) -> Frame:
+        """Return the next frame."""
         self.t_ns += PERIOD_NS
         self._frames += 1
         if pose:
@@ -102,8 +112,7 @@ class Stage:
         t_camera_ns = self.t_ns + CAMERA_AHEAD_NS
         depth = depth_of(None if T_D_hand is None else T_D_hand.tobytes(), thumb_out_rad).copy()
         depth[0, 0] = self._frames % 1000  # a live picture always changes
-        frame = Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
-        return self.calibration.step(replace(frame, T_W_D=told))
+        return Frame(self._frames, t_camera_ns, self.t_ns, depth, SENSOR.depth_scale_m, CAMERA)
 
     def hold(self, T_D_hand: Float64 = T_D_HAND, frames: int = 7) -> Observation:
         """Hold the hand still for a while."""

@@ -218,14 +218,6 @@ def test_the_headset_s_eye_distance_is_used_if_none_was_typed(
     assert stage.calibration.solve().measured_eye_distance == EyeDistance(0.060)
 
 
-def test_redo_of_an_alignment_can_be_undone(stage: Stage, session: Session) -> None:
-    stage.align()
-    stage.calibration.redo()
-    stage.calibration.restore_alignment(1)
-    assert len(stage.calibration.alignments) == 1
-    assert list(Session.open(session.path).alignments) == [1]
-
-
 def test_what_is_deleted_while_the_disk_is_full_is_deleted_later(
     stage: Stage, session: Session, tmp_path: Path
 ) -> None:

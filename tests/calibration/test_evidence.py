@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.calibration.evidence import FROZEN_FRAMES, Contradiction, Evidence
+from handcal.calibration.sight import FROZEN_FRAMES, Contradiction, Evidence
 from handcal.core.types import CameraIdentity, DepthCheck, Frame
 from handcal.rig.example import example_rig
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.calibration.former import SLIP_M, read_former
 from handcal.calibration.procedure import Calibration
+from handcal.calibration.solve_again import SLIP_M, read_former
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError
-from handcal.core.types import EYES, Eye, Float64, Verdict
+from handcal.core.types import EYES, Eye, Float64
 from handcal.session.session import Session
 from tests.calibration.stage import RIG, SETTINGS, Stage, events
 from tests.helpers import eventually
@@ -96,28 +96,6 @@ def test_going_back_gives_up_a_cursor_and_a_verification(stage: Stage) -> None:
     np.testing.assert_allclose(stage.calibration.applied_shift_m["left"], 0.0)
     with pytest.raises(ProcedureError):
         stage.calibration.nudge("left", 1.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "is_used"),
-    [
-        ("accept", True),
-        ("repeat", True),
-        ("keep", False),
-        ("implausible", False),
-        ("contradicted", False),
-    ],
-)
-def test_what_is_drawn_follows_the_verdict(stage: Stage, name: str, is_used: bool) -> None:
-    stage.align()
-    results = stage.calibration.solve()
-    verdict = Verdict(name, "for the test")  # type: ignore[arg-type]
-    stage.calibration.results = replace(results, verdicts=dict.fromkeys(EYES, verdict))
-    stage.calibration.apply()
-    stage.calibration.wait_applied()
-    for eye in EYES:
-        expected_m = results.eyes[eye].shift_m if is_used else np.zeros(3)
-        np.testing.assert_allclose(stage.calibration.applied_shift_m[eye], expected_m)
 
 
 def test_going_back_loses_no_alignment_and_no_result(stage: Stage, session: Session) -> None:

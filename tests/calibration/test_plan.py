@@ -12,7 +12,6 @@ from handcal.calibration.plan import NextStep, Plan, PlanSettings, StepName
 from handcal.calibration.states import ProcedureError, State
 from handcal.calibration.verifying import skipped_eyes
 from handcal.core.display import view_of_eye
-from handcal.core.errors import FileError
 from handcal.core.geometry import transform
 from handcal.core.types import EYES, Eye, EyeDistance
 from handcal.link.client import HeadsetClient
@@ -20,7 +19,7 @@ from handcal.link.nudges import NudgeSum
 from handcal.link.server import HeadsetServer
 from handcal.register.placement import PlacementSettings
 from handcal.session.session import Session
-from tests.calibration.stage import HEADSET_AHEAD_NS, RIG, T_D_HAND, Stage
+from tests.calibration.stage import HEADSET_AHEAD_NS, RIG, Stage
 from tests.helpers import eventually
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)
@@ -38,8 +37,18 @@ class Planned:
 
     def advance(self, frames: int = 1) -> NextStep:
         for _ in range(frames):
-            step = self.plan.advance(self.stage.see())
-        return step
+            self.plan.advance(self.stage.frame(), is_pressed=True)
+        return self.step
+
+    def follow(self) -> NextStep:
+        """See a frame; the plan takes its step by itself once it is due."""
+        self.plan.advance(self.stage.frame())
+        return self.step
+
+    @property
+    def step(self) -> NextStep:
+        assert self.plan.step is not None
+        return self.plan.step
 
     def until(self, name: StepName, frames: int = 60) -> NextStep:
         for _ in range(frames):
@@ -140,18 +149,6 @@ def test_every_eye_is_verified_and_then_the_hand_may_be_lowered(
     assert planned.stage.calibration.raised is None
 
 
-def test_one_usable_eye(make: Callable[..., Planned]) -> None:
-    planned = make(PlanSettings("paper", usable_eyes=("right",), is_automatic=True, placement=ONCE))
-    assert planned.until(StepName.CURSOR).eyes == ("right",)
-    planned.confirm()
-    assert planned.until(StepName.VERIFY).eyes == ("right",)
-    planned.fits("right")
-    planned.until(StepName.DONE)
-    assert set(planned.stage.calibration.verifications) == {"right"}
-    assert planned.stage.calibration.results is not None
-    assert set(planned.stage.calibration.results.eyes) == {"right"}
-
-
 def test_a_stored_calibration_is_verified_before_anything_else(
     make: Callable[..., Planned],
 ) -> None:
@@ -166,28 +163,6 @@ def test_a_stored_calibration_is_verified_before_anything_else(
     assert {one.name for one in results.verdicts.values()} <= {"accept", "keep"}
     assert not planned.stage.calibration.alignments
     assert "verdict" in step.text
-
-
-def test_the_paper_s_cursor_is_where_the_hand_is(make: Callable[..., Planned]) -> None:
-    planned = make(PlanSettings("paper", is_automatic=True, verify=False))
-    planned.until(StepName.CURSOR)
-    calibration = planned.stage.calibration
-    assert calibration.eyes == EYES
-    assert calibration.raised is None
-    assert calibration.cursor is not None
-    hand = calibration.steady_hand
-    assert hand is not None
-    assert np.linalg.norm(calibration.cursor.middle_W_m - hand.middle_W_m) < 0.002
-
-
-def test_asking_changes_nothing(make: Callable[..., Planned]) -> None:
-    planned = make()
-    planned.stage.hold(T_D_HAND)
-    eventually(lambda: planned.stage.calibration.is_applied)
-    first = planned.plan.next_step(is_steady=True)
-    second = planned.plan.next_step(is_steady=True)
-    assert first.name is second.name is StepName.CURSOR
-    assert planned.stage.state() is State.SHOW_HAND
 
 
 def test_the_whole_recommended_plan_with_one_usable_eye(make: Callable[..., Planned]) -> None:
@@ -229,7 +204,7 @@ def test_a_skipped_eye_is_not_verified_by_the_plan(
     planned.until(StepName.ALIGN)
     planned.confirm()
     planned.until(StepName.NUDGE)
-    planned.plan.skip()
+    planned.plan.skip("left")
     assert planned.stage.state() is State.APPLIED
     planned.until(StepName.DONE)
     assert planned.stage.calibration.verifications == {}
@@ -258,14 +233,14 @@ def test_a_wearer_sees_what_comes_before_the_paper_s_plan_begins_it(
     planned = make(PAPER)
     began_ns, step = 0, planned.plan.next_step(is_steady=False)
     while planned.stage.state() is not State.ALIGN:
-        step = planned.plan.follow(planned.stage.see())
+        step = planned.follow()
         if step.name is StepName.CURSOR:
             began_ns = began_ns or planned.stage.t_ns
     assert began_ns
     assert planned.stage.t_ns - began_ns >= 1_200_000_000
     held = make(replace(PAPER, is_automatic=False))
     for _ in range(30):
-        step = held.plan.follow(held.stage.see())
+        step = held.follow()
     assert step.name is StepName.CURSOR
     assert held.stage.state() is State.SHOW_HAND
 
@@ -321,11 +296,11 @@ def test_an_eye_may_be_skipped_before_its_verification_begins(
             if planned.stage.state() is State.APPLYING:
                 planned.stage.calibration.wait_applied()
         assert step.eyes == (eye,)
-        planned.plan.skip()
+        planned.plan.skip(eye)
     planned.until(StepName.DONE)
     assert skipped_eyes(Session.open(session.path).events) == set(EYES)
-    with pytest.raises(ProcedureError, match="no verification to skip"):
-        planned.plan.skip()
+    with pytest.raises(ProcedureError, match="no verification of the left eye"):
+        planned.plan.skip("left")
 
 
 def test_skipping_a_verification_that_has_just_ended_skips_no_other(
@@ -337,8 +312,12 @@ def test_skipping_a_verification_that_has_just_ended_skips_no_other(
     while planned.stage.state() is State.VERIFY:
         planned.stage.see()
     assert planned.stage.state() is State.APPLYING
-    with pytest.raises(ProcedureError, match="no verification to skip"):
-        planned.plan.skip()
+    with pytest.raises(ProcedureError, match="no verification of the left eye"):
+        planned.plan.skip("left")
+    assert planned.until(StepName.VERIFY).eyes == ("right",)
+    with pytest.raises(ProcedureError, match="no verification of the left eye"):
+        planned.plan.skip("left")
+    assert planned.stage.state() is State.VERIFY
     assert planned.plan.skipped == set()
 
 
@@ -353,23 +332,6 @@ def test_a_contradicted_result_ends_the_plan(make: Callable[..., Planned]) -> No
     step = planned.until(StepName.DONE)
     assert "does not draw what was sent" in step.text
     assert len(calibration.alignments) == 1
-
-
-def test_eyes_chosen_while_nothing_can_be_written_are_followed(
-    make: Callable[..., Planned], session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    planned = make(PAPER)
-
-    def refuse(*_: object) -> None:
-        raise FileError("the disk is full")
-
-    with monkeypatch.context() as full:
-        full.setattr("handcal.session.journal.JournalWriter.append", refuse)
-        planned.plan.choose("left")
-    assert planned.plan.settings.usable_eyes == ("left",)
-    assert session.contents.facts.usable_eyes == ("left",)
-    session.write_waiting()
-    assert Session.open(session.path).facts.usable_eyes == ("left",)
 
 
 def test_an_eye_that_is_no_longer_chosen_asks_for_nothing(make: Callable[..., Planned]) -> None:
@@ -396,11 +358,11 @@ def test_an_eye_that_is_no_longer_chosen_asks_for_nothing(make: Callable[..., Pl
 def test_the_pause_begins_once_the_hand_is_placed(make: Callable[..., Planned]) -> None:
     planned = make(PAPER)
     planned.stage.hold(frames=10)
-    unplaced = replace(planned.stage.see(), hand=None)
     for _ in range(3):
-        assert planned.plan.follow(unplaced).name is StepName.CURSOR
+        planned.plan.advance(planned.stage.frame(pose=False))
+        assert planned.step.name is StepName.CURSOR
         assert planned.stage.state() is State.SHOW_HAND
-    planned.plan.follow(planned.stage.see())
+    planned.follow()
     assert planned.stage.state() is State.SHOW_HAND
 
 

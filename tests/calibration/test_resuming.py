@@ -112,6 +112,7 @@ def test_a_calibration_goes_on_with_what_is_left_of_a_damaged_session(
     stage.calibration.solve()
     stage.calibration.apply()
     stage.calibration.wait_applied()
+    assert Session.open(session.path).is_applied, "of all that is left"
     stage.align()
     assert list(stage.calibration.alignments) == [1, 3]
     stage.calibration.delete_alignment(3)

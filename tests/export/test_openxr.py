@@ -12,7 +12,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from handcal.calibration.former import Former
+from handcal.calibration.solve_again import Former
 from handcal.core.errors import FileError
 from handcal.export import openxr
 from handcal.export.openxr import install_layer, layer_status, remove_layer, use_calibration
@@ -20,8 +20,8 @@ from handcal.io.resources import resource_path
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.session.in_force import end_at_begin, in_force_path
 from handcal.session.session import Session, open_session
-from handcal.station.opening import resume_or_create
 from handcal.station.settings import HeadsetKind, StationSettings
+from handcal.station.station import resume_or_create
 
 EXAMPLE = resource_path("example_session")
 

@@ -22,10 +22,9 @@ from handcal.export.report import session_report
 from handcal.register.benefit import expected_error_arcmin
 from handcal.report.document import Table
 from handcal.report.pdf import compose, write_pdf
-from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, comparison_json
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
-from handcal.session.trial import Trial
+from handcal.session.trial import COMPARED, Answer, Comparison, Drawing, Trial, comparison_json
 
 COMPARED_M: dict[Eye, Float64] = {"left": np.array([1e-3, 0.0, 0.0])}
 HOSTILE = ["\n\n../../x", "$\\frac{1}{0", "x" * 10_000, "\x00\u202e🙂中"]

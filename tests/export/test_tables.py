@@ -12,9 +12,9 @@ import pytest
 from handcal.core.types import Eye, Float64
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
 from handcal.export.tables import write_comparisons, write_parameters, write_trials
-from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.journal import Event
 from handcal.session.session import SessionRecord
+from handcal.session.trial import COMPARED, Comparison, comparison_json
 
 
 def read(path: Path) -> list[dict[str, str]]:

@@ -20,7 +20,8 @@ from scipy.spatial.transform import Rotation
 from handcal.calibration.hands import PlacedHand
 from handcal.calibration.plan import NextStep, StepName
 from handcal.calibration.procedure import Procedure
-from handcal.calibration.states import CalibrationSettings, Observation, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import CalibrationSettings, State
 from handcal.camera.feed import CameraStatus
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.display import view_of_eye
@@ -325,7 +326,7 @@ def studio(
 ) -> Iterator[Studio]:
     """Return the parts of a station to be opened with their settings and the pairing key `KEY`."""
     camera = Camera(frames)
-    monkeypatch.setattr("handcal.station.opening.RealSenseCamera", camera)
+    monkeypatch.setattr("handcal.station.station.RealSenseCamera", camera)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         address = probe.getsockname()
@@ -336,9 +337,10 @@ def studio(
         host=address[0],
         port=address[1],
         sessions=str(tmp_path / "sessions"),
-        # A busy computer gives few frames a second, and a confirmation may lie between two.
-        calibration=CalibrationSettings(match_tolerance_s=0.6, apply_timeout_s=1.0),
     )
+    # A busy computer gives few frames a second, and a confirmation may lie between two.
+    monkeypatch.setattr("handcal.calibration.hands.MATCH_NS", 600_000_000)
+    monkeypatch.setattr("handcal.calibration.procedure._APPLY_TIMEOUT_S", 1.0)
     with Headset(address, KEY) as headset:
         yield Studio(settings, camera, headset)
 

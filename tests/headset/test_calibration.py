@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from handcal.calibration.states import CalibrationSettings, State
+from handcal.calibration.states import State
 from handcal.core.progress import Progress
 from handcal.core.types import EYES
 from handcal.io.resources import resource_path
@@ -60,8 +60,8 @@ def test_either_side_is_restarted_during_a_calibration(
     headset_of: Callable[[int], int],
 ) -> None:
     monkeypatch.setattr("handcal.sim.simulation.program_command", lambda: command(program))
-    calibration = CalibrationSettings(match_tolerance_s=2.0)
-    settings = StationSettings(seed=SEED, sessions=str(tmp_path), calibration=calibration)
+    monkeypatch.setattr("handcal.calibration.hands.MATCH_NS", 2 * 10**9)
+    settings = StationSettings(seed=SEED, sessions=str(tmp_path))
     with Station(settings, "Ada") as station:
         _step_until(
             station, lambda seen: seen.observation is not None and seen.observation.is_steady

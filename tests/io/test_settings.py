@@ -16,7 +16,7 @@ from typing_extensions import TypeAliasType
 from handcal.calibration.states import CalibrationSettings
 from handcal.core.errors import FileError
 from handcal.core.types import Float64
-from handcal.io.settings import read_settings, settings_json
+from handcal.io.settings import known_settings, read_settings, settings_json
 from handcal.lab.demo import DemoSettings
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -74,6 +74,11 @@ def test_every_kind_of_value_comes_back(ratio: float, place: list[float], limit:
     inner = Inner(abs(ratio), (place[0], place[1], place[2]))
     assert settings == Outer(3, "y", True, "b", limit, ("a", "b", "c"), inner)
     assert json.loads(json.dumps(settings_json(settings))) == data
+
+
+def test_what_is_no_setting_any_more_is_left_out_of_an_earlier_file() -> None:
+    stored = {"count": 2, "gone": 1, "inner": {"ratio": 2.0, "gone_s": 0.1}}
+    assert known_settings(Outer, stored) == {"count": 2, "inner": {"ratio": 2.0}}
 
 
 def test_what_is_absent_takes_its_default_and_a_whole_number_serves_as_any() -> None:

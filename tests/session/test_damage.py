@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -266,17 +266,3 @@ def test_a_journal_can_be_checked_as_its_page_says(monkeypatch: pytest.MonkeyPat
     exec(code, {})
     with pytest.raises(AssertionError):
         exec(code.replace("-47", "-46"), {})
-
-
-def test_another_sound_alignment_is_not_taken_for_it(
-    tmp_path: Path, sound: SessionRecord, alignment: Alignment
-) -> None:
-    other = replace(alignment, hand_m=alignment.hand_m + 0.01)
-    with Session.create(tmp_path, sound.rig, {}, name="other") as session:
-        session.save_alignment(other)
-    copy = tmp_path / "copy"
-    shutil.copytree(sound.path, copy)
-    shutil.copy(session.path / "alignments/1.npz", copy / "alignments/3.npz")
-    record = Session.open(copy)
-    assert [damage.file for damage in record.damaged] == ["alignments/3.npz"]
-    assert list(record.alignments) == [1]

@@ -18,16 +18,6 @@ def begin(path: Path) -> JournalWriter:
     return JournalWriter(path, read_journal(path))
 
 
-def test_what_is_appended_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "journal.jsonl"
-    appended = happens_now(2, "said", {"text": "φ\n", "value": 0.1 + 0.2})
-    begin(path).append(journal_line(appended))
-    content = read_journal(path)
-    assert content.events[1] == appended
-    assert (appended.number, appended.data["value"]) == (2, 0.1 + 0.2)
-    assert (content.complete_bytes, content.torn_bytes) == (path.stat().st_size, 0)
-
-
 def test_a_torn_line_is_left_out_and_goes_with_the_next(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     begin(path)
@@ -101,15 +91,3 @@ def test_each_event_and_each_new_file_are_on_the_disk_when_they_are_done(
         assert synced[0] == (stored, stored.stat().st_size)
         assert [one for one, _ in synced[1:]] == [stored.parent, path]
         assert synced[-1][1] == path.stat().st_size
-
-
-def test_each_line_is_on_the_disk_before_it_counts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "journal.jsonl"
-    writer = begin(path)
-    synced: list[bytes] = []
-    monkeypatch.setattr(os, "fsync", lambda _: synced.append(path.read_bytes()))
-    line = journal_line(happens_now(2, "said", {}))
-    writer.append(line)
-    assert any(content.endswith(line) for content in synced)

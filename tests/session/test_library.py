@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment, HeadsetIdentity
+from handcal.register.results import RESULTS_VERSION
 from handcal.rig.example import example_rig
 from handcal.session.library import (
     DELETED,
@@ -19,13 +21,14 @@ from handcal.session.library import (
     deleted_sessions,
     read_library,
     restore_session,
+    unfinished_and_repaired,
 )
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
-from handcal.session.trial import make_trial
+from handcal.session.trial import COMPARED, Comparison, comparison_json, make_trial
 
 RESULTS = {
-    "version": 2,
+    "version": RESULTS_VERSION,
     "eyes": {
         "left": {
             "verdict": "accept",
@@ -35,6 +38,10 @@ RESULTS = {
         "right": {"verdict": "repeat", "benefit": {"after_arcmin": 16.0}},
     },
 }
+
+
+def solved(**eyes: object) -> dict[str, object]:
+    return {"version": RESULTS_VERSION, "eyes": eyes}
 
 
 @pytest.fixture
@@ -77,7 +84,7 @@ def test_the_trials_of_an_eye_are_those_of_its_calibration(
 
     def found(**results: object) -> float | None:
         with Session(path) as session:
-            session.save_results({"eyes": {"left": results}})
+            session.save_results(solved(left=results))
         trials = read_library(tmp_path)[0].eyes["left"].trials
         assert trials is None or (trials.count, trials.is_over) == (2, False), "no target is known"
         return None if trials is None else trials.mean_arcmin
@@ -98,7 +105,7 @@ def test_a_number_too_large_for_a_float_hides_no_other_session(
 ) -> None:
     make("sound", "Bo")
     with Session(make("one", "Ada", solved=False)) as session:
-        session.save_results({"eyes": {"left": {"verdict": "accept", name: [10**400, 0, 0]}}})
+        session.save_results(solved(left={"verdict": "accept", name: [10**400, 0, 0]}))
     entries = {entry.wearer: entry for entry in read_library(tmp_path)}
     assert entries["Ada"].damaged == 1
     assert not entries["Bo"].damaged
@@ -125,7 +132,7 @@ def test_an_eye_that_keeps_the_offline_calibration_has_its_error(
 ) -> None:
     kept = {"benefit": {"without_arcmin": 6.2, "after_arcmin": 2.7}, "measured_arcmin": [5, 2.7]}
     with Session(make("one", "Ada", solved=False)) as session:
-        session.save_results({"eyes": {"right": {"verdict": "keep", **kept}}})
+        session.save_results(solved(right={"verdict": "keep", **kept}))
     (entry,) = read_library(tmp_path)
     right = entry.eyes["right"]
     assert (right.before_arcmin, right.expected_arcmin, right.remaining_arcmin) == (6.2, 6.2, None)
@@ -139,6 +146,14 @@ def test_results_that_no_longer_hold_are_not_shown(
     (entry,) = read_library(tmp_path)
     assert entry.eyes == {}
     assert not entry.is_finished
+
+
+def test_results_of_another_version_are_not_shown(
+    make: Callable[..., Path], tmp_path: Path
+) -> None:
+    with Session(make("one", "Ada")) as session:
+        session.save_results(RESULTS | {"version": RESULTS_VERSION - 1})
+    assert read_library(tmp_path)[0].eyes == {}
 
 
 def test_a_damaged_session_says_so_and_spares_the_others(
@@ -169,7 +184,7 @@ def test_strange_results_are_no_obstacle(
     make: Callable[..., Path], tmp_path: Path, eyes: object
 ) -> None:
     with Session(make("one", "Ada", solved=False)) as session:
-        session.save_results({"eyes": eyes})
+        session.save_results({"version": RESULTS_VERSION, "eyes": eyes})
     (entry,) = read_library(tmp_path)
     for outcome in entry.eyes.values():
         assert outcome.remaining_arcmin is None
@@ -239,19 +254,6 @@ def test_a_repaired_copy_keeps_the_names(make: Callable[..., Path], tmp_path: Pa
     assert (copy.wearer, copy.former_wearers, copy.damaged) == ("Ada", ("Adda",), 0)
 
 
-def test_a_crash_leaves_the_former_or_the_corrected_name(
-    make: Callable[..., Path], tmp_path: Path
-) -> None:
-    journal = make("one", "Adda") / "journal.jsonl"
-    begun = len(journal.read_bytes())
-    correct_wearer(journal.parent, "Ada")
-    complete = journal.read_bytes()
-    for length in range(begun, len(complete) + 1):
-        journal.write_bytes(complete[:length])
-        record = Session.open(journal.parent)
-        assert record.wearer == ("Ada" if length == len(complete) else "Adda")
-
-
 def test_a_deleted_session_that_vanishes_while_listed_is_no_obstacle(
     make: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -276,3 +278,79 @@ def test_an_open_session_is_not_deleted(make: Callable[..., Path], tmp_path: Pat
         delete_session(tmp_path)
     with pytest.raises(FileError, match="no longer there: another program moved or deleted it"):
         delete_session(tmp_path / "gone")
+
+
+def begin(parent: Path, name: str, wearer: str = "") -> Session:
+    return Session.create(parent, example_rig(), {}, name=name, wearer=wearer)
+
+
+def test_only_those_not_finished_are_listed_the_newest_first(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    with begin(tmp_path, "b-first", "P7") as first:
+        first.save_alignment(alignment)
+        first.save_alignment(alignment)
+        first.delete("alignment", 1)
+        first.finish()
+        first.record("went_on")
+    with begin(tmp_path, "c-done") as done:
+        done.finish()
+        done.save_notes("notes do not begin it again")
+        trial = make_trial(example_rig().eyes["left"], "left", 0.5, np.zeros(3), np.zeros(3))
+        done.save_fine_tuned({"left": np.zeros(3)})
+        done.save_trial(trial)
+        done.record(COMPARED, **comparison_json(Comparison("offline", "first", {})))
+        done.delete("trial", 1)
+        done.restore("trial", 1)
+    assert Session.open(tmp_path / "c-done").is_finished
+    begin(tmp_path, "a-second").close()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "file").write_text("not a folder")
+
+    newest, oldest = unfinished_and_repaired(tmp_path)[0]
+    assert (newest.path, oldest.path) == (tmp_path / "a-second", tmp_path / "b-first")
+    assert (oldest.wearer, oldest.alignments, oldest.trials, oldest.problem) == ("P7", 1, 0, "")
+    assert oldest.started == Session.open(oldest.path).events[0].time
+    with Session(oldest.path):  # it can be resumed
+        pass
+
+
+def test_a_session_that_cannot_be_resumed_gives_the_reason(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    for name in ("damaged", "foreign", "empty"):
+        with begin(tmp_path, name) as session:
+            session.save_alignment(alignment)
+    (tmp_path / "damaged" / "alignments" / "1.npz").write_bytes(b"nothing")
+    event = json.dumps({"version": 9})
+    (tmp_path / "foreign" / "journal.jsonl").write_text(event + "\n")
+    (tmp_path / "empty" / "journal.jsonl").write_text("")
+    with begin(tmp_path, "running"):
+        problems = {one.path.name: one.problem for one in unfinished_and_repaired(tmp_path)[0]}
+        parts = {one.path.name: one.damaged for one in unfinished_and_repaired(tmp_path)[0]}
+    assert set(problems) == {"damaged", "foreign", "empty", "running"}
+    assert (problems["damaged"], parts["damaged"]) == ("", 1)
+    assert "has version 9" in problems["foreign"]
+    assert "does not begin" in problems["empty"]
+    assert "in use by process" in problems["running"]
+
+
+def test_a_damaged_session_knows_of_its_repaired_copy(tmp_path: Path, alignment: Alignment) -> None:
+    with begin(tmp_path, "one") as session:
+        session.save_alignment(alignment)
+        session.save_alignment(alignment)
+    with begin(tmp_path, "other") as other:
+        other.save_alignment(alignment)
+    for name in ("one", "other"):
+        (tmp_path / name / "alignments" / "1.npz").unlink()
+    repair_session(tmp_path / "one", tmp_path / "copy")
+    found = {
+        session.path.name: session.is_repaired for session in unfinished_and_repaired(tmp_path)[0]
+    }
+    assert found == {"one": True, "copy": False, "other": False}
+    with Session(tmp_path / "copy") as copy:
+        copy.finish()
+    found = {
+        session.path.name: session.is_repaired for session in unfinished_and_repaired(tmp_path)[0]
+    }
+    assert found == {"one": True, "other": False}

@@ -13,10 +13,14 @@ import pytest
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment
 from handcal.export.export import ExportSettings, export_session
-from handcal.session.library import correct_wearer, delete_session, read_library
+from handcal.session.library import (
+    correct_wearer,
+    delete_session,
+    read_library,
+    unfinished_and_repaired,
+)
 from handcal.session.repair import check_session, repair_session
 from handcal.session.session import Session, SessionRecord
-from handcal.session.unfinished import unfinished_and_repaired
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no modes, and few links")
 

@@ -11,12 +11,11 @@ from handcal.core.types import Alignment, Verification
 from handcal.rig.example import example_rig
 from handcal.session.journal import JOURNAL, happens_now, journal_line
 from handcal.session.session import (
-    MAX_ALIGNMENT_BYTES,
     MAX_NOTES_CHARACTERS,
     Session,
     SessionRecord,
 )
-from handcal.session.state import MAX_ALIGNMENTS, MAX_TRIALS, WENT_BACK, SessionEvent
+from handcal.session.state import MAX_TRIALS, WENT_BACK, SessionEvent
 from handcal.session.trial import Trial, trial_json
 from tests.session.conftest import RESULTS, SETTINGS, SHIFT_M
 
@@ -38,12 +37,6 @@ def test_everything_comes_back(finished: SessionRecord, alignment: Alignment) ->
         assert stored.cursor_m.tobytes() == alignment.cursor_m.tobytes()
         assert stored.T_E_W["right"].tobytes() == alignment.T_E_W["right"].tobytes()
     assert finished.torn_bytes == 0
-
-
-def test_a_new_session_has_no_results_and_can_be_read_while_written(session: Session) -> None:
-    record = Session.open(session.path)
-    assert record.results is None
-    assert record.alignments == {}
 
 
 def test_a_session_goes_on_where_it_ended(session: Session, alignment: Alignment) -> None:
@@ -79,53 +72,11 @@ def test_names_of_its_own_events_and_nan_are_refused(session: Session) -> None:
     assert len(Session.open(session.path).events) == 1
 
 
-def test_too_large_an_alignment_is_not_written(session: Session, alignment: Alignment) -> None:
-    cloud_m = np.zeros((MAX_ALIGNMENT_BYTES // 24, 3))
-    huge = Alignment(
-        cloud_m,
-        alignment.hand_m,
-        np.zeros(len(cloud_m), bool),
-        alignment.hand_is_cut,
-        alignment.T_E_W,
-        ("left",),
-        np.zeros(3),
-        0,
-        1,
-    )
-    with pytest.raises(ValueError, match="too large"):
-        session.save_alignment(huge)
-    assert Session.open(session.path).alignments == {}
-
-
 def test_a_closed_session_writes_no_more(session: Session) -> None:
     session.close()
     session.close()
     with pytest.raises(FileError, match="is closed; open the session again"):
         session.record("event")
-
-
-def test_a_deleted_alignment_is_left_out_with_its_results(
-    session: Session, alignment: Alignment
-) -> None:
-    second = replace(alignment, t_b_ns=2)
-    session.save_alignment(alignment)
-    session.save_alignment(second)
-    session.save_results(RESULTS)
-    session.delete("alignment", 2)
-    record = Session.open(session.path)
-    assert [kept.t_b_ns for kept in record.alignments.values()] == [alignment.t_b_ns]
-    assert record.results is None
-
-    session.close()
-    with Session(session.path) as again:
-        assert again.save_alignment(replace(alignment, t_b_ns=3)) == 3
-        again.delete("alignment", 3)
-        again.delete("alignment", 1)
-        with pytest.raises(ValueError, match="there is no alignment 1"):
-            again.delete("alignment", 1)
-        with pytest.raises(ValueError, match="alignment_deleted"):
-            again.record("alignment_deleted")
-    assert Session.open(session.path).alignments == {}
 
 
 def numbers(record: SessionRecord) -> tuple[list[int], list[int]]:
@@ -202,19 +153,6 @@ def _plain(value: object) -> object:
     if is_dataclass(value):
         return [_plain(getattr(value, field.name)) for field in fields(value)]
     return value
-
-
-def test_a_session_of_many_alignments_is_full(session: Session, alignment: Alignment) -> None:
-    session.delete("alignment", session.save_alignment(alignment))
-    for _ in range(MAX_ALIGNMENTS):
-        session.save_alignment(alignment)
-    with pytest.raises(ValueError, match="full: no room for more than 100 alignments"):
-        session.save_alignment(alignment)
-    with pytest.raises(ValueError, match="no room for more than 100 alignments"):
-        session.restore("alignment", 1)
-    session.delete("alignment", 2)
-    assert session.save_alignment(alignment) == MAX_ALIGNMENTS + 2
-    assert len(Session.open(session.path).alignments) == MAX_ALIGNMENTS
 
 
 def test_trials_come_back_can_be_deleted_and_are_limited(session: Session, trial: Trial) -> None:

@@ -1,7 +1,6 @@
 """Sessions that survive other writers, kills, a full disk, and damaged files."""
 
 import contextlib
-import json
 import os
 import random
 import resource
@@ -28,7 +27,7 @@ from handcal.session.library import read_library
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent
 from handcal.session.trial import Trial
-from tests.session.conftest import RESULTS, SETTINGS
+from tests.session.conftest import SETTINGS
 
 # Writes alignments that tell their own number, deletes and restores them, and says when each round
 # is safe.
@@ -188,71 +187,6 @@ def test_a_session_survives_kill_9(tmp_path: Path, seed: int) -> None:
         assert record.applied_shift_m["left"][0] in (1e-3 * safe, 1e-3 * (safe + 1))
 
 
-FILES = [
-    "journal.jsonl",
-    "rig.yaml",
-    "settings.json",
-    "results.json",
-    "alignments/1.npz",
-    "alignments/2.npz",
-]
-
-
-@given(st.sampled_from(FILES), st.floats(0, 1))
-@settings(deadline=None)
-def test_a_truncated_file_gives_the_data_or_a_file_error(
-    tmp_path_factory: pytest.TempPathFactory,
-    finished: SessionRecord,
-    name: str,
-    fraction: float,
-) -> None:
-    path = tmp_path_factory.mktemp("copy") / "session"
-    shutil.copytree(finished.path, path)
-    length = int(fraction * (path / name).stat().st_size)
-    os.truncate(path / name, length)
-    try:
-        record = Session.open(path)
-    except FileError:
-        return
-    assert record.settings == SETTINGS
-    assert record.results == RESULTS or (name == "journal.jsonl" and record.results is None)
-    # The line break after JSON holds nothing.
-    whole = (finished.path / name).stat().st_size - name.endswith(".json")
-    assert record.damaged or length >= whole
-    assert record.events == finished.events[: len(record.events)]
-    assert record.journal_bytes + record.torn_bytes == (path / "journal.jsonl").stat().st_size
-    for stored, original in zip(
-        record.alignments.values(), finished.alignments.values(), strict=False
-    ):
-        assert stored.hand_m.tobytes() == original.hand_m.tobytes()
-
-
-@pytest.mark.parametrize("name", [name for name in FILES if name != "results.json"])
-def test_a_missing_file_is_named(tmp_path: Path, finished: SessionRecord, name: str) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(finished.path, path)
-    (path / name).unlink()
-    if name == "journal.jsonl":
-        with pytest.raises(FileError, match=name):
-            Session.open(path)
-    else:
-        assert [damage.file for damage in Session.open(path).damaged] == [name]
-
-
-@pytest.mark.parametrize("name", ["rig.yaml", "alignments/1.npz", "alignments/2.npz"])
-def test_a_changed_file_is_noticed(tmp_path: Path, finished: SessionRecord, name: str) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(finished.path, path)
-    content = bytearray((path / name).read_bytes())
-    content[len(content) // 2] ^= 1
-    (path / name).write_bytes(content)
-    record = Session.open(path)
-    assert [damage.file for damage in record.damaged] == [name]
-    assert record.rig.eyes["left"].K.tobytes() == finished.rig.eyes["left"].K.tobytes()
-    lost = {"rig.yaml": set(), "alignments/1.npz": {1}, "alignments/2.npz": {2}}[name]
-    assert set(record.alignments) == {1, 2} - lost
-
-
 def test_a_sound_alignment_of_another_place_is_noticed(
     tmp_path: Path, alignment: Alignment
 ) -> None:
@@ -274,33 +208,6 @@ def test_a_sound_alignment_of_another_place_is_noticed(
     assert entry.damaged == 2
 
 
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        ({"version": 4}, "has version 4, not 3"),
-        ({"number": 7}, "does not have its checksum"),
-        ({"event": "made_up"}, "does not have its checksum"),
-        ({"version": 2}, "has version 2, not 3"),
-        ({"time": "2026-11-22T00:00:00+00:00"}, "does not have its checksum"),
-        (None, "is not an event of a session"),
-    ],
-)
-def test_a_changed_line_costs_only_itself(
-    tmp_path: Path, finished: SessionRecord, change: dict[str, object] | None, problem: str
-) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(finished.path, path)
-    journal = path / "journal.jsonl"
-    lines = journal.read_text().splitlines()
-    lines[1] = "[1, 2]" if change is None else json.dumps(json.loads(lines[1]) | change)
-    journal.write_text("\n".join(lines) + "\n")
-    record = Session.open(path)
-    assert [(damage.file, damage.line) for damage in record.damaged] == [("journal.jsonl", 2)]
-    assert problem in record.damaged[0].what
-    assert record.events == (finished.events[0], *finished.events[2:])
-    assert numbers_of(record) == numbers_of(finished)
-
-
 def test_a_newer_version_is_refused_as_a_whole(
     tmp_path: Path, finished: SessionRecord, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -313,22 +220,6 @@ def test_a_newer_version_is_refused_as_a_whole(
     journal.write_bytes(journal.read_bytes() + line)
     with pytest.raises(FileError, match="has version 4, not 3; use the handcal that wrote it"):
         Session.open(path)
-
-
-def test_a_journal_without_its_beginning_is_refused(
-    tmp_path: Path, finished: SessionRecord
-) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(finished.path, path)
-    (path / "journal.jsonl").write_text("")
-    with pytest.raises(FileError, match="does not begin as the journal of a session"):
-        Session.open(path)
-
-
-def numbers_of(record: SessionRecord) -> tuple[list[int], ...]:
-    """Return the numbers of all items of a session."""
-    alignments = list(record.alignments), list(record.deleted_alignments)
-    return *alignments, list(record.trials), list(record.deleted_trials)
 
 
 JSON = st.recursive(

@@ -1,18 +1,36 @@
+"""Trials and blinded comparisons of the user test."""
+
+from __future__ import annotations
+
 import json
+from collections.abc import Callable
 from dataclasses import asdict, replace
+from math import comb
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from handcal.core.display import TARGET_DEPTHS_M, arcmin_from_px, update_matrix
-from handcal.core.types import EYES, Eye, Float64
+from handcal.core.types import EYES, Alignment, Eye, Float64
+from handcal.register.results import Results, SolveSettings, results_json, solve_session
 from handcal.rig.example import example_rig
+from handcal.session.record import eye_trials
+from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import (
+    COMPARED,
+    Answer,
+    Comparison,
+    Drawing,
     Trial,
     calibration_numbers,
+    comparison_json,
+    count_comparisons,
     make_trial,
+    read_comparisons,
     read_trial,
+    sign_test,
     summarise_trials,
     trial_errors_arcmin,
     trial_json,
@@ -46,12 +64,6 @@ def test_errors_are_what_the_model_says(eye: Any, depth_m: float) -> None:
         error_px = np.hypot(*(pixels[0] - pixels[1]))
         assert made.error_px[number] == pytest.approx(error_px)
         assert made.error_arcmin[number] == pytest.approx(float(arcmin_from_px(display, error_px)))
-
-
-def test_no_adjustment_is_no_error() -> None:
-    made = trial(adjusted_m=CALIBRATED_M)
-    assert (made.error_px == 0.0).all()
-    assert (made.error_arcmin == 0.0).all()
 
 
 def test_a_shift_aside_by_hand() -> None:
@@ -95,13 +107,6 @@ def test_what_is_no_trial_is_refused(change: dict[str, Any], problem: str) -> No
         read_trial(trial_json(trial()) | change, "")
 
 
-def test_what_lacks_something_is_refused() -> None:
-    data = trial_json(trial())
-    del data["truth_px"]
-    with pytest.raises(ValueError, match="no 'truth_px'"):
-        read_trial(data, "")
-
-
 def test_statistics_are_of_all_corners() -> None:
     trials = [trial(depth_m, ADJUSTED_M * factor) for depth_m in (0.6, 0.4) for factor in (1, 2)]
     trials.append(replace(trials[0], eye="right"))
@@ -120,13 +125,6 @@ def test_statistics_are_of_all_corners() -> None:
     assert list(statistics.by_depth_m) == [0.4, 0.6]
     assert statistics.by_depth_m[0.6].trials == 3
     json.dumps(asdict(statistics), allow_nan=False)
-
-
-def test_no_trials_have_no_statistics() -> None:
-    statistics = summarise_trials([])
-    assert statistics.total is None
-    assert not statistics.by_eye
-    assert not statistics.by_depth_m
 
 
 def test_trials_of_one_calibration_are_told_from_others() -> None:
@@ -155,3 +153,84 @@ def test_trials_of_another_shift_judge_nothing_of_this_one() -> None:
     assert trial_errors_arcmin(trials) == {}
     of_either = trial_errors_arcmin(trials, both, {"right": CALIBRATED_M + 1e-3})
     assert of_either == {"left": errors[:2], "right": errors[3:]}
+
+
+FORMER_M = np.array([0.01, 0.0, 0.0])
+
+
+@pytest.fixture
+def results(simulated: Callable[..., Alignment]) -> Results:
+    return solve_session([simulated(1, ("left",))], RIG, SolveSettings())
+
+
+@pytest.fixture
+def record(session: Session, results: Results) -> SessionRecord:
+    """Return a session solved with another φ, of both eyes, and a trial of each."""
+    eyes = results_json(results)["eyes"]
+    stored = {eye: {**eyes["left"], "shift_m": FORMER_M.tolist()} for eye in EYES}
+    trials = {
+        number: make_trial(RIG.eyes[eye], eye, 0.4, FORMER_M, 2 * FORMER_M)
+        for number, eye in enumerate(EYES, 1)
+    }
+    record = Session.open(session.path)
+    return replace(record, results={"eyes": stored}, is_solved=True, trials=trials)
+
+
+def test_trials_of_an_eye_that_is_not_solved_now_judge_nothing(
+    results: Results, record: SessionRecord
+) -> None:
+    assert set(eye_trials(results, record, 8.0)) == {"left"}
+
+
+def test_stored_results_of_other_alignments_do_not_count(
+    results: Results, record: SessionRecord
+) -> None:
+    assert eye_trials(results, replace(record, is_solved=False), 8.0) == {}
+
+
+SHIFT_M: dict[Eye, Float64] = {"left": np.array([1e-3, 2e-3, 3e-3])}
+
+
+def made(first: Drawing, answer: Answer) -> Comparison:
+    return Comparison(first, answer, SHIFT_M)
+
+
+@pytest.mark.parametrize(
+    ("first", "answer", "better"),
+    [
+        ("offline", "first", "offline"),
+        ("offline", "second", "applied"),
+        ("applied", "first", "applied"),
+        ("applied", "second", "offline"),
+        ("applied", "neither", None),
+    ],
+)
+def test_the_better_one_follows_from_order_and_answer(
+    first: Drawing, answer: Answer, better: Drawing | None
+) -> None:
+    assert made(first, answer).better == better
+
+
+def test_a_session_keeps_comparisons_and_leaves_out_what_is_damaged(tmp_path: Path) -> None:
+    with Session.create(tmp_path, example_rig(), {}) as session:
+        session.record(COMPARED, **comparison_json(made("offline", "second")))
+        session.record(COMPARED, first="offline", answer=["first"], applied_shift_m={})
+        session.record(COMPARED, first="offline", answer="first", applied_shift_m={"nose": [0]})
+        session.record(COMPARED, first="offline", answer="first")
+        session.record(COMPARED, **comparison_json(made("applied", "neither")))
+    kept = read_comparisons(Session.open(session.path).events)
+    assert [(one.first, one.answer) for one in kept] == [
+        ("offline", "second"),
+        ("applied", "neither"),
+    ]
+    np.testing.assert_array_equal(kept[0].applied_shift_m["left"], SHIFT_M["left"])
+    assert kept[0].time
+    counts = count_comparisons(kept)
+    assert (counts.applied, counts.offline, counts.neither, counts.p_value) == (1, 0, 1, 1.0)
+
+
+def test_the_sign_test_is_that_of_the_binomial_distribution() -> None:
+    assert sign_test(0, 0) == sign_test(5, 5) == 1.0
+    assert sign_test(10, 0) == sign_test(0, 10) == 2 / 2**10
+    assert sign_test(2000, 0) == 0.0
+    assert sign_test(8, 2) == 2 * (1 + 10 + comb(10, 2)) / 2**10

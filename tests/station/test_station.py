@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import handcal.station.opening
-from handcal.calibration.former import Former
+import handcal.station.station
 from handcal.calibration.plan import PlanSettings
+from handcal.calibration.solve_again import Former
 from handcal.calibration.states import CalibrationSettings, ProcedureError, State
-from handcal.calibration.timing.delay import DelaySettings
 from handcal.calibration.verifying import SKIPPED
 from handcal.core.errors import CameraError, FileError, LinkError
 from handcal.core.types import EYES, Alignment, Eye, Float64, Frame
@@ -27,33 +26,33 @@ from handcal.link.pairing import new_pairing_key
 from handcal.register.fuse import FuseSettings
 from handcal.register.prior import LearnedPrior, PriorSettings
 from handcal.rig.example import example_rig
-from handcal.session.facts import facts_json
 from handcal.session.journal import JournalContent, read_journal
 from handcal.session.session import Session
+from handcal.session.state import facts_json
 from handcal.session.trial import make_trial
 from handcal.sim.camera import SyntheticCamera
 from handcal.sim.wearer import draw_eyes
 from handcal.sim.wearer_settings import WearerSettings
 from handcal.station.faults import Fault
-from handcal.station.opening import resume_or_create
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
-from handcal.station.station import Station
+from handcal.station.station import Station, resume_or_create
 from tests.helpers import Patience, eventually, slow_simulator, write_small_rig
 
 NAIVE_SEED = 3
 PATIENCE_S = 50.0
 pytestmark = pytest.mark.process
-# A busy computer gives few frames a second, and the wearer's answer lies between two.
-# A busy machine's camera is late, which would be reported instead of what is tested.
-CALIBRATION = CalibrationSettings(
-    apply_timeout_s=0.5, match_tolerance_s=2.0, delay=DelaySettings(limit_s=5.0)
-)
+CALIBRATION = CalibrationSettings()
 
 
 @pytest.fixture
 def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StationSettings:
     slow_simulator(monkeypatch)
+    monkeypatch.setattr("handcal.calibration.procedure._APPLY_TIMEOUT_S", 0.5)
+    # A busy computer gives few frames a second, and the wearer's answer lies between two.
+    monkeypatch.setattr("handcal.calibration.hands.MATCH_NS", 2 * 10**9)
+    # Its camera is late, which would be reported instead of what is tested.
+    monkeypatch.setattr("handcal.calibration.delay._LIMIT_S", 5.0)
     return StationSettings(
         seed=NAIVE_SEED,
         rig=str(write_small_rig(tmp_path / "rig.yaml")),
@@ -156,9 +155,9 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         compared = station.step()
         assert (compared.comparing, compared.has_compared_both) == ("first", False)
         assert compared.views == {}  # they would tell which drawing is shown
-        station.trials.comparing.show("second")
+        station.trials.show_compared("second")
         assert station.step().has_compared_both
-        station.trials.comparing.answer("second")
+        station.trials.answer("second")
         station.trials.show_offline(True)
         station.trials.show_offline(False)  # nothing else may change
         solved_m = applied_m["left"]
@@ -277,7 +276,7 @@ class Unplugged(SyntheticCamera):
 def test_a_camera_that_comes_back_finds_the_session_as_it_was(
     settings: StationSettings, begun: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(handcal.station.opening, "SyntheticCamera", Unplugged)
+    monkeypatch.setattr(handcal.station.station, "SyntheticCamera", Unplugged)
     with Station(settings, resume=begun) as station:
         seen = step_until(station, "a frame", lambda s: s.frame is not None, PATIENCE_S)
         assert seen.camera.problem == ""

@@ -40,12 +40,11 @@ from handcal.report.statistics import (
     variance_components,
 )
 from handcal.report.write import write_report
-from handcal.session.comparison import count_comparisons, read_comparisons
 from handcal.session.journal import JOURNAL, MAX_JOURNAL_BYTES
 from handcal.session.record import replay
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import SessionEvent
-from handcal.session.trial import calibration_numbers
+from handcal.session.trial import calibration_numbers, count_comparisons, read_comparisons
 
 CornerRow: TypeAlias = dict[str, Any]
 """One corner of one trial: the columns of `corner_rows`, and whose it is."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
-from handcal.calibration.states import CalibrationSettings
+from handcal.calibration.delay import ASSUMED_LATENCY_S
 from handcal.camera.camera import Camera
 from handcal.camera.sdk_devices import Device, devices_by_child, explain_absence
 from handcal.core.errors import CancelledError, HandcalError
@@ -30,12 +30,8 @@ from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
 from handcal.rig.compare import compare_camera
 from handcal.rig.rig_file import read_rig
-from handcal.station.checks.headset import (
-    STAMP_ADVICE,
-    headset_problem,
-    headset_state,
-    run_pose_delay,
-)
+from handcal.station.checks.headset import headset_problem, headset_state
+from handcal.station.poses import STAMP_ADVICE, run_pose_delay
 
 _PACKAGES = (
     "numpy",
@@ -49,7 +45,6 @@ _PACKAGES = (
 )
 CAMERA_EXTRAS = {"oak": ("depthai", "OAK-D"), "orbbec": ("pyorbbecsdk", "Orbbec camera")}
 """Extras that cameras need: the module of each, and the cameras."""
-_CAMERA_LATENCY_S = CalibrationSettings().camera_latency_s
 _SETTLE_S = 2.0
 _POLL_S = 0.05
 _LONGEST_STEP_MS = 1.0
@@ -129,7 +124,7 @@ def examine_headset(
         return found
     what = "Pose stamps"
     try:
-        delay = run_pose_delay(server, camera, rig.T_H_D, _CAMERA_LATENCY_S, progress=progress)
+        delay = run_pose_delay(server, camera, rig.T_H_D, ASSUMED_LATENCY_S, progress=progress)
     except CancelledError:
         raise
     except HandcalError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from ipaddress import ip_address
 from pathlib import Path
@@ -36,6 +37,8 @@ from handcal.station.settings import StationSettings
 _LEAST_GATE_M = 0.15
 """Least part of the depth gate within a wearer's reach: a hand, and room to move it."""
 _HALF_HAND_M, _ROUNDING_M = 0.05, 1e-6
+# `_look` adds the part's name.
+_good, _limited, _broken = (partial(Finding, "", health) for health in Health)
 Part: TypeAlias = Literal["camera", "headset", "rig", "sessions"]
 PARTS: dict[Part, str] = {
     "camera": "Camera",
@@ -102,26 +105,10 @@ def gate_problem(settings: StationSettings) -> Finding | None:
 def _look(part: Part, look: Callable[[], Finding], advice: str) -> Finding:
     try:
         finding = look()
-    except (
-        HandcalError,
-        OSError,
-        ValueError,
-    ) as error:  # ValueError: a path that contains a null byte
+    except (HandcalError, OSError, ValueError) as error:  # ValueError: a null byte in a path
         why = (isinstance(error, OSError) and error.strerror) or str(error)
         finding = Finding("", Health.BROKEN, why, advice)
     return replace(finding, what=PARTS[part])
-
-
-def _good(found: str) -> Finding:
-    return Finding("", Health.GOOD, found)
-
-
-def _limited(found: str, advice: str) -> Finding:
-    return Finding("", Health.LIMITED, found, advice)
-
-
-def _broken(found: str, advice: str) -> Finding:
-    return Finding("", Health.BROKEN, found, advice)
 
 
 def _camera(settings: StationSettings, progress: Progress) -> Finding:

@@ -46,8 +46,6 @@ class SupportSettings:
     empty: no session may have been made yet."""
     sessions: tuple[Path, ...] = ()
     """Further folders for it, each with at least one session: a wrong one would leave the names."""
-    names: tuple[str, ...] = ()
-    """Further names to take out."""
     frames: Path | None = None
     """Recording, a file or a folder, to add."""
 
@@ -118,14 +116,14 @@ def run_support(
 
 
 def known_names(settings: SupportSettings) -> frozenset[str]:
-    """Return the wearers' names in the journals of all sessions, and those of the settings.
+    """Return the wearers' names in the journals of all sessions.
 
     Raises
     ------
     FileError
         If one of `sessions` is missing or holds no session.
     """
-    names = set(settings.names)
+    names: set[str] = set()
     own = (settings.session_folder,) if settings.session_folder else ()
     for folder in (*own, *settings.sessions):
         entries = (*read_library(folder), *read_library(folder / DELETED))

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import secrets
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.display import target_corners_m
@@ -9,13 +14,17 @@ from handcal.core.types import Eye, Float64, Rig
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target
 from handcal.session.session import Session
-from handcal.session.trial import make_trial
-from handcal.station.user_test.comparing import Comparing
-from handcal.station.weak import weakly
+from handcal.session.trial import Answer, Comparison, Drawing, Place, make_trial
+
+_SAME_M = 1e-6
+_ORDERS: tuple[Drawing, ...] = ("offline", "applied")
 
 
 class Trials:
-    """Shows targets and other drawings in the headset, and saves trials.
+    """Shows targets and other drawings in the headset, and saves trials and comparisons.
+
+    In a blinded comparison the headset draws with two φ in random order, and the wearer chooses.
+    The order is told only to the journal.
 
     Parameters
     ----------
@@ -23,24 +32,38 @@ class Trials:
     rig : Rig
     link : HeadsetServer
     session : Session
+    draw_lot : callable
+        Chooses the drawing that a comparison shows first.
 
     Attributes
     ----------
-    comparing : Comparing
     target_E_m : dict of eye to (4, 3) float64
         Corners of the target, for the eye to which it is shown; empty while it is hidden.
     is_offline : bool
         True while the headset draws with the offline calibration.
+    compared : {"first", "second"} or None
+        The drawing of the comparison that is shown; None while there is none.
+    has_compared_both : bool
+        True once both have been shown.
     """
 
     def __init__(
-        self, calibration: Calibration, rig: Rig, link: HeadsetServer, session: Session
+        self,
+        calibration: Calibration,
+        rig: Rig,
+        link: HeadsetServer,
+        session: Session,
+        draw_lot: Callable[[tuple[Drawing, ...]], Drawing] = secrets.choice,
     ) -> None:
         self._calibration = calibration
         self._rig = rig
         self._link = link
         self._session = session
-        self.comparing = Comparing(session, weakly(self.show_offline))
+        self._draw_lot = draw_lot
+        self._first: Drawing = "offline"
+        self._compared_m: Mapping[Eye, Float64] = {}
+        self.compared: Place | None = None
+        self.has_compared_both = False
         self.target_E_m: dict[Eye, Float64] = {}
         self.is_offline = False
 
@@ -87,19 +110,6 @@ class Trials:
             self._link.send_target(None)
             self.target_E_m = {}
 
-    def compare(self) -> None:
-        """Begin a blinded comparison of the offline calibration and the applied φ.
-
-        Raises
-        ------
-        ProcedureError
-            Unless the calibrated φ is applied, or if it is the offline one.
-        LinkError
-            If the link is closed.
-        """
-        self._require_applied()
-        self.comparing.begin(self._calibration.applied_shift_m)
-
     def show_offline(self, is_shown: bool) -> None:
         """Have the headset draw with the offline calibration, or with the applied one again.
 
@@ -116,13 +126,68 @@ class Trials:
             self._link.send_show(is_shown)
             self.is_offline = is_shown
 
+    def compare(self) -> None:
+        """Begin a blinded comparison of the offline calibration and the applied φ.
+
+        Raises
+        ------
+        ProcedureError
+            Unless the calibrated φ is applied, or if it is the offline one.
+        LinkError
+            If the link is closed.
+        """
+        self._require_applied()
+        applied_m = self._calibration.applied_shift_m
+        if all(np.abs(shift_m).max() < _SAME_M for shift_m in applied_m.values()):
+            raise ProcedureError(
+                "the headset draws with the offline calibration", "solve and apply"
+            )
+        self.end_comparison()
+        self._compared_m = dict(applied_m)
+        self._first = self._draw_lot(_ORDERS)
+        self._show_compared("first")
+
+    def show_compared(self, place: Place) -> None:
+        """Show the first or the second drawing; raises as `compare`."""
+        if self.compared is None:
+            raise ProcedureError("begin a comparison first")
+        self._show_compared(place)
+
+    def answer(self, answer: Answer) -> None:
+        """Record which drawing fits better, and end the comparison.
+
+        Raises
+        ------
+        ProcedureError
+            Unless both have been shown.
+        FileError
+            If the session cannot be written; the comparison continues.
+        """
+        if self.compared is None or not self.has_compared_both:
+            raise ProcedureError("show the wearer both drawings first")
+        self._session.save_comparison(Comparison(self._first, answer, self._compared_m))
+        self.end_comparison()
+
+    def end_comparison(self) -> None:
+        """End a comparison; the headset draws with the applied φ again."""
+        if self.compared is not None:
+            self.compared, self.has_compared_both = None, False
+            self.show_offline(False)
+
     def follow_procedure(self) -> None:
         """End what is shown once the calibrated φ is no longer applied, or is another one."""
         if self._calibration.state is not State.APPLIED:
             self.hide_target()
-            self.comparing.end()
+            self.end_comparison()
             self.show_offline(False)
-        self.comparing.check(self._calibration.applied_shift_m)
+        applied_m = self._calibration.applied_shift_m
+        if any(not np.array_equal(m, applied_m[eye]) for eye, m in self._compared_m.items()):
+            self.end_comparison()
+
+    def _show_compared(self, place: Place) -> None:
+        self.show_offline((place == "first") == (self._first == "offline"))
+        self.has_compared_both |= place == "second"
+        self.compared = place
 
     def _require_applied(self) -> None:
         if self._calibration.state is not State.APPLIED:

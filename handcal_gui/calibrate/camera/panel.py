@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.calibration.states import Observation
+from handcal.calibration.sight import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.core.errors import FileError
 from handcal.core.types import Frame

@@ -9,6 +9,7 @@ from functools import partial
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError
+from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.docks import Panels
@@ -92,13 +93,13 @@ def _connect_trials(panels: Panels, submit: Submit) -> None:
     )
     trials.compare_requested.connect(lambda: submit(compare, lambda s: s.trials.compare()))
     trials.end_comparison_requested.connect(
-        lambda: submit(compare, lambda s: s.trials.comparing.end())
+        lambda: submit(compare, lambda s: s.trials.end_comparison())
     )
     trials.show_compared_requested.connect(
-        lambda place: submit(compare, lambda s: s.trials.comparing.show(place))
+        lambda place: submit(compare, lambda s: s.trials.show_compared(place))
     )
     trials.comparison_answered.connect(
-        lambda answer: submit(compare, lambda s: s.trials.comparing.answer(answer))
+        lambda answer: submit(compare, lambda s: s.trials.answer(answer))
     )
 
 
@@ -108,25 +109,24 @@ def _confirm(calibration: Calibration) -> None:
         calibration.confirm()
 
 
-def _take_step(station: Station) -> None:
-    """Take the plan's next step; the session keeps what it cannot write yet."""
-    with suppress(FileError):
-        station.take_step()
+def skipping(snapshot: Snapshot) -> Command:
+    """Return the command that skips the verification shown, unless the wearer has ended it."""
+    verifying, step = snapshot.procedure.verifying, snapshot.next_step
+    eyes = (verifying.eye,) if verifying is not None else () if step is None else step.eyes
 
+    def skip(station: Station) -> None:
+        with suppress(FileError, ProcedureError):
+            station.plan.skip(eyes[0])
 
-def _skip(station: Station) -> None:
-    """Skip the verification, which the wearer may have ended already."""
-    with suppress(FileError, ProcedureError):
-        station.plan.skip()
+    return skip if eyes else lambda _: None
 
 
 COMMANDS: dict[Action, Command] = {
-    Action.TAKE_STEP: _take_step,
+    Action.TAKE_STEP: Station.take_step,
     Action.CONFIRM: calibrating(_confirm),
     Action.REDO: calibrating(Calibration.redo),
     Action.VERIFIED: calibrating(Calibration.verified),
     Action.UNDO_NUDGE: calibrating(Calibration.undo_nudge),
-    Action.SKIP: _skip,
     Action.ANOTHER: lambda station: station.plan.request(),
     Action.REPEAT_LEFT: lambda station: station.plan.request(("left",)),
     Action.REPEAT_RIGHT: lambda station: station.plan.request(("right",)),

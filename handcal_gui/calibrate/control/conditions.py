@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 
-from handcal.calibration.states import Observation
+from handcal.calibration.sight import Observation
 from handcal.camera.feed import CameraStatus
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.translation import tr

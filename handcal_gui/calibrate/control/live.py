@@ -21,7 +21,7 @@ from handcal.session.session import Session
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
 from handcal_gui.app.translation import tr
-from handcal_gui.calibrate.control.commands import COMMANDS, calibrating, connect_panels
+from handcal_gui.calibrate.control.commands import COMMANDS, calibrating, connect_panels, skipping
 from handcal_gui.calibrate.control.compare import Comparison
 from handcal_gui.calibrate.control.conditions import Conditions
 from handcal_gui.calibrate.docks import Panel
@@ -189,7 +189,9 @@ class CalibrationController(QObject):
                 # Before the plan can take another step.
                 self._hold_plan(self._wizard_panel.wizard.holds_plan)
                 self._wizard_panel.show_snapshot(self._snapshot)
-            if (command := COMMANDS.get(action)) is not None:
+            is_skip = action is Action.SKIP
+            command = skipping(self._snapshot) if is_skip else COMMANDS.get(action)
+            if command is not None:
                 self._doing = self._submit(action.value, command)
 
     def _nudge(self, right_arcmin: float, down_arcmin: float, size: float) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from handcal.core.types import Eye
-from handcal.session.judged_trials import EyeTrials, eye_trials, is_doubted
+from handcal.session.record import eye_trials
+from handcal.session.trial import EyeTrials, is_doubted
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.guide.view import EYE_WORDS, Precondition

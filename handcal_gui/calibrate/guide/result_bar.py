@@ -11,8 +11,9 @@ from PySide6.QtWidgets import QWidget
 from handcal.core.types import Eye
 from handcal.register.results import Results
 from handcal.register.verdict import VerdictSettings
-from handcal.session.judged_trials import EyeTrials, eye_trials
+from handcal.session.record import eye_trials
 from handcal.session.session import SessionRecord
+from handcal.session.trial import EyeTrials
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
 from handcal_gui.app.theme import SPACING_PX

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
 from handcal.core.types import EYES, Eye, phi_text
 from handcal.register.results import USED, Results
-from handcal.session.judged_trials import EyeTrials
+from handcal.session.trial import EyeTrials
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import paragraph

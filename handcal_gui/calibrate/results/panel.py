@@ -10,9 +10,8 @@ from PySide6.QtWidgets import QComboBox, QLabel, QStackedLayout, QStackedWidget,
 
 from handcal.core.types import EYES, Alignment, Eye
 from handcal.register.results import Results
-from handcal.session.judged_trials import EyeTrials, eye_trials
-from handcal.session.record import SessionRecord
-from handcal.session.trial import Trial
+from handcal.session.record import SessionRecord, eye_trials
+from handcal.session.trial import EyeTrials, Trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
 from handcal_gui.app.theme import SPACING_PX

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
 from handcal.core.types import Eye
 from handcal.register.results import Results
-from handcal.session.judged_trials import EyeTrials
+from handcal.session.trial import EyeTrials
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, scale_font
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.layouts import vbox

@@ -9,7 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
 from handcal.calibration.hands import PlacedHand
-from handcal.calibration.states import Observation, State
+from handcal.calibration.sight import Observation
+from handcal.calibration.states import State
 from handcal.core.types import Float64
 from handcal.register.guard import turn_advice
 from handcal.session.record import SessionRecord

@@ -12,9 +12,13 @@ from handcal.core.errors import FileError
 from handcal.core.types import Eye
 from handcal.io.files import modified_s
 from handcal.session.journal import find_journals
-from handcal.session.library import EyeOutcome, eye_outcomes
+from handcal.session.library import (
+    EyeOutcome,
+    UnfinishedSession,
+    eye_outcomes,
+    unfinished_and_repaired,
+)
 from handcal.session.record import replay
-from handcal.session.unfinished import UnfinishedSession, unfinished_and_repaired
 from handcal_gui.app.preferences import MOST_RECENT
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.numbers import pluralize

@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from handcal.session.comparison import Answer, Place
+from handcal.session.trial import Answer, Place
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import button, one_of, paragraph, stand_out_while_checked

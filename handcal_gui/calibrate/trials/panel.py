@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
 from handcal.calibration.states import State
 from handcal.core.display import TARGET_DEPTHS_M
 from handcal.core.types import EYES, Eye, Float64
-from handcal.session.comparison import read_comparisons
 from handcal.session.session import SessionRecord
+from handcal.session.trial import read_comparisons
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.keys import add_action
 from handcal_gui.app.theme import SPACING_PX

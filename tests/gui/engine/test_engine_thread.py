@@ -22,7 +22,7 @@ from handcal.bridge.bridges import BridgeSettings
 from handcal.calibration.states import ProcedureError
 from handcal.core.errors import FileError
 from handcal.io.closable import Closable
-from handcal.session.facts import SessionFacts
+from handcal.session.state import SessionFacts
 from handcal.station.station import Station
 from handcal_gui.engine.engine_thread import EngineThread
 

@@ -16,7 +16,7 @@ from pytestqt.qtbot import QtBot
 from handcal.core.errors import CameraError
 from handcal.core.progress import Progress
 from handcal.link.pairing import Pairings
-from handcal.station.user_test.cube_tracking import (
+from handcal.station.user_test.cube import (
     CubeSight,
     CubeTracking,
     TrackingOrder,

@@ -22,7 +22,7 @@ from handcal.core.types import Float64
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.session.trial import Trial
-from handcal.station.user_test.cube_trials import StudyLeader, TrialOrder
+from handcal.station.user_test.cube import StudyLeader, TrialOrder
 from handcal_gui.evaluate.entries import UserEntries
 from handcal_gui.evaluate.trials_dialog import STEP_M, TrialsDialog
 from tests.gui.helpers import letters

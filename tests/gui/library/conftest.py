@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QComboBox, QInputDialog, QPushButton, QTableView
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Alignment
+from handcal.register.results import RESULTS_VERSION
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal_gui.library.window import LibraryWindow
@@ -26,7 +27,7 @@ def results(verdict: str, expected: float, measured: float | None = None) -> dic
     one: dict[str, Any] = {"verdict": verdict, "benefit": benefit}
     if measured is not None:
         one["measured_arcmin"] = [2.0 * measured, measured]
-    return {"version": 2, "eyes": {"left": one, "right": one}}
+    return {"version": RESULTS_VERSION, "eyes": {"left": one, "right": one}}
 
 
 @pytest.fixture

@@ -18,10 +18,10 @@ from pytestqt.qtbot import QtBot
 
 from handcal.core.types import EYES
 from handcal.rig.example import example_rig
-from handcal.session.judged_trials import EyeTrials
 from handcal.session.library import EyeOutcome, LibraryEntry, delete_session, read_library
 from handcal.session.repair import repair_session
 from handcal.session.session import Session
+from handcal.session.trial import EyeTrials
 from handcal_gui.app.theme import SPACING_PX, number_font
 from handcal_gui.library.sessions_model import (
     COLUMNS,

@@ -9,9 +9,8 @@ import pytest
 from handcal.core.types import EYES, Alignment, Eye, EyeDistance, EyeShift, Float64, Rig, Verdict
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
-from handcal.session.judged_trials import EyeTrials, eye_trials
-from handcal.session.record import SessionRecord
-from handcal.session.trial import Trial, make_trial
+from handcal.session.record import SessionRecord, eye_trials
+from handcal.session.trial import EyeTrials, Trial, make_trial
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,

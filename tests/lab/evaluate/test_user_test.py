@@ -26,10 +26,9 @@ from handcal.report.cells import median_quartiles
 from handcal.report.document import Table
 from handcal.report.statistics import mean_interval
 from handcal.rig.example import example_rig
-from handcal.session.comparison import COMPARED, Answer, Comparison, Drawing, comparison_json
 from handcal.session.journal import Event
 from handcal.session.session import Session, SessionRecord
-from handcal.session.trial import make_trial
+from handcal.session.trial import COMPARED, Answer, Comparison, Drawing, comparison_json, make_trial
 
 RIG = example_rig()
 

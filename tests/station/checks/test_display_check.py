@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from handcal.calibration.evidence import Evidence
+from handcal.calibration.sight import Evidence
 from handcal.core.errors import CancelledError, HandcalError
 from handcal.core.progress import Progress
 from handcal.core.types import DisplayCheck, Eye, HeadsetIdentity

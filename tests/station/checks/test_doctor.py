@@ -7,7 +7,6 @@ import importlib.util
 import shutil
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,10 +14,7 @@ import pytest
 
 from handcal.camera.sdk_devices import Device, explain_absence
 from handcal.core.errors import CameraError, FileError, LinkError
-from handcal.core.types import CameraIdentity
 from handcal.link.pairing import KEY_VARIABLE
-from handcal.rig.example import example_rig
-from handcal.rig.rig_file import write_rig
 from handcal.station.checks import doctor
 from handcal.station.checks.doctor import Finding, Health, examine
 
@@ -67,37 +63,12 @@ def test_a_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("system", "advice"),
-    [
-        ({"platform": "linux", "frozen": True}, "install the Debian package of handcal again"),
-        ({"platform": "win32"}, "run handcal's installer again, or pip install handcal"),
-        ({"platform": "darwin"}, "pip install handcal"),
-    ],
-)
-def test_advice_for_a_damaged_installation_is_that_of_the_platform(
-    system: dict[str, object], advice: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(doctor, "sys", SimpleNamespace(version_info=(3, 13), **system))
-    monkeypatch.setattr(doctor, "read_rig", fail_with(FileError("rig.yaml is damaged")))
-    assert of("Example rig").advice == advice
-
-
 def test_a_clock_as_that_of_windows_before_python_3_13(monkeypatch: pytest.MonkeyPatch) -> None:
     assert of("Clock").health is Health.GOOD
     clock = SimpleNamespace(resolution=0.015625)
     monkeypatch.setattr(time, "get_clock_info", lambda _: clock)
     assert "15.6 ms" in of("Clock").found
     assert "3.13" in of("Clock").advice
-
-
-def test_on_windows_the_network_and_the_camera_have_advice_of_their_own(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(doctor, "sys", SimpleNamespace(version_info=(3, 13), platform="win32"))
-    monkeypatch.setattr(doctor, "UdpTransport", fail_with(LinkError("blocked")))
-    assert "Windows Security" in of("Network").advice
-    assert "Privacy" in of("Camera").advice
 
 
 def test_a_missing_hand_detector_leaves_the_depth(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,22 +127,6 @@ def test_the_camera(
     monkeypatch.setattr(doctor, "explain_absence", lambda: explain_absence(Path("nowhere")))
     assert found in of("Camera").found
     assert of("Camera").health is health
-
-
-def test_another_camera_than_the_rig_s_is_reported(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    d415, path = Device("D415", "123", "5.16", "3.2"), tmp_path / "rig.yaml"
-    monkeypatch.setattr(doctor, "devices_by_child", lambda: [d415])
-    write_rig(path, replace(example_rig(), depth_camera=d415.identity))
-    assert of("Camera", path).health is Health.GOOD
-    write_rig(path, replace(example_rig(), depth_camera=CameraIdentity("D435", "456")))
-    assert of("Camera", path).health is Health.LIMITED
-    assert "another model: D415, not D435; another serial number" in of("Camera", path).found
-    assert of("Rig file", path).health is Health.GOOD
-    path.write_text("")
-    assert of("Rig file", path).health is Health.BROKEN
-    assert of("Camera", path).health is Health.GOOD
 
 
 def test_a_missing_camera_sdk(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,14 +34,8 @@ from handcal.sim.room import make_room
 from handcal.sim.scene import SceneState
 from handcal.station.checks import doctor
 from handcal.station.checks.doctor import Health, examine_headset
-from handcal.station.checks.headset import (
-    PoseDelay,
-    find_pose_delay,
-    headset_problem,
-    headset_state,
-    link_problem,
-    run_pose_delay,
-)
+from handcal.station.checks.headset import headset_problem, headset_state, link_problem
+from handcal.station.poses import find_pose_delay, run_pose_delay
 
 KEY = b"a pairing key of the tests"
 RIG = example_rig()
@@ -161,12 +155,6 @@ def test_a_head_at_rest_or_a_hand_not_seen_tells_nothing() -> None:
     assert find_pose_delay(still, unknown, RIG.T_H_D) is None
 
 
-def test_a_delay_is_in_milliseconds() -> None:
-    text = "poses are for 30 ± 1 ms {} than their stamps say"
-    assert str(PoseDelay(0.03, 0.001)) == text.format("later")
-    assert str(PoseDelay(-0.03, 0.001)) == text.format("earlier")
-
-
 LATENCY_S = 0.03
 POSE_NS = 1_000_000_000 // 60
 FRAMES = 50
@@ -221,7 +209,7 @@ def turning_head(delay_s: float) -> Iterator[tuple[HeadsetServer, PunctualCamera
 def pass_by_frames(patch: pytest.MonkeyPatch, camera: PunctualCamera, duration_s: float) -> None:
     """Let a duration pass in `FRAMES` frames: a busy machine gives few in a second."""
     clock = SimpleNamespace(monotonic=lambda: camera.frames * duration_s / FRAMES)
-    patch.setattr("handcal.station.checks.headset.time", clock)
+    patch.setattr("handcal.station.poses.time", clock)
 
 
 @pytest.mark.process

@@ -161,18 +161,6 @@ def test_a_hololens_needs_its_address_and_others_their_libraries(
     assert find("camera", plugged_in).found == "RealSense on the HoloLens 2 at hl, not tried yet"
 
 
-def test_a_recording_without_the_sdk_is_named(
-    settings: StationSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pyrealsense2", None)
-    path = tmp_path / "hand.db3"
-    path.touch()
-    finding = find("camera", replace(settings, source="recording", recording=str(path)))
-    assert finding.health is Health.BROKEN
-    assert "no package exists for macOS" in finding.found
-    assert "simulator" in finding.advice
-
-
 def test_a_recording_must_be_there(settings: StationSettings, tmp_path: Path) -> None:
     played = replace(settings, source="recording")
     assert find("camera", played).found == "no recording is chosen"

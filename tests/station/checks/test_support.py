@@ -38,8 +38,9 @@ def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SupportSettings
     (folder / "pairing.key").write_text("a secret of the tests")
     with Session.create(tmp_path / "sessions", example_rig(), {}, wearer=WEARERS[1]) as one:
         one.correct_wearer("P-08")  # the log may hold either name
-    Session.create(tmp_path / "sessions", example_rig(), {}, wearer=WEARERS[0]).close()
-    return SupportSettings(folder, tmp_path / "sessions", names=(WEARERS[2],))
+    for wearer in (WEARERS[0], WEARERS[2]):
+        Session.create(tmp_path / "sessions", example_rig(), {}, wearer=wearer).close()
+    return SupportSettings(folder, tmp_path / "sessions")
 
 
 def contents(path: Path) -> dict[str, str]:

@@ -21,11 +21,13 @@ from handcal.sim.hand import make_hand
 from handcal.sim.overlay import overlay_by_eye
 from handcal.sim.wearer import draw_eyes, draw_placement_error
 from handcal.sim.wearer_settings import WearerSettings
-from handcal.station.user_test import cube_trials as user_test
-from handcal.station.user_test.cube_tracking import CubeTracker, run_cube_tracking
-from handcal.station.user_test.cube_trials import (
+from handcal.station.user_test import cube as user_test
+from handcal.station.user_test.cube import (
+    CubeTracker,
+    StudyLeader,
     TrialSettings,
     calibrated_shifts_m,
+    run_cube_tracking,
     run_user_trials,
 )
 from tests.helpers import ROOT
@@ -90,11 +92,13 @@ def test_the_tracked_cube_is_drawn_where_it_is(
 
 
 def test_the_trials_measure_the_true_error(
-    session: Session, bench: tuple[HeadsetServer, HeadsetClient, CubeBench]
+    session: Session,
+    bench: tuple[HeadsetServer, HeadsetClient, CubeBench],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     server, client, room = bench
     before = len(Session.open(session.path).trials)
-    settings = TrialSettings(depths_m=(0.4, 0.6))
+    monkeypatch.setattr(user_test, "TARGET_DEPTHS_M", (0.4, 0.6))
     prompts: list[tuple[str, tuple[Eye, ...]]] = []
 
     def adjust(eye: Eye, shift_m: Float64, draw: Callable[[Float64], None]) -> Float64:
@@ -103,7 +107,7 @@ def test_the_trials_measure_the_true_error(
         return room.adjust(eye, shift_m, draw)
 
     made = run_user_trials(
-        session, server, tracker(session, server, room), adjust, room.place, settings
+        session, server, tracker(session, server, room), StudyLeader(room.place, adjust)
     )
     assert [eyes for _, eyes in prompts] == [("left",), ("right",)] * 2
     assert prompts[0][0].startswith("Close your right eye. Say where")
@@ -127,17 +131,19 @@ def test_a_cube_elsewhere_and_an_unsolved_session_are_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     server, _, room = bench
-    impatient = TrialSettings(depths_m=(0.6,), patience_s=0.5)
+    monkeypatch.setattr(user_test, "TARGET_DEPTHS_M", (0.6,))
+    impatient = TrialSettings(patience_s=0.5)
     cube = tracker(session, server, room)
     monkeypatch.setattr(cube, "step", lambda: TrackedCube(0, room.T_W_T, True, 9))
+    elsewhere = StudyLeader(lambda _: room.place(0.45), room.adjust)
     with pytest.raises(HandcalError, match=r"0\.\d+ m from the eyes; put it down there"):
-        run_user_trials(session, server, cube, room.adjust, lambda _: room.place(0.45), impatient)
+        run_user_trials(session, server, cube, elsewhere, impatient)
     rig = Session.open(session.path).rig
     with (
         Session.create(session.path.parent, rig, {}) as empty,
         pytest.raises(FileError, match="left eye is not solved"),
     ):
-        run_user_trials(empty, server, cube, room.adjust, room.place, impatient)
+        run_user_trials(empty, server, cube, elsewhere, impatient)
 
 
 def test_trials_of_an_eye_that_keeps_the_offline_calibration_judge_that() -> None:
@@ -184,8 +190,7 @@ def test_the_published_procedure_finds_the_true_error(
                     session,
                     server,
                     CubeTracker(room, Cube(), rig.T_H_D, server.pose_at_host_ns),
-                    room.adjust,
-                    room.place,
+                    StudyLeader(room.place, room.adjust),
                     TrialSettings(eyes=("left",)),
                 ):
                     found_px.append(trial.error_px)

@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 from handcal.core.types import EYES, Eye, Verdict, VerdictName, phi_text
 from handcal.register.results import Results
 from handcal.register.verdict import Advice
-from handcal.session.judged_trials import EyeTrials
+from handcal.session.trial import EyeTrials
 from handcal_gui.app.theme import colors
 from handcal_gui.calibrate.parts.result_card import ResultCard, eye_results, result_text
 from tests.gui.helpers import show, text

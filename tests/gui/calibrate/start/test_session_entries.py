@@ -9,6 +9,7 @@ from pathlib import Path
 
 from handcal.core.types import Alignment
 from handcal.io.lock import FileLock
+from handcal.register.results import RESULTS_VERSION
 from handcal.rig.example import example_rig
 from handcal.session.library import EyeOutcome
 from handcal.session.repair import repair_session
@@ -144,11 +145,13 @@ def test_a_recent_session_shows_its_results_unless_they_are_damaged(
     path = make(tmp_path, "Ada", [alignment], is_done=False)
     left = {"verdict": "accept", "benefit": {"without_arcmin": 20.0, "after_arcmin": 3.0}}
     with Session(path) as session:
-        session.save_results({"version": 2, "eyes": {"left": left, "right": "damaged"}})
+        session.save_results(
+            {"version": RESULTS_VERSION, "eyes": {"left": left, "right": "damaged"}}
+        )
     (entry,) = find_sessions(tmp_path, [path]).recent
     assert entry.eyes == {"left": EyeOutcome("accept", 20.0, 3.0, None)}
     with Session(path) as session:
-        session.save_results({"version": 2, "eyes": ["damaged"]})
+        session.save_results({"version": RESULTS_VERSION, "eyes": ["damaged"]})
     (entry,) = find_sessions(tmp_path, [path]).recent
     assert entry.eyes == {}
 

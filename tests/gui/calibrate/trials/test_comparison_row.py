@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
-from handcal.session.comparison import COMPARED
 from handcal.session.journal import Event
+from handcal.session.trial import COMPARED
 from handcal.station.snapshot import Snapshot
 from handcal_gui.calibrate.trials.comparison_row import ComparisonRow
 from handcal_gui.calibrate.trials.panel import TrialsPanel

@@ -287,7 +287,7 @@ def test_keys_move_the_outline_the_way_they_point_and_only_while_it_is_verified(
         press(window, key)
     assert moved == []
     zero = (0.0, 0.0, 0.0)
-    still = VerifyingView("left", NudgeSum(), zero, zero, can_undo=False, can_redo=False)
+    still = VerifyingView("left", NudgeSum(), zero, zero, can_undo=False)
     guide.show_snapshot(snapshot(State.VERIFY, procedure={"verifying": still}))
     for key in (*keys, Qt.Key.Key_Plus, Qt.Key.Key_Minus):
         press(window, key)

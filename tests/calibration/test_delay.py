@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from handcal.calibration.delay import ASSUMED_SIGMA_S, DelayMeter
 from handcal.calibration.hands import PlacedHand
-from handcal.calibration.timing.delay import DelayMeter, DelaySettings
 from handcal.camera.clock import FrameClock
 from handcal.core.errors import PoseError, PosePendingError
 from handcal.core.geometry import rigid
@@ -57,7 +57,7 @@ class Rehearsal:
     ) -> None:
         self.head, self.latency_s, self.late_s = head, latency_s, late_s
         self.clock = FrameClock(0.03)
-        self.meter = DelayMeter(self.clock, self.pose_at, T_H_D, DelaySettings())
+        self.meter = DelayMeter(self.clock, self.pose_at, T_H_D)
         self.now_ns = START_NS
         self.rng = np.random.default_rng(1)
 
@@ -150,7 +150,7 @@ def test_uncertain_times_move_a_hand_by_the_speeds_of_head_and_hand() -> None:
     rehearsal.now_ns = START_NS + 10**9
     hands = [placed(START_NS + t_ns) for t_ns in (200_000_000, 500_000_000)]
     sigma_m = rehearsal.meter.time_sigma_m(hands, hands[1].t_host_ns + 20_000_000, 0.05)
-    carried_m = DelaySettings().assumed_sigma_s * 0.03 * 0.5
+    carried_m = ASSUMED_SIGMA_S * 0.03 * 0.5
     assert sigma_m == pytest.approx(np.hypot(np.sqrt(2.0) * carried_m, 0.02 * 0.05), rel=0.15)
 
 

@@ -11,7 +11,7 @@ import pytest
 from handcal.core.errors import CameraError, CameraTimeoutError, HandcalError, PoseError
 from handcal.core.geometry import rigid
 from handcal.core.types import LOOK_AROUND, Float64, Frame, Intrinsics
-from handcal.station.camera_pose import find_camera_pose, run_camera_pose
+from handcal.station.poses import find_camera_pose, run_camera_pose
 
 T_H_D: Float64 = rigid([0.3, -0.2, 0.1], [0.02, -0.03, 0.05])
 OTHER_WORLD: Float64 = rigid([0.0, 0.5, 0.0], [1.0, 0.0, 2.0])
@@ -97,12 +97,12 @@ class Scene:
 
 def test_the_wearer_looks_around_and_the_pose_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     scene: Any = Scene()
-    monkeypatch.setattr("handcal.station.camera_pose.time", scene)
+    monkeypatch.setattr("handcal.station.poses.time", scene)
     found = run_camera_pose(scene, scene)
     np.testing.assert_allclose(found.T_H_D, T_H_D, atol=1e-6)
     assert scene.prompts == [LOOK_AROUND, ""]
     mute: Any = Scene(tells=False)
-    monkeypatch.setattr("handcal.station.camera_pose.time", mute)
+    monkeypatch.setattr("handcal.station.poses.time", mute)
     with pytest.raises(CameraError, match="does not report its pose"):
         run_camera_pose(mute, mute)
     assert mute.prompts[-1] == ""
