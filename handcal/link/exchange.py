@@ -17,8 +17,8 @@ from ipaddress import ip_network
 
 from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link.cookies import Cookies
 from handcal.link.fields import MalformedError, read_text
+from handcal.link.greetings import Cookies
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings
 from handcal.link.transport import Address

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import hmac
+import math
+import secrets
 from dataclasses import dataclass
 
 from handcal.link import handcal_pb2 as pb
 from handcal.link import wire
 from handcal.link.fields import MalformedError, read_text
 from handcal.link.pairing import MAX_NAME_CHARACTERS
+from handcal.link.transport import Address
 from handcal.link.wire import NONCE_BYTES, Packet, Welcome
 
 MAX_COOKIE_BYTES = 32
@@ -88,3 +92,27 @@ def read_refused(message: pb.Refused) -> Refusal:
     return Refusal(
         message.reason == pb.REFUSAL_KEY_TAKEN, read_text(message.other, MAX_NAME_CHARACTERS)
     )
+
+
+PERIOD_S = 120.0
+"""A cookie is valid until the end of the period after the one in which it was made."""
+_BYTES = 16
+
+
+class Cookies:
+    """Makes and checks cookies, with a secret of its own."""
+
+    def __init__(self) -> None:
+        self._secret = secrets.token_bytes(32)
+
+    def make(self, device: int, address: Address, now_s: float, age: int = 0) -> bytes:
+        """Return the cookie of the present period, or of the one before with `age` 1."""
+        period = math.floor(now_s / PERIOD_S) - age
+        who = f"{period} {device:016x} {address[1]} {address[0]}".encode()
+        return hmac.digest(self._secret, who, "sha256")[:_BYTES]
+
+    def accept(self, cookie: bytes, device: int, address: Address, now_s: float) -> bool:
+        """Return whether a cookie was made for this device and address a while ago at most."""
+        return bool(cookie) and any(
+            hmac.compare_digest(cookie, self.make(device, address, now_s, age)) for age in (0, 1)
+        )

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass, field
 
 from handcal.link import greetings, messages, wire
-from handcal.link.cookies import PERIOD_S, Cookies
 from handcal.link.exchange import Exchange
+from handcal.link.greetings import PERIOD_S, Cookies
 from handcal.link.pairing import Pairing, Pairings, device_number
 from handcal.link.transport import Address
 from handcal.link.wire import Keys, Packet, Rejection

@@ -16,9 +16,9 @@ from handcal.link import exchange, greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.ask_to_pair import pair_by_code, pair_by_digits
 from handcal.link.client import HeadsetClient
-from handcal.link.cookies import Cookies
 from handcal.link.exchange import MAX_ATTEMPTS, PRIME, VALUE_BYTES, Exchange
 from handcal.link.fields import MalformedError
+from handcal.link.greetings import Cookies
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import OFFER_S, Pairings, new_device_id
 from handcal.link.server import HeadsetServer

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link.cookies import PERIOD_S
 from handcal.link.fields import MalformedError
+from handcal.link.greetings import PERIOD_S
 from handcal.link.handshake import MAX_ANSWERS, Caller, Limiter, Reception
 from handcal.link.pairing import MAX_DEVICES, Pairing, Pairings
 from handcal.link.transport import Address
