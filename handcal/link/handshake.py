@@ -8,10 +8,11 @@ earlier one of its device.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from handcal.link import greetings, messages, wire
-from handcal.link.exchange import Exchange
 from handcal.link.greetings import PERIOD_S, Cookies
 from handcal.link.pairing import Pairing, Pairings, device_number
 from handcal.link.transport import Address
@@ -22,6 +23,9 @@ MAX_ANSWERS = 64
 _MAX_DEVICES = 64
 _MAX_DROPPED = 4096
 _FOREIGN_KEYS_HZ = 20.0
+
+PairingDesk: TypeAlias = Callable[[Packet, bytes, Address, float], bytes | Rejection]
+"""Answers a device whose key is unknown: `Exchange.hear` in `exchange.py`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +78,13 @@ class Reception:
 
     Attributes
     ----------
-    exchange : Exchange or None
+    pairing_desk : callable or None
         Answers those who ask to pair, while an invitation is shown.
     cookies : Cookies
     """
 
     def __init__(self, pairings: Pairings) -> None:
-        self.exchange: Exchange | None = None
+        self.pairing_desk: PairingDesk | None = None
         self._pairings = pairings
         self._heard: dict[int, _Heard] = {}
         self.cookies = Cookies()
@@ -108,10 +112,9 @@ class Reception:
         device = packet.sequence
         found = self._find(device, datagram, now_s)
         if found is None:
-            exchange = self.exchange
-            return (
-                exchange.hear(packet, datagram, address, now_s) if exchange else Rejection.UNPAIRED
-            )
+            if self.pairing_desk is None:
+                return Rejection.UNPAIRED
+            return self.pairing_desk(packet, datagram, address, now_s)
         pairing, keys = found
         hello = greetings.read_hello(messages.parse(packet.payload))
         heard = self._recall(device, now_s)

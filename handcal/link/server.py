@@ -132,6 +132,7 @@ class HeadsetServer(Sender):
         super().__init__(transport, settings)
         self._pairings = pairings
         self._reception = Reception(pairings)
+        self._exchange: Exchange | None = None
         self._session: _Session | None = None
         self._device: HeadsetIdentity | None = None
         self._shown = Owner()
@@ -178,25 +179,25 @@ class HeadsetServer(Sender):
         with self._changed:
             self._require_running()
             self.withdraw()
-            self._reception.exchange = Exchange(
+            self._exchange = Exchange(
                 self._pairings, invitation, self._reception.cookies, time.monotonic()
             )
+            self._reception.pairing_desk = self._exchange.hear
         return invitation
 
     @property
     def pairing_attempts(self) -> PairingAttempts:
         """The attempts to pair by the present invitation."""
         with self._changed:
-            exchange = self._reception.exchange
-            if exchange is None:
+            if self._exchange is None:
                 return PairingAttempts()
-            return PairingAttempts(*exchange.tried, exchange.is_used_up)
+            return PairingAttempts(*self._exchange.tried, self._exchange.is_used_up)
 
     def withdraw(self) -> None:
         """End the invitation, if there is one."""
         with self._changed:
             self._pairings.withdraw()
-            self._reception.exchange = None
+            self._exchange = self._reception.pairing_desk = None
 
     @property
     def clock_step_s(self) -> float:
