@@ -7,7 +7,7 @@ import time
 from contextlib import suppress
 
 from handcal.core.errors import LinkError
-from handcal.link import exchange, greetings, messages, wire
+from handcal.link import exchange, handshake, messages, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.fields import MalformedError
 from handcal.link.invitation import Invitation
@@ -62,7 +62,7 @@ def _pair(
         end_s = time.monotonic() + timeout_s
         while time.monotonic() < end_s:
             asked = exchange.pair(nonce, value, name, cookie, by_code=by_code)
-            transport.send(greetings.seal(exchange.PUBLIC_KEYS.to_pc, device, asked), address)
+            transport.send(handshake.seal(exchange.PUBLIC_KEYS.to_pc, device, asked), address)
             for datagram, sender in transport.receive(_RESEND_S):
                 answer = _read(datagram, device) if sender == address else None
                 if answer is None:

@@ -12,8 +12,8 @@ from types import MappingProxyType
 import numpy as np
 
 from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
-from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link import handshake, messages, nudges, wire
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.fields import MalformedError, read_eyes
@@ -256,13 +256,13 @@ class HeadsetClient(Endpoint):
         match body:
             case "retry":
                 is_first = not self._cookie
-                self._cookie = envelope.retry.cookie[: greetings.MAX_COOKIE_BYTES]
+                self._cookie = envelope.retry.cookie[: handshake.MAX_COOKIE_BYTES]
                 if is_first:  # or a PC that takes no cookie would be asked without a pause
                     self._say_hello()
             case "welcome":
-                self._join(greetings.read_welcome(envelope.welcome))
+                self._join(handshake.read_welcome(envelope.welcome))
             case "refused":
-                self._refusal = str(greetings.read_refused(envelope.refused))
+                self._refusal = str(handshake.read_refused(envelope.refused))
                 self._begin_again()
                 self._next_hello_s = time.monotonic() + _REFUSED_PERIOD_S
         return None
@@ -389,8 +389,8 @@ class HeadsetClient(Endpoint):
 
     def _say_hello(self) -> None:
         self._hello_ns = max(time.time_ns(), self._hello_ns + 1)
-        hello = greetings.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
-        self._post(greetings.seal(self._keys.to_pc, self._device, hello), self._server)
+        hello = handshake.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
+        self._post(handshake.seal(self._keys.to_pc, self._device, hello), self._server)
 
 
 def _own_side(server: Address) -> Address:

@@ -15,10 +15,10 @@ from collections import Counter
 from dataclasses import dataclass
 from ipaddress import ip_network
 
-from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link import handshake, messages, wire
 from handcal.link.fields import MalformedError, read_text
-from handcal.link.greetings import Cookies
+from handcal.link.handshake import Cookies
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings
 from handcal.link.transport import Address
@@ -170,12 +170,12 @@ class Exchange:
         message, device = read_pair(messages.parse(packet.payload)), packet.sequence
         answer = self._answers.get((device, message.nonce))
         if not self._cookies.accept(message.cookie, device, address, now_s):
-            answer = greetings.retry(message.nonce, self._cookies.make(device, address, now_s))
+            answer = handshake.retry(message.nonce, self._cookies.make(device, address, now_s))
         elif answer is None and not self._tallies[message.by_code].allows(address):
-            answer = greetings.refused_code(message.nonce)
+            answer = handshake.refused_code(message.nonce)
         elif answer is None:
             answer = self._answers[device, message.nonce] = self._answer(device, message, now_s)
-        return greetings.seal(PUBLIC_KEYS.to_headset, device, answer)
+        return handshake.seal(PUBLIC_KEYS.to_headset, device, answer)
 
     def _answer(self, device: int, message: pb.Pair, now_s: float) -> pb.Envelope:
         secret = new_secret()
@@ -220,7 +220,7 @@ def read_pair(envelope: pb.Envelope) -> pb.Pair:
     if (
         envelope.WhichOneof("body") != "pair"
         or len(message.nonce) != NONCE_BYTES
-        or len(message.cookie) > greetings.MAX_COOKIE_BYTES
+        or len(message.cookie) > handshake.MAX_COOKIE_BYTES
     ):
         raise MalformedError("a pairing begins with a nonce")
     _read_value(message.public_value)

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 
 from handcal.core.errors import FileError, PosePendingError
 from handcal.core.types import Float64, HeadsetIdentity
-from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link import handshake, messages, nudges, wire
 from handcal.link.clock import ClockEstimator
 from handcal.link.endpoint import Channel
 from handcal.link.exchange import Exchange, new_digits
 from handcal.link.fields import MalformedError
-from handcal.link.greetings import Refusal
-from handcal.link.handshake import Caller, Reception
+from handcal.link.handshake import Caller, Reception, Refusal
 from handcal.link.invitation import Invitation, new_code
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum
@@ -317,7 +316,7 @@ class HeadsetServer(Sender):
         if isinstance(heard, Rejection):
             return heard
         if isinstance(heard, Caller):
-            heard = greetings.seal(
+            heard = handshake.seal(
                 heard.keys.to_headset, packet.sequence, self._meet(heard, address)
             )
         self._post(heard, address)
@@ -330,19 +329,19 @@ class HeadsetServer(Sender):
         if owner_id not in ("", caller.device_id):
             owner = caller.pairing.name or "another headset"
             self._tell(f"headset {name} asks to connect with the pairing key of {owner}")
-            return greetings.refused(caller.nonce, Refusal(is_key_taken=True, other=owner))
+            return handshake.refused(caller.nonce, Refusal(is_key_taken=True, other=owner))
         channel, session = self._channel, self._session
         if channel is not None and session is not None:
             is_same = session.caller.device_id == caller.device_id
             if is_same and session.caller.nonce == caller.nonce and channel.address == address:
-                return greetings.welcome(session.welcome)  # the first one was lost
+                return handshake.welcome(session.welcome)  # the first one was lost
             # A device whose app has been restarted is silent in its old session.
             patience_s = _RESTART_S if is_same else self._settings.silence_s
             if time.monotonic() - channel.heard_s <= patience_s:
                 holder = session.caller.name or session.caller.device_id
                 self._tell(f"headset {name} asks to connect; {holder} is connected")
-                return greetings.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
-        return greetings.welcome(self._open(caller, address))
+                return handshake.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
+        return handshake.welcome(self._open(caller, address))
 
     def _open(self, caller: Caller, address: Address) -> Welcome:
         if not caller.pairing.device_id:

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from handcal.core.errors import LinkError
 from handcal.core.types import HeadsetIdentity
-from handcal.link import exchange, greetings, messages, wire
+from handcal.link import exchange, handshake, messages, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.ask_to_pair import pair_by_code, pair_by_digits
 from handcal.link.client import HeadsetClient
 from handcal.link.exchange import MAX_ATTEMPTS, PRIME, VALUE_BYTES, Exchange
 from handcal.link.fields import MalformedError
-from handcal.link.greetings import Cookies
+from handcal.link.handshake import Cookies
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import OFFER_S, Pairings, new_device_id
 from handcal.link.server import HeadsetServer
@@ -87,7 +87,7 @@ def request(
     code = INVITATION.code if by_code else DIGITS
     value = value if value is not None else exchange.public_value(code, 7, nonce, 9)
     pair = exchange.pair(nonce, value, name, cookie, by_code=by_code)
-    return greetings.seal(exchange.PUBLIC_KEYS.to_pc, 7, pair)
+    return handshake.seal(exchange.PUBLIC_KEYS.to_pc, 7, pair)
 
 
 def hear(
@@ -166,7 +166,7 @@ def test_one_host_cannot_use_up_the_attempts_of_all() -> None:
 def test_the_pc_answers_for_a_while() -> None:
     pc = new_exchange()
     assert hear(pc, request(), OFFER_S + 1.0) is Rejection.UNPAIRED
-    hello = greetings.seal(b"another key", 7, greetings.hello(NONCE, 1, b"", ""))
+    hello = handshake.seal(b"another key", 7, handshake.hello(NONCE, 1, b"", ""))
     assert hear(pc, hello) is Rejection.UNPAIRED
 
 
@@ -179,7 +179,7 @@ def test_nonsense_costs_no_attempt() -> None:
         request(value=b""),
         request(name="two\nlines"),
         request(cookie=bytes(33)),
-        greetings.seal(exchange.PUBLIC_KEYS.to_pc, 7, pb.Envelope(bye=pb.Bye())),
+        handshake.seal(exchange.PUBLIC_KEYS.to_pc, 7, pb.Envelope(bye=pb.Bye())),
     ]
     for datagram in wrong * 3:
         with pytest.raises(MalformedError):

@@ -9,8 +9,8 @@ from hypothesis.extra.numpy import arrays
 
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Float64, HeadsetIdentity, HeadsetView, Projection
-from handcal.link import greetings, messages
 from handcal.link import handcal_pb2 as pb
+from handcal.link import handshake, messages
 from handcal.link.fields import MalformedError
 from handcal.link.reliable import Receipt
 from handcal.link.shapes import Shape, Target
@@ -143,10 +143,10 @@ def read_device(message: pb.Device) -> object:
         (read_device, pb.Device(eye_distance_m=np.nan)),
         (read_device, pb.Device(views=[pb.View()] * 3)),
         (read_device, pb.Device(views=[pb.View(eye=pb.EYE_LEFT, T_V_H=rotated(1.0))])),
-        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(15)))),
-        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(16), cookie=bytes(33)))),
-        (greetings.read_hello, pb.Envelope(bye=pb.Bye())),
-        (greetings.read_welcome, pb.Welcome(nonce=bytes(16), session=1)),
+        (handshake.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(15)))),
+        (handshake.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(16), cookie=bytes(33)))),
+        (handshake.read_hello, pb.Envelope(bye=pb.Bye())),
+        (handshake.read_welcome, pb.Welcome(nonce=bytes(16), session=1)),
     ],
 )
 def test_nonsense_is_malformed(read: Callable[[Any], object], message: object) -> None:
