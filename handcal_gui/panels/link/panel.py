@@ -7,8 +7,7 @@ from collections import deque
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QWidget
 
-from handcal.link.rates import link_rates
-from handcal.link.statistics import LinkStatistics
+from handcal.link.statistics import LinkStatistics, link_rates
 from handcal.station.snapshot import Snapshot
 from handcal_gui.panels.link.link_history import LinkHistory
 from handcal_gui.panels.link.link_table import RATES_S, LinkTable
