@@ -14,9 +14,15 @@ from handcal.core.errors import LinkError
 from handcal.core.types import HeadsetIdentity
 from handcal.link import exchange, handshake, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link.ask_to_pair import pair_by_code, pair_by_digits
 from handcal.link.client import HeadsetClient
-from handcal.link.exchange import MAX_ATTEMPTS, PRIME, VALUE_BYTES, Exchange
+from handcal.link.exchange import (
+    MAX_ATTEMPTS,
+    PRIME,
+    VALUE_BYTES,
+    Exchange,
+    pair_by_code,
+    pair_by_digits,
+)
 from handcal.link.fields import MalformedError
 from handcal.link.handshake import Cookies
 from handcal.link.invitation import Invitation

@@ -8,8 +8,8 @@ from handcal.core.errors import CancelledError, LinkError
 from handcal.core.progress import Progress
 from handcal.core.types import HeadsetIdentity
 from handcal.link import inviting
-from handcal.link.ask_to_pair import pair_by_code, pair_by_digits
 from handcal.link.client import HeadsetClient
+from handcal.link.exchange import pair_by_code, pair_by_digits
 from handcal.link.invitation import Invitation
 from handcal.link.inviting import run_pairing
 from handcal.link.pairing import Pairing, Pairings
