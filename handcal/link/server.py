@@ -12,7 +12,6 @@ from handcal.core.errors import FileError, PosePendingError
 from handcal.core.types import Float64, HeadsetIdentity
 from handcal.link import handcal_pb2 as pb
 from handcal.link import handshake, messages, nudges, wire
-from handcal.link.clock import ClockEstimator
 from handcal.link.endpoint import Channel
 from handcal.link.exchange import Exchange, new_digits
 from handcal.link.fields import MalformedError
@@ -21,7 +20,7 @@ from handcal.link.invitation import Invitation, new_code
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum
 from handcal.link.pairing import Pairing, Pairings
-from handcal.link.poses import PoseBuffer
+from handcal.link.poses import ClockEstimator, PoseBuffer
 from handcal.link.sender import Sender
 from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.statistics import LinkStatistics

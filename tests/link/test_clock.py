@@ -3,7 +3,7 @@ import random
 import pytest
 
 from handcal.core.errors import PosePendingError
-from handcal.link.clock import MIN_SAMPLES, ClockEstimator
+from handcal.link.poses import MIN_SAMPLES, ClockEstimator
 
 MS = 1_000_000
 START_NS = 5_000_000_000_000
