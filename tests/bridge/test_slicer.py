@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.bridge.bridge import Bridge
+from handcal.bridge.bridges import Bridge
 from handcal.bridge.slicer import MAX_POINTS, SlicerOutput
 from handcal.cli.main import main
 from handcal.core.conventions import slicer_points_mm, slicer_transform
