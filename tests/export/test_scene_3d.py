@@ -7,8 +7,7 @@ import pytest
 
 from handcal.core.geometry import invert, project, transform
 from handcal.export.outcome import SessionOutcome, load_outcome
-from handcal.export.scene_3d import make_scenes
-from handcal.export.window_3d import residual_colors
+from handcal.export.window_3d import make_scenes, residual_colors
 from handcal.io.resources import resource_path
 from handcal.session.session import Session, SessionRecord
 
