@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from handcal.core.geometry import transform
-from handcal.export.figure_rows import (
+from handcal.export.figures import CELL_MM, overlay_outlines, residual_cells
+from handcal.export.outcome import SessionOutcome
+from handcal.export.report import (
     convergence_rows,
     distance_rows,
     overlay_rows,
     residual_rows,
     running_mean_rows,
+    session_report,
 )
-from handcal.export.figures import CELL_MM, overlay_outlines, residual_cells
-from handcal.export.outcome import SessionOutcome
-from handcal.export.report import session_report
 from handcal.report.document import Table
 
 
