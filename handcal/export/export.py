@@ -10,14 +10,19 @@ from pathlib import Path
 
 from handcal.core.progress import Progress
 from handcal.export.archive import write_archive
-from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.clouds import write_clouds
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.export.north_star import write_northstar
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.staging import Staging
 from handcal.export.tables import write_comparisons, write_parameters, write_trials
-from handcal.export.tools import write_openxr, write_slicer, write_unity
+from handcal.export.tools import (
+    write_calibration_json,
+    write_calibration_yaml,
+    write_openxr,
+    write_slicer,
+    write_unity,
+)
 from handcal.session.session import SessionRecord
 
 _ALL = {**FORMATS, **TOOL_FORMATS}

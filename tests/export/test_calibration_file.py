@@ -12,8 +12,8 @@ import pytest
 
 from handcal.core.conventions import opengl_projection, openxr_view, unity_camera
 from handcal.core.types import EYES, Eye, Rig
-from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
+from handcal.export.tools import write_calibration_json, write_calibration_yaml
 from handcal.session.session import SessionRecord
 
 
