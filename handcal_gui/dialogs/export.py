@@ -10,8 +10,7 @@ from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings
-from handcal.export.many import Exported
+from handcal.export.export import Exported, ExportSettings
 from handcal_gui.dialogs.export_choices import ExportChoices
 from handcal_gui.dialogs.export_progress import ExportProgress
 from handcal_gui.engine.jobs import Job

@@ -11,8 +11,7 @@ import pytest
 
 from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
-from handcal.export import archive
-from handcal.export.archive import write_archive
+from handcal.export.export import write_archive
 from handcal.session.session import Session, SessionRecord
 
 

@@ -9,8 +9,7 @@ import pytest
 
 from handcal.core.errors import CancelledError
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings
-from handcal.export.many import export_sessions
+from handcal.export.export import ExportSettings, export_sessions
 from handcal.io.resources import resource_path
 
 SETTINGS = ExportSettings(("csv", "yaml"))

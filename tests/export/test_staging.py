@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from handcal.core.errors import FileError
-from handcal.export.staging import Staging
+from handcal.export.export import Staging
 
 
 def tree(folder: Path) -> dict[str, str]:
@@ -155,7 +155,7 @@ def test_a_link_in_place_of_a_file_is_replaced_and_put_back_as_a_link(
     mine.write_text("mine")
     out.mkdir()
     (out / "x").symlink_to(mine)
-    monkeypatch.setattr("handcal.export.staging.sync_folder", Path.rmdir)
+    monkeypatch.setattr("handcal.export.export.sync_folder", Path.rmdir)
     with Staging(out) as staging:
         write(staging, x="new")
         with pytest.raises(FileError, match="cannot write"):
