@@ -22,7 +22,6 @@ from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import device_number
 from handcal.link.reliable import Outgoing
-from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import Packet, Rejection, Slot
@@ -30,6 +29,8 @@ from handcal.link.wire import Packet, Rejection, Slot
 MAX_WEARERS = 16
 _POSES_PER_DATAGRAM = 3
 _REFUSED_PERIOD_S = 1.0
+_HELLO_PERIOD_S = 0.1
+"""Time between two hellos, or two signs of life."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +90,6 @@ class HeadsetClient(Endpoint):
         The headset's own; its `device_id` has 16 hexadecimal digits, and belongs to this device.
     clock_ns : callable
         The headset's clock, ns.
-    settings : LinkSettings
     impairment : Impairment
         Impairments of the datagrams in both directions.
 
@@ -107,7 +107,6 @@ class HeadsetClient(Endpoint):
         pairing_key: bytes,
         identity: HeadsetIdentity,
         clock_ns: Callable[[], int] = time.monotonic_ns,
-        settings: LinkSettings = DEFAULT_SETTINGS,
         impairment: Impairment = UNIMPAIRED,
     ) -> None:
         if len(pairing_key) < wire.MIN_PAIRING_KEY_BYTES:
@@ -117,8 +116,8 @@ class HeadsetClient(Endpoint):
         self._pairing_key = pairing_key
         self._keys = wire.handshake_keys(pairing_key, self._device)
         self._server = resolve(*server)
-        transport = UdpTransport(_own_side(self._server), settings.receive_buffer_bytes)
-        super().__init__(ImpairedTransport(transport, impairment), settings)
+        transport = UdpTransport(_own_side(self._server))
+        super().__init__(ImpairedTransport(transport, impairment))
         self._identity = identity
         self._clock_ns = clock_ns
         self._recent_poses: deque[tuple[int, Float64]] = deque(maxlen=_POSES_PER_DATAGRAM)
@@ -379,7 +378,7 @@ class HeadsetClient(Endpoint):
     def _tick(self, now_s: float) -> None:
         if now_s < self._next_hello_s:
             return
-        self._next_hello_s = now_s + self._settings.hello_period_s
+        self._next_hello_s = now_s + _HELLO_PERIOD_S
         if self._channel is not None and self._is_silent(self._channel):
             self._channel = None
         if self._channel is None:

@@ -24,7 +24,6 @@ from handcal.link.fields import MalformedError, read_text
 from handcal.link.handshake import Cookies
 from handcal.link.invitation import Invitation
 from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings, device_number
-from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import NONCE_BYTES, Packet, Rejection
 
@@ -290,7 +289,7 @@ def _pair(
     value = exchange.public_value(code, device, nonce, secret)
     cookie = b""
     address = resolve(*server)
-    transport = UdpTransport(local_address(address), DEFAULT_SETTINGS.receive_buffer_bytes)
+    transport = UdpTransport(local_address(address))
     try:
         end_s = time.monotonic() + timeout_s
         while time.monotonic() < end_s:

@@ -7,16 +7,17 @@ import math
 import secrets
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from handcal.core.errors import FileError, PosePendingError
 from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
+from handcal.link import endpoint, handshake, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link import handshake, messages, nudges, wire
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.exchange import Exchange, new_digits
@@ -28,22 +29,188 @@ from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.poses import ClockEstimator, PoseBuffer
 from handcal.link.reliable import Outgoing
-from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.shapes import Shape, Target
 from handcal.link.statistics import LinkStatistics
-from handcal.link.transport import Address, Transport, UdpTransport, reachable_address
+from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import Packet, Rejection, Slot, Welcome
 
+LOOPBACK: Address = ("127.0.0.1", 0)
+_LOG = logging.getLogger(__name__)
+_MAX_CONFIRMATIONS = 64
+_Stamped = TypeVar("_Stamped", pb.Confirm, pb.Nudge)
+_LIVE_POINTS = 3000
+"""Most points of a live hand in one frame; enough for a closed surface."""
+_PING_PERIOD_S = 0.1
+_NOTICE_S = 5.0
+_RESTART_S = 0.5
+_REFRESH_S = 1.0
+_AHEAD_NS = 1_000_000_000
+"""A pose further ahead of the headset's own clock than this is for no image that will be drawn."""
+_AROUND_STEP_NS = 2_000_000_000
+"""After a step of the headset's clock: until the clock is known again, and old stamps are gone."""
 
-class Sender(Endpoint):
-    """The part of the PC's end that sends what the headset shows."""
 
-    def __init__(self, transport: Transport, settings: LinkSettings) -> None:
-        super().__init__(transport, settings)
+@dataclass(frozen=True, slots=True, eq=False)
+class Confirmation:
+    """The wearer's confirmation that the hand covers the cursor."""
+
+    t_headset_ns: int
+    t_host_ns: int
+    """t_b on the headset's clock, and on the host's monotonic clock."""
+    cursor_id: int
+    problem: str = ""
+    """Difference between what the headset drew and what it was sent; empty if there is none."""
+    is_timed: bool = True
+    """False if the headset's clock was set around this time, so that the times mean nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nudge:
+    """The wearer's total movement of what an eye draws since the verification began."""
+
+    verify_id: int
+    moved: NudgeSum
+    fits: bool
+    """True if the wearer says that the drawing covers the hand."""
+    t_host_ns: int
+    """Time of the last press of a key, on the host's monotonic clock."""
+    problem: str = ""
+    """As in `Confirmation`."""
+    session: int = 0
+    """The link's session, in which the sums began at zero."""
+    is_timed: bool = True
+    """As in `Confirmation`."""
+
+
+@dataclass(frozen=True, slots=True)
+class PairingAttempts:
+    """Attempts to pair by digits, none of which has led to a connection."""
+
+    count: int = 0
+    host: str = ""
+    """Address of the last one."""
+    is_used_up: bool = False
+    """True if no more are answered, so that the digits are worth nothing."""
+
+    def __str__(self) -> str:
+        if self.count < 2:
+            return ""
+        told = f"{self.count} attempts with other digits, the last from {self.host}"
+        return f"{told}; no more are answered: show a new code" if self.is_used_up else told
+
+
+@dataclass(slots=True)
+class _Session:
+    """The present session's device and its welcome."""
+
+    caller: Caller
+    welcome: Welcome
+
+
+class HeadsetServer(Endpoint):
+    """Waits for the headset, streams to it, and stores its poses.
+
+    A headset that reconnects is sent the newest cursor, prompt, projections and so on again. One
+    headset is served at a time; others are refused until it has been silent for a while.
+
+    Parameters
+    ----------
+    pairings : Pairings or bytes
+        The headsets that may connect; or a key alone, for the first that connects with it.
+    bind : (host, port)
+        Default: loopback, any free port.
+
+    Raises
+    ------
+    LinkError
+        If the address cannot be bound.
+    ValueError
+        If the key is too short.
+    """
+
+    def __init__(self, pairings: Pairings | bytes, bind: Address = LOOPBACK) -> None:
+        if isinstance(pairings, bytes):
+            pairings = Pairings((Pairing(pairings.decode()),))
+        super().__init__(UdpTransport(bind))
+        self._pairings = pairings
         self._projections: dict[Eye, Projection] = {}
         self._cursor: pb.Cursor | None = None
         self._is_offline = False
         self._live_frame = 0
+        self._reception = Reception(pairings)
+        self._exchange: Exchange | None = None
+        self._session: _Session | None = None
+        self._device: HeadsetIdentity | None = None
+        self._shown = Owner()
+        self._notice, self._notice_until_s = "", 0.0
+        self._clock = ClockEstimator()
+        self._poses = PoseBuffer()
+        self._step_ns, self._step_host_ns = 0, -_AROUND_STEP_NS
+        # The last number of each is when it came, on the host's clock.
+        self._confirms: deque[tuple[pb.Confirm, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
+        self._nudges: deque[tuple[pb.Nudge, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
+        self._lost = 0
+        self._next_ping_s = 0.0
+        self._next_refresh_s = 0.0
+        self._unread = ""
+        self._start()
+
+    @property
+    def device(self) -> HeadsetIdentity | None:
+        """The connected headset, as it introduced itself last; None before it has."""
+        with self._changed:
+            return self._device
+
+    @property
+    def shown(self) -> Owner:
+        """Wearer and rig of the projections that the headset says it draws with."""
+        with self._changed:
+            return self._shown
+
+    @property
+    def pairings(self) -> Pairings:
+        """The devices that may connect."""
+        return self._pairings
+
+    def invite(self) -> Invitation:
+        """Let one new device pair within ten minutes, by QR code or digits; end other invitations.
+
+        Raises
+        ------
+        LinkError
+            If this machine has no network, or the link is closed.
+        """
+        host, port = reachable_address(self.address)
+        invitation = Invitation(host, port, new_code(), new_digits())
+        with self._changed:
+            self._require_running()
+            self.withdraw()
+            self._exchange = Exchange(
+                self._pairings, invitation, self._reception.cookies, time.monotonic()
+            )
+            self._reception.pairing_desk = self._exchange.hear
+        return invitation
+
+    @property
+    def pairing_attempts(self) -> PairingAttempts:
+        """The attempts to pair by the present invitation."""
+        with self._changed:
+            if self._exchange is None:
+                return PairingAttempts()
+            return PairingAttempts(*self._exchange.tried, self._exchange.is_used_up)
+
+    def withdraw(self) -> None:
+        """End the invitation, if there is one."""
+        with self._changed:
+            self._pairings.withdraw()
+            self._exchange = self._reception.pairing_desk = None
+
+    @property
+    def clock_step_s(self) -> float:
+        """By how much the headset's clock was set a moment ago; 0 if it was not."""
+        with self._changed:
+            is_recent = time.monotonic_ns() - self._step_host_ns < _AROUND_STEP_NS
+            return 1e-9 * self._step_ns if is_recent else 0.0
 
     def send_cursor(
         self, points_W_m: ArrayLike, cursor_id: int, eyes: Sequence[Eye] = EYES
@@ -86,7 +253,7 @@ class Sender(Endpoint):
             If the link is closed.
         """
         points = np.asarray(points_W_m)
-        thinned = points[:: max(1, math.ceil(len(points) / self._settings.live_points))]
+        thinned = points[:: max(1, math.ceil(len(points) / _LIVE_POINTS))]
         with self._changed:
             self._require_running()
             self._live_frame += 1
@@ -183,191 +350,6 @@ class Sender(Endpoint):
             self._require_running()
             self._outbox.restart(time.monotonic())
 
-    def _difference(self, digest: bytes) -> str:
-        """Return how a headset's drawing differs from what it was sent; empty if it does not."""
-        drawn = drawn_projections(self._projections, self._is_offline)
-        if digest == drawn_digest(drawn, self._cursor):
-            return ""
-        return "the headset draws other projections or another cursor than it was sent"
-
-
-LOOPBACK: Address = ("127.0.0.1", 0)
-_LOG = logging.getLogger(__name__)
-_MAX_CONFIRMATIONS = 64
-_NOTICE_S = 5.0
-_RESTART_S = 0.5
-_REFRESH_S = 1.0
-_AHEAD_NS = 1_000_000_000
-"""A pose further ahead of the headset's own clock than this is for no image that will be drawn."""
-_AROUND_STEP_NS = 2_000_000_000
-"""After a step of the headset's clock: until the clock is known again, and old stamps are gone."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Confirmation:
-    """The wearer's confirmation that the hand covers the cursor."""
-
-    t_headset_ns: int
-    t_host_ns: int
-    """t_b on the headset's clock, and on the host's monotonic clock."""
-    cursor_id: int
-    problem: str = ""
-    """Difference between what the headset drew and what it was sent; empty if there is none."""
-    is_timed: bool = True
-    """False if the headset's clock was set around this time, so that the times mean nothing."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Nudge:
-    """The wearer's total movement of what an eye draws since the verification began."""
-
-    verify_id: int
-    moved: NudgeSum
-    fits: bool
-    """True if the wearer says that the drawing covers the hand."""
-    t_host_ns: int
-    """Time of the last press of a key, on the host's monotonic clock."""
-    problem: str = ""
-    """As in `Confirmation`."""
-    session: int = 0
-    """The link's session, in which the sums began at zero."""
-    is_timed: bool = True
-    """As in `Confirmation`."""
-
-
-@dataclass(frozen=True, slots=True)
-class PairingAttempts:
-    """Attempts to pair by digits, none of which has led to a connection."""
-
-    count: int = 0
-    host: str = ""
-    """Address of the last one."""
-    is_used_up: bool = False
-    """True if no more are answered, so that the digits are worth nothing."""
-
-    def __str__(self) -> str:
-        if self.count < 2:
-            return ""
-        told = f"{self.count} attempts with other digits, the last from {self.host}"
-        return f"{told}; no more are answered: show a new code" if self.is_used_up else told
-
-
-@dataclass(slots=True)
-class _Session:
-    """The present session's device and its welcome."""
-
-    caller: Caller
-    welcome: Welcome
-
-
-class HeadsetServer(Sender):
-    """Waits for the headset, streams to it, and stores its poses.
-
-    A headset that reconnects is sent the newest cursor, prompt, projections and so on again. One
-    headset is served at a time; others are refused until it has been silent for a while.
-
-    Parameters
-    ----------
-    pairings : Pairings or bytes
-        The headsets that may connect; or a key alone, for the first that connects with it.
-    bind : (host, port)
-        Default: loopback, any free port.
-    settings : LinkSettings
-
-    Raises
-    ------
-    LinkError
-        If the address cannot be bound.
-    ValueError
-        If the key is too short.
-    """
-
-    def __init__(
-        self,
-        pairings: Pairings | bytes,
-        bind: Address = LOOPBACK,
-        settings: LinkSettings = DEFAULT_SETTINGS,
-    ) -> None:
-        if isinstance(pairings, bytes):
-            pairings = Pairings((Pairing(pairings.decode()),))
-        transport = UdpTransport(bind, settings.receive_buffer_bytes)
-        super().__init__(transport, settings)
-        self._pairings = pairings
-        self._reception = Reception(pairings)
-        self._exchange: Exchange | None = None
-        self._session: _Session | None = None
-        self._device: HeadsetIdentity | None = None
-        self._shown = Owner()
-        self._notice, self._notice_until_s = "", 0.0
-        self._clock = ClockEstimator()
-        self._poses = PoseBuffer()
-        self._step_ns, self._step_host_ns = 0, -_AROUND_STEP_NS
-        # The last number of each is when it came, on the host's clock.
-        self._confirms: deque[tuple[pb.Confirm, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
-        self._nudges: deque[tuple[pb.Nudge, NudgeSum, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
-        self._lost = 0
-        self._next_ping_s = 0.0
-        self._next_refresh_s = 0.0
-        self._unread = ""
-        self._start()
-
-    @property
-    def device(self) -> HeadsetIdentity | None:
-        """The connected headset, as it introduced itself last; None before it has."""
-        with self._changed:
-            return self._device
-
-    @property
-    def shown(self) -> Owner:
-        """Wearer and rig of the projections that the headset says it draws with."""
-        with self._changed:
-            return self._shown
-
-    @property
-    def pairings(self) -> Pairings:
-        """The devices that may connect."""
-        return self._pairings
-
-    def invite(self) -> Invitation:
-        """Let one new device pair within ten minutes, by QR code or digits; end other invitations.
-
-        Raises
-        ------
-        LinkError
-            If this machine has no network, or the link is closed.
-        """
-        host, port = reachable_address(self.address)
-        invitation = Invitation(host, port, new_code(), new_digits())
-        with self._changed:
-            self._require_running()
-            self.withdraw()
-            self._exchange = Exchange(
-                self._pairings, invitation, self._reception.cookies, time.monotonic()
-            )
-            self._reception.pairing_desk = self._exchange.hear
-        return invitation
-
-    @property
-    def pairing_attempts(self) -> PairingAttempts:
-        """The attempts to pair by the present invitation."""
-        with self._changed:
-            if self._exchange is None:
-                return PairingAttempts()
-            return PairingAttempts(*self._exchange.tried, self._exchange.is_used_up)
-
-    def withdraw(self) -> None:
-        """End the invitation, if there is one."""
-        with self._changed:
-            self._pairings.withdraw()
-            self._exchange = self._reception.pairing_desk = None
-
-    @property
-    def clock_step_s(self) -> float:
-        """By how much the headset's clock was set a moment ago; 0 if it was not."""
-        with self._changed:
-            is_recent = time.monotonic_ns() - self._step_host_ns < _AROUND_STEP_NS
-            return 1e-9 * self._step_ns if is_recent else 0.0
-
     def confirmations(self) -> list[Confirmation]:
         """Return the confirmations since the last call.
 
@@ -380,16 +362,10 @@ class HeadsetServer(Sender):
         """
         with self._changed:
             self._require_running()
-            found = []
-            while self._confirms and self._is_checked(self._confirms[0][-1]):
-                confirm, problem, came_ns = self._confirms.popleft()
-                t_host_ns, is_timed = self._when(confirm.t_headset_ns, came_ns)
-                found.append(
-                    Confirmation(
-                        confirm.t_headset_ns, t_host_ns, confirm.cursor_id, problem, is_timed
-                    )
-                )
-            return found
+            return [
+                Confirmation(message.t_headset_ns, t_host_ns, message.cursor_id, problem, is_timed)
+                for message, problem, t_host_ns, is_timed in self._checked(self._confirms)
+            ]
 
     def nudges(self) -> list[Nudge]:
         """Return the wearer's nudges since the last call; held back as `confirmations`.
@@ -402,22 +378,32 @@ class HeadsetServer(Sender):
         with self._changed:
             self._require_running()
             session = 0 if self._channel is None else self._channel.session
-            found = []
-            while self._nudges and self._is_checked(self._nudges[0][-1]):
-                nudge, moved, problem, came_ns = self._nudges.popleft()
-                t_host_ns, is_timed = self._when(nudge.t_headset_ns, came_ns)
-                found.append(
-                    Nudge(nudge.verify_id, moved, nudge.fits, t_host_ns, problem, session, is_timed)
+            return [
+                Nudge(
+                    message.verify_id,
+                    nudges.read_nudge(message),
+                    message.fits,
+                    t_host_ns,
+                    problem,
+                    session,
+                    is_timed,
                 )
-            return found
+                for message, problem, t_host_ns, is_timed in self._checked(self._nudges)
+            ]
 
-    def _is_checked(self, came_ns: int) -> bool:
-        return self._clock.fit is not None and self._clock.checked_host_ns >= came_ns
+    def _checked(
+        self, waiting: deque[tuple[_Stamped, str, int]]
+    ) -> Iterator[tuple[_Stamped, str, int, bool]]:
+        """Take the messages that came before the newest answered ping was sent.
 
-    def _when(self, t_headset_ns: int, came_ns: int) -> tuple[int, bool]:
-        """Return a stamp on the host's clock, and whether it can be trusted."""
-        is_timed = came_ns > self._step_host_ns + _AROUND_STEP_NS
-        return self._clock.to_host_ns(t_headset_ns) if is_timed else came_ns, is_timed
+        Each comes with its problem, its time on the host's clock, and whether that is trusted.
+        """
+        clock = self._clock
+        while waiting and clock.fit is not None and clock.checked_host_ns >= waiting[0][-1]:
+            message, problem, came_ns = waiting.popleft()
+            is_timed = came_ns > self._step_host_ns + _AROUND_STEP_NS
+            t_host_ns = clock.to_host_ns(message.t_headset_ns) if is_timed else came_ns
+            yield message, problem, t_host_ns, is_timed
 
     def pose_at_host_ns(self, t_host_ns: int) -> Float64:
         """Return the headset's pose ``T_W_H`` at a time of the host's monotonic clock.
@@ -436,8 +422,9 @@ class HeadsetServer(Sender):
             try:
                 return self._poses.at(self._clock.to_headset_ns(t_host_ns))
             except PosePendingError as error:
-                why = str(error) if self.connected else "the headset sends no poses"
-                raise PosePendingError(why) from None
+                if self.connected:
+                    raise
+                raise PosePendingError("the headset sends no poses") from error
 
     def statistics(self) -> LinkStatistics:
         """Return the link's counters and estimates."""
@@ -499,7 +486,7 @@ class HeadsetServer(Sender):
             if is_same and session.caller.nonce == caller.nonce and channel.address == address:
                 return handshake.welcome(session.welcome)  # the first one was lost
             # A device whose app has been restarted is silent in its old session.
-            patience_s = _RESTART_S if is_same else self._settings.silence_s
+            patience_s = _RESTART_S if is_same else endpoint.SILENCE_S
             if time.monotonic() - channel.heard_s <= patience_s:
                 holder = session.caller.name or session.caller.device_id
                 self._tell(f"headset {name} asks to connect; {holder} is connected")
@@ -541,15 +528,11 @@ class HeadsetServer(Sender):
                 self._take_poses(envelope.poses)
             case "confirm":
                 confirm = messages.read_confirm(envelope.confirm)
-                came_ns = time.monotonic_ns()
-                self._confirms.append((confirm, self._difference(confirm.drawn), came_ns))
-                self._next_ping_s = 0.0
+                self._confirms.append((confirm, *self._received_now(confirm.drawn)))
             case "nudge":
-                nudge = envelope.nudge
-                moved = nudges.read_nudge(nudge)
-                came_ns = time.monotonic_ns()
-                self._nudges.append((nudge, moved, self._difference(nudge.drawn), came_ns))
-                self._next_ping_s = 0.0
+                nudges.read_nudge(envelope.nudge)  # MalformedError now, not when it is taken
+                drawn = envelope.nudge.drawn
+                self._nudges.append((envelope.nudge, *self._received_now(drawn)))
             case "device":
                 assert self._session is not None
                 device_id = self._session.caller.device_id
@@ -558,6 +541,18 @@ class HeadsetServer(Sender):
                 self._take_pong(envelope.pong)
             case other:
                 raise MalformedError(f"a headset sends no {other}")
+
+    def _received_now(self, digest: bytes) -> tuple[str, int]:
+        """Return the problem of a message that comes now, and its time; ask for the clock soon."""
+        self._next_ping_s = 0.0
+        return self._difference(digest), time.monotonic_ns()
+
+    def _difference(self, digest: bytes) -> str:
+        """Return how a headset's drawing differs from what it was sent; empty if it does not."""
+        drawn = drawn_projections(self._projections, self._is_offline)
+        if digest == drawn_digest(drawn, self._cursor):
+            return ""
+        return "the headset draws other projections or another cursor than it was sent"
 
     def _take_poses(self, poses: pb.Poses) -> None:
         clock = self._clock
@@ -589,7 +584,7 @@ class HeadsetServer(Sender):
 
     def _take_pong(self, pong: pb.Pong) -> None:
         now_ns = time.monotonic_ns()
-        if not 0 <= now_ns - pong.t_sent_host_ns < 1e9 * self._settings.silence_s:
+        if not 0 <= now_ns - pong.t_sent_host_ns < 1e9 * endpoint.SILENCE_S:
             return  # of no ping sent lately
         self._lost = max(0, pong.highest_sequence - pong.accepted)
         was_known = self._clock.fit is not None
@@ -608,5 +603,5 @@ class HeadsetServer(Sender):
             self._next_refresh_s = now_s + _REFRESH_S
             self._refresh()
         if now_s >= self._next_ping_s:
-            self._next_ping_s = now_s + self._settings.ping_period_s
+            self._next_ping_s = now_s + _PING_PERIOD_S
             self._send(pb.Envelope(ping=pb.Ping(t_sent_host_ns=time.monotonic_ns())))

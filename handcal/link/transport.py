@@ -19,6 +19,7 @@ Address: TypeAlias = tuple[str, int]
 EVERY_NETWORK = ("0.0.0.0", "::")  # noqa: S104
 """The addresses that listen on all networks: of IPv4, and of both where the system can."""
 _MAX_BATCH = 256
+_RECEIVE_BUFFER_BYTES = 4 * 2**20  # a burst of cursor and live hand waits in it
 _MAPPED = "::ffff:"
 _ANYWHERE: tuple[Address, ...] = (("192.0.2.1", 9), ("2001:db8::1", 9))
 """Reserved for documentation, of IPv4 and IPv6; nothing is sent to them."""
@@ -51,7 +52,7 @@ class UdpTransport:
         If the address cannot be bound.
     """
 
-    def __init__(self, bind: Address, receive_buffer_bytes: int) -> None:
+    def __init__(self, bind: Address) -> None:
         family = _family(bind[0])
         self._is_ipv6 = family is socket.AF_INET6
         try:
@@ -59,7 +60,7 @@ class UdpTransport:
         except OSError as error:  # no IPv6 in this system
             raise LinkError(_not_bound(bind, error)) from error
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer_bytes)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
             if self._is_ipv6:
                 self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
             self._socket.bind(bind)

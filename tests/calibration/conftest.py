@@ -10,14 +10,16 @@ import pytest
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.session.session import Session
-from tests.calibration.stage import KEY, LINK, RIG, Stage, connect
+from tests.calibration.stage import KEY, RIG, Stage, connect
 
 
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[HeadsetServer]:
     # The stage's time runs ahead of the real one, as it waits for nothing.
     monkeypatch.setattr("handcal.link.server._AHEAD_NS", 10**12)
-    with HeadsetServer(KEY, settings=LINK) as server:
+    monkeypatch.setattr("handcal.link.server._PING_PERIOD_S", 0.01)
+    monkeypatch.setattr("handcal.link.client._HELLO_PERIOD_S", 0.01)
+    with HeadsetServer(KEY) as server:
         yield server
 
 

@@ -81,7 +81,7 @@ def test_giving_up_ends_it(tmp_path: Path, record: SessionRecord) -> None:
 def test_too_much_is_refused(
     tmp_path: Path, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(archive, "MAX_ARCHIVE_BYTES", 1000)
+    monkeypatch.setattr("handcal.export.export.MAX_ARCHIVE_BYTES", 1000)
     with pytest.raises(FileError, match="more than the 1,000 that fit"):
         write_archive(tmp_path / "s.zip", record, tmp_path)
     assert not (tmp_path / "s.zip").exists()

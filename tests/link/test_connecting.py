@@ -17,7 +17,6 @@ from handcal.link.client import MAX_WEARERS, HeadsetClient
 from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
 from handcal.link.server import HeadsetServer
-from handcal.link.settings import LinkSettings
 from handcal.link.shapes import Shape
 from handcal.link.wire import Rejection
 from tests.helpers import eventually
@@ -53,9 +52,11 @@ def test_a_pc_that_starts_again_is_found_again(pairing_key: bytes) -> None:
         assert client.state().projections["left"].P[0, 0] == 1.0
 
 
-def test_silence_is_noticed(pairing_key: bytes, raw_server: Any) -> None:
-    settings = LinkSettings(silence_s=0.3)
-    with HeadsetClient(raw_server.address, pairing_key, IDENTITY, settings=settings) as client:
+def test_silence_is_noticed(
+    pairing_key: bytes, raw_server: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal.link.endpoint.SILENCE_S", 0.3)
+    with HeadsetClient(raw_server.address, pairing_key, IDENTITY) as client:
         hello, address = raw_server.wait_for("hello")
         retry = raw_server.greeting(handshake.retry(hello.hello.nonce, b"cookie"))
         raw_server.socket.sendto(retry, address)

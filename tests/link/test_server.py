@@ -19,7 +19,6 @@ from handcal.link import messages
 from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
 from handcal.link.server import HeadsetServer
-from handcal.link.settings import LinkSettings
 from tests.helpers import eventually
 
 NewHeadset = Callable[..., Any]
@@ -104,8 +103,11 @@ def test_a_replayed_capture_does_nothing(server: HeadsetServer, new_headset: New
         thief.receive()
 
 
-def test_an_incumbent_stays_until_it_is_silent(pairings: Pairings, raw_headset: Any) -> None:
-    with HeadsetServer(pairings, settings=LinkSettings(silence_s=0.6)) as server:
+def test_an_incumbent_stays_until_it_is_silent(
+    pairings: Pairings, raw_headset: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal.link.endpoint.SILENCE_S", 0.6)
+    with HeadsetServer(pairings) as server:
         keys = [one.key.encode() for one in pairings.all if one.device_id]
         first, second = (raw_headset(server.address, keys[i], i + 1) for i in (0, 1))
         with first.socket, second.socket:
@@ -239,9 +241,12 @@ def test_poses_are_told_at_the_hosts_time(server: HeadsetServer, new_headset: Ne
     assert server.statistics().lost_inbound == 11
 
 
-def test_giving_up_is_reported(pairing_key: bytes, caplog: pytest.LogCaptureFixture) -> None:
+def test_giving_up_is_reported(
+    pairing_key: bytes, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal.link.reliable.GIVE_UP_S", 0.1)
     caplog.set_level("INFO")
-    with HeadsetServer(pairing_key, settings=LinkSettings(give_up_s=0.1)) as server:
+    with HeadsetServer(pairing_key) as server:
         message = server.send_prompt("Raise your hand")
         assert server.statistics().unacked == 1
         with pytest.raises(LinkError, match="prompt was not acknowledged"):
