@@ -279,7 +279,8 @@ class Staging(Closable):
         try:
             self._lock = FileLock(make_folder(self._root) / "lock")
         except FileError as error:  # it names a folder that nobody chose
-            raise FileError(str(error).replace(str(self._root), str(self._folder))) from error
+            what = error.what.replace(str(self._root), str(self._folder))
+            raise FileError(what, error.advice) from error
         self.path = self._root / "new"
         self._old = self._root / "old"
         try:

@@ -121,10 +121,8 @@ def install_layer() -> Path:
     try:  # not copied over: running programs have the old one in their memory
         write_atomic(library, data)
     except FileError as error:
-        raise FileError(
-            f"{error}",
-            "if OpenXR programs are running, end them and try again",
-        ) from error
+        advice = "if OpenXR programs are running, end them and try again"
+        raise FileError(error.what, advice) from error
     manifest = _manifest()
     make_folder(manifest.parent)
     layer = {

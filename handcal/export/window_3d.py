@@ -148,12 +148,14 @@ def inspect_session(
     number = list(scenes)[-1] if number is None else number
     if number not in scenes:
         known = ", ".join(map(str, scenes))
-        raise FileError(f"{outcome.record.path} has no alignment {number}", f"it has {known}")
+        raise FileError(f"{outcome.record.path} has no alignment {number}: it has {known}")
     if find_spec("open3d") is None:
-        raise HandcalError("Open3D is not installed: pip install 'handcal[3d]'")
+        raise HandcalError("Open3D is not installed", "pip install 'handcal[3d]'")
     if picture is None:
         if not _has_display():
-            raise HandcalError("no display found for the 3D window", "--picture FILE needs none")
+            raise HandcalError(
+                "no display found for the 3D window", "use --picture FILE, which needs none"
+            )
         _run(_Order(outcome.name, scenes, number, None), progress)
         return
     require_suffix(picture, ".png")
@@ -208,7 +210,7 @@ def _run(order: _Order, progress: Progress) -> None:
     if status:
         raise HandcalError(
             f"the 3D window crashed (status {status}), perhaps in the graphics driver",
-            "update it",
+            "update the driver",
         )
 
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from handcal.core.errors import LinkError
 from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
 from handcal.link import handcal_pb2 as pb
 from handcal.link import handshake, messages, nudges, wire
@@ -128,7 +129,7 @@ class HeadsetClient(Endpoint):
         self._live_chunks: dict[int, Float64] = {}
         self._nonce = secrets.token_bytes(wire.NONCE_BYTES)
         self._cookie = b""
-        self._refusal = ""
+        self._refused: LinkError | None = None
         self._hello_ns = 0
         self._next_hello_s = 0.0
         self._start()
@@ -137,7 +138,7 @@ class HeadsetClient(Endpoint):
     def refusal(self) -> str:
         """The PC's reason for not connecting; empty if it has none."""
         with self._changed:
-            return self._refusal
+            return "" if self._refused is None else str(self._refused)
 
     @property
     def kept(self) -> Mapping[Owner, Mapping[Eye, Projection]]:
@@ -238,8 +239,8 @@ class HeadsetClient(Endpoint):
                 return HeadsetState(projections=self._state.projections)
             return replace(self._state, live_W_m=self._live_hand())
 
-    def _silence(self, timeout_s: float) -> str:
-        return self._refusal or super()._silence(timeout_s)
+    def _silence(self, timeout_s: float) -> LinkError:
+        return self._refused or super()._silence(timeout_s)
 
     def _greet(self, packet: Packet, datagram: bytes, address: Address) -> Rejection | None:
         if address != self._server or packet.sequence != self._device:
@@ -261,7 +262,7 @@ class HeadsetClient(Endpoint):
             case "welcome":
                 self._join(handshake.read_welcome(envelope.welcome))
             case "refused":
-                self._refusal = str(handshake.read_refused(envelope.refused))
+                self._refused = handshake.read_refused(envelope.refused).error
                 self._begin_again()
                 self._next_hello_s = time.monotonic() + _REFUSED_PERIOD_S
         return None
@@ -271,7 +272,7 @@ class HeadsetClient(Endpoint):
         self._channel = Channel(welcome.session, self._server, keys.to_pc, keys.to_headset)
         self._begin_again()
         self._dismissed = False
-        self._refusal = ""
+        self._refused = None
         self._next_hello_s = 0.0
         self._live_frame = 0
         self._live_chunks.clear()

@@ -94,7 +94,7 @@ class Endpoint(Closable):
         with self._changed:
             self._wait_for(lambda: self.connected, timeout_s)
             if not self.connected:
-                raise LinkError(self._silence(timeout_s))
+                raise self._silence(timeout_s)
 
     def wait_acked(self, message: Outgoing, timeout_s: float) -> None:
         """Wait until the other end has acknowledged a message.
@@ -127,11 +127,11 @@ class Endpoint(Closable):
         self._thread.join()
         self._transport.close()
 
-    def _silence(self, timeout_s: float) -> str:
-        """Return the message for a connection that failed."""
-        return (
-            f"no device with this pairing key answered within {timeout_s:g} s; "
-            "check the address, the key and the firewall"
+    def _silence(self, timeout_s: float) -> LinkError:
+        """Return the error of a connection that failed."""
+        return LinkError(
+            f"no device with this pairing key answered within {timeout_s:g} s",
+            "check the address, the key and the firewall",
         )
 
     @abstractmethod

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from handcal.core.errors import LinkError
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire
 from handcal.link.fields import MalformedError, read_text
@@ -38,10 +39,13 @@ class Refusal:
     other: str
     """Name of the other device."""
 
-    def __str__(self) -> str:
+    @property
+    def error(self) -> LinkError:
+        """What to tell the wearer of the refused headset."""
         if self.is_key_taken:
-            return f"this pairing key belongs to {self.other}; ask the PC for a key of your own"
-        return f"{self.other} is connected to the PC; disconnect it first"
+            belongs = f"this pairing key belongs to {self.other}"
+            return LinkError(belongs, "ask the PC for a key of your own")
+        return LinkError(f"{self.other} is connected to the PC", "disconnect it first")
 
 
 def hello(nonce: bytes, time_ns: int, cookie: bytes, name: str) -> pb.Envelope:

@@ -58,7 +58,7 @@ class UdpTransport:
         try:
             self._socket = socket.socket(family, socket.SOCK_DGRAM)
         except OSError as error:  # no IPv6 in this system
-            raise LinkError(_not_bound(bind, error)) from error
+            raise _not_bound(bind, error) from error
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
             if self._is_ipv6:
@@ -66,7 +66,7 @@ class UdpTransport:
             self._socket.bind(bind)
         except OSError as error:
             self._socket.close()
-            raise LinkError(_not_bound(bind, error)) from error
+            raise _not_bound(bind, error) from error
         self._socket.setblocking(False)
         self.address: Address = self._socket.getsockname()[:2]
 
@@ -101,16 +101,17 @@ class UdpTransport:
         self._socket.close()
 
 
-def _not_bound(address: Address, error: OSError) -> str:
-    """Return why an address cannot be bound, and what to do."""
-    host, port = address
+def _not_bound(address: Address, error: OSError) -> LinkError:
+    """Return the error of an address that cannot be bound."""
     if error.errno == errno.EADDRINUSE:
-        why = "another program, perhaps another handcal, uses this port; end it, or choose another"
+        reason = "another program, perhaps another handcal, uses this port"
+        advice = "end it, or choose another"
     elif error.errno == errno.EADDRNOTAVAIL:
-        why = "this computer has no such address; enter one of its own, or 0.0.0.0 for all"
+        reason = "this computer has no such address"
+        advice = "enter one of its own, or 0.0.0.0 for all"
     else:
-        why = f"{error.strerror}; choose another address or port"
-    return f"cannot listen on {host}:{port}: {why}"
+        reason, advice = f"{error.strerror}", "choose another address or port"
+    return LinkError(f"cannot listen on {address[0]}:{address[1]}: {reason}", advice)
 
 
 def local_address(server: Address) -> Address:

@@ -96,7 +96,7 @@ def test_cancelling_closes_the_window(program: Path, outcome: SessionOutcome) ->
 def test_what_cannot_be_shown_is_said_before_a_process_starts(
     outcome: SessionOutcome, empty: SessionRecord, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    with pytest.raises(FileError, match="has no alignment 2; it has 1, 3"):
+    with pytest.raises(FileError, match="has no alignment 2: it has 1, 3"):
         inspect_session(outcome, 2)
     with pytest.raises(FileError, match="no alignment to show"):
         inspect_session(load_outcome(empty))
