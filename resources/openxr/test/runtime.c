@@ -5,9 +5,10 @@
  *   TEST_SYSTEM    the headset's name
  *   TEST_EXTENSION one extension more
  *   TEST_RECORD    file for what xrEndFrame received */
+#include "../loader.h"
+
 #include <locale.h>
 #include <math.h>
-#include <openxr/openxr.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,30 +19,6 @@
 #else
 #define EXPORT __attribute__((visibility("default")))
 #endif
-
-typedef struct {
-    int type;
-    uint32_t version;
-    size_t size;
-    uint32_t min_interface, max_interface;
-    XrVersion min_api, max_api;
-} LoaderInfo;
-
-typedef struct {
-    int type;
-    uint32_t version;
-    size_t size;
-    uint32_t interface_version;
-    XrVersion api;
-    PFN_xrGetInstanceProcAddr get;
-} RuntimeRequest;
-
-typedef struct {
-    int type;
-    const void *next;
-    float focus_distance;
-    XrFlags64 flags;
-} FocusML;
 
 enum { HEAD_SPACE = 1 << 30 }; /* in the handle of a VIEW space */
 static uint64_t last_handle = 0x1000;
@@ -283,8 +260,8 @@ static XrResult XRAPI_CALL EndFrame(XrSession s, const XrFrameEndInfo *info) {
             }
     }
     for (const XrBaseInStructure *one = info->next; record && one; one = one->next)
-        if ((int)one->type == 1000135000)
-            fprintf(record, "focus %.9g\n", ((const FocusML *)(const void *)one)->focus_distance);
+        if ((int)one->type == TYPE_FRAME_END_INFO_ML)
+            fprintf(record, "focus %.9g\n", ((const FrameEndInfoML *)(const void *)one)->focus_distance);
     return XR_SUCCESS;
 }
 
