@@ -144,6 +144,9 @@ _OPENXR: Mapping[str, Entry] = {
         "openxr",
     ),
     "remove": Entry("Remove the layer and end the calibration in force.", "openxr"),
+    "client": Entry(
+        "Be the headset of a calibration, on any OpenXR headset of this computer.", "openxr"
+    ),
 }
 
 COMMANDS: Mapping[str, Entry] = {

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from handcal.cli.output import console, save
-from handcal.cli.terminal import arg, command, flag
+from handcal.cli.output import console, save, until_interrupted
+from handcal.cli.terminal import arg, command, fail, file_option, flag
+
+_MAX_CODE = 1000
 
 
 @command()
@@ -56,3 +59,44 @@ def status(arguments: argparse.Namespace) -> None:
     save(arguments.json, asdict(found))
     for line in found.lines:
         console.print(line, markup=False)
+
+
+@command(
+    arg(
+        "address",
+        nargs="?",
+        default="127.0.0.1",
+        metavar="HOST[:PORT]",
+        help="the computer that runs handcal (default: this one, port 47800)",
+    ),
+    file_option("--key-file", "pairing key (default: that of --pair, else HANDCAL_PAIRING_KEY)"),
+    flag("--pair", "first type the text or the 8 digits that handcal pair shows"),
+)
+def client(arguments: argparse.Namespace) -> None:
+    """Be the headset of a calibration, on any OpenXR headset of this computer."""
+    from handcal.link.pairing import read_pairing_key
+    from handcal.openxr_client.client import run_openxr_client
+    from handcal.openxr_client.identity import pair, read_identity
+    from handcal.station.settings import DEFAULT_PORT
+
+    host, colon, port = arguments.address.rpartition(":")
+    if not colon or not port.isdecimal() or (":" in host and not host.endswith("]")):
+        host, port = arguments.address, str(DEFAULT_PORT)
+    server = host.strip("[]"), int(port)
+    if arguments.pair:
+        console.print("Code: ", end="")
+        try:
+            server, identity = pair(sys.stdin.readline(_MAX_CODE), server)
+        except ValueError as error:
+            fail(str(error), 2)
+    else:
+        stored = None if arguments.key_file else read_identity()
+        identity = stored or ("", read_pairing_key(arguments.key_file))
+    device_id, key = identity
+    console.print(
+        "Enter or space, a controller's trigger or a pinch of the other hand confirms; in the "
+        "window, arrows, + and - move the drawing, and Esc ends.",
+        markup=False,
+    )
+    with until_interrupted() as is_stopped:
+        run_openxr_client(server, key, device_id, is_stopped)
