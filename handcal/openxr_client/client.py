@@ -28,6 +28,7 @@ from handcal.export.openxr import correction_owner
 from handcal.io.closable import Closable
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.nudges import NudgeSum
+from handcal.link.pairing import MAX_NAME_CHARACTERS
 from handcal.link.transport import Address
 from handcal.link.wire import VERSION, hkdf
 from handcal.openxr_client.drawing import Painter, own_projection, strokes_of
@@ -282,9 +283,9 @@ class Runtime(Closable):
             )
         )
         stack.callback(xr.destroy_instance, self._instance)
-        self.name = xr.get_instance_properties(self._instance).runtime_name.decode()
+        self.name = _name(xr.get_instance_properties(self._instance).runtime_name)
         system = xr.get_system(self._instance)
-        self.system = xr.get_system_properties(self._instance, system).system_name.decode()[:40]
+        self.system = _name(xr.get_system_properties(self._instance, system).system_name)
         stereo = xr.ViewConfigurationType.PRIMARY_STEREO
         sizes = xr.enumerate_view_configuration_views(self._instance, system, stereo)
         modes = xr.enumerate_environment_blend_modes(self._instance, system, stereo)
@@ -492,6 +493,12 @@ class Runtime(Closable):
             return int(ticks) * 10**9 // hz.value
         stamp = xr.convert_time_to_timespec_time_khr(self._instance, xr_time)
         return int(stamp.tv_sec) * 10**9 + int(stamp.tv_nsec)
+
+
+def _name(text: bytes) -> str:
+    """Return a runtime's text as far as the link takes it; Monado's name has 47 characters."""
+    shown = "".join(one for one in text.decode(errors="replace") if one.isprintable())
+    return shown[:MAX_NAME_CHARACTERS]
 
 
 def _transform(pose: Any) -> Float64:
