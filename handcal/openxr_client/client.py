@@ -11,8 +11,8 @@ from __future__ import annotations
 import ctypes
 import sys
 import time
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Any
@@ -28,7 +28,13 @@ from handcal.export.openxr import correction_owner
 from handcal.io.closable import Closable
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.nudges import NudgeSum
-from handcal.link.pairing import MAX_NAME_CHARACTERS
+from handcal.link.pairing import (
+    MAX_NAME_CHARACTERS,
+    Pairing,
+    Pairings,
+    new_device_id,
+    new_pairing_key,
+)
 from handcal.link.transport import Address
 from handcal.link.wire import VERSION, hkdf
 from handcal.openxr_client.drawing import Painter, own_projection, strokes_of
@@ -80,6 +86,22 @@ class Frame:
 def clock_ns() -> int:
     """Return the time on the clock to which the runtime's times are converted."""
     return time.perf_counter_ns()
+
+
+def paired_identity(pairings: Pairings) -> tuple[str, bytes]:
+    """Return the device and key of this computer's OpenXR headset, pairing it the first time.
+
+    Raises
+    ------
+    FileError
+        If the file of the paired devices cannot be written.
+    """
+    for pairing in pairings.all:
+        if pairing.device_id and pairing.name == NAME:
+            return pairing.device_id, pairing.key.encode()
+    device_id, key = new_device_id(), new_pairing_key()
+    pairings.bind(Pairing(key), device_id, NAME)
+    return device_id, key.encode()
 
 
 def run_openxr_client(
@@ -216,21 +238,32 @@ class Runtime(Closable):
         with ExitStack() as stack:
             stack.enter_context(correction_owner(NAME))
             self._open_window(stack)
-            try:
+            with self._failing("no OpenXR runtime could be used"):
                 self._open_session(stack)
-            except xr.exception.FormFactorUnavailableError as error:
-                raise HandcalError("no headset is connected", "connect it and try again") from error
-            except xr.XrException as error:
-                raise HandcalError(
-                    f"no OpenXR runtime could be used: {error or type(error).__name__}",
-                    "start the headset's software, such as SteamVR or Monado",
-                ) from error
             self._painter = Painter()
             self._stack = stack.pop_all()
 
     def close(self) -> None:
         """End the session; safe to call twice."""
         self._stack.close()
+
+    @contextmanager
+    def _failing(self, what: str) -> Iterator[None]:
+        """Say of a failure of the runtime what became of it."""
+        xr = self._xr
+        try:
+            yield
+        except xr.exception.FormFactorUnavailableError as error:
+            raise HandcalError("no headset is connected", "connect it and try again") from error
+        except xr.XrException as error:
+            reason = str(error) or type(error).__name__
+            raise HandcalError(
+                f"{what}: {reason}", "start the headset's software, such as SteamVR or Monado"
+            ) from error
+
+    def _destroy(self, destroy: Callable[[Any], None], handle: Any) -> None:
+        with suppress(self._xr.XrException):  # the runtime may have ended before
+            destroy(handle)
 
     def _open_window(self, stack: ExitStack) -> None:
         glfw = self._glfw
@@ -282,7 +315,7 @@ class Runtime(Closable):
                 enabled_extension_names=extensions,
             )
         )
-        stack.callback(xr.destroy_instance, self._instance)
+        stack.callback(self._destroy, xr.destroy_instance, self._instance)
         self.name = _name(xr.get_instance_properties(self._instance).runtime_name)
         system = xr.get_system(self._instance)
         self.system = _name(xr.get_system_properties(self._instance, system).system_name)
@@ -299,7 +332,7 @@ class Runtime(Closable):
                 system_id=system, next=ctypes.cast(ctypes.pointer(binding), ctypes.c_void_p)
             ),
         )
-        stack.callback(xr.destroy_session, self._session)
+        stack.callback(self._destroy, xr.destroy_session, self._session)
         self._world, self._head = (
             xr.create_reference_space(self._session, xr.ReferenceSpaceCreateInfo(kind))
             for kind in (xr.ReferenceSpaceType.LOCAL, xr.ReferenceSpaceType.VIEW)
@@ -372,6 +405,10 @@ class Runtime(Closable):
 
     def wait(self) -> Frame | None:
         """Wait until the next image is wanted; None if none is, for a while."""
+        with self._failing("the OpenXR runtime has failed"):
+            return self._wait()
+
+    def _wait(self) -> Frame | None:
         xr = self._xr
         self._poll()
         if not self._is_running or self.is_over:
@@ -403,6 +440,10 @@ class Runtime(Closable):
 
     def show(self, frame: Frame, state: HeadsetState, text: str) -> None:
         """Draw and submit the image of both eyes."""
+        with self._failing("the OpenXR runtime has failed"):
+            self._show(frame, state, text)
+
+    def _show(self, frame: Frame, state: HeadsetState, text: str) -> None:
         xr, glfw = self._xr, self._glfw
         layers = []
         if frame.is_seen and frame.T_W_H is not None and frame.views:

@@ -22,21 +22,22 @@ from handcal.core.conventions import opengl_transform
 from handcal.core.display import projection_matrix
 from handcal.core.geometry import invert, project, rigid, transform
 from handcal.core.progress import Progress
-from handcal.core.types import EYES, Eye, Float64, HeadsetView, Projection
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, HeadsetView, Projection
 from handcal.export.outcome import SessionOutcome
 from handcal.io.files import read_json, write_json
 from handcal.io.resources import resource_path
 from handcal.lab.demo import DemoSettings, run_demo
 from handcal.link import handcal_pb2 as pb
 from handcal.link import messages
-from handcal.link.client import HeadsetState
+from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.nudges import NudgeSum, VerifyRequest
-from handcal.link.server import HeadsetServer
+from handcal.link.pairing import Pairings
+from handcal.link.server import Confirmation, HeadsetServer
 from handcal.link.shapes import Shape, Target
-from handcal.openxr_client import identity
-from handcal.openxr_client.client import _Wearer
+from handcal.openxr_client.client import _Wearer, paired_identity
 from handcal.openxr_client.drawing import BLUE, RED, clip_from_V, own_projection, strokes_of
-from tests.helpers import eventually, example_rig
+from handcal.rig.example import example_rig
+from tests.helpers import eventually
 from tests.openxr.conftest import OWN_ANGLES, own_views
 from tests.openxr.worn_client import command, write_wearer
 
@@ -96,12 +97,12 @@ class Headset:
         self.server, self.folder = server, folder
         self.head = folder / "head"
 
-    def images(self) -> dict[str, Any]:
+    def images(self) -> dict[Eye, Any]:
         """Return the images (rows, columns, RGBA) of a frame from now, the highest row first."""
         for _ in range(2):  # the first may be of a frame that was drawn before
             (self.folder / "take").touch()
             eventually(lambda: not (self.folder / "take").exists(), 20.0)
-        images = {}
+        images: dict[Eye, Any] = {}
         for number, eye in enumerate(EYES):
             data = (self.folder / f"eye{number}").read_bytes()
             width, height = np.frombuffer(data[:8], np.uint32)
@@ -213,8 +214,13 @@ class TestOnTheRuntime:
         time.sleep(0.2)  # until it is drawn
         before_ns = time.monotonic_ns()
         write_wearer(headset.head, T_W_H, is_pressed=True)
-        found: list[Any] = []
-        eventually(lambda: found.extend(headset.server.confirmations()) or found)
+        found: list[Confirmation] = []
+
+        def has_come() -> bool:
+            found.extend(headset.server.confirmations())
+            return bool(found)
+
+        eventually(has_come)
         write_wearer(headset.head, T_W_H)
         (confirmation,) = found
         assert (confirmation.cursor_id, confirmation.problem) == (7, "")
@@ -346,14 +352,10 @@ def test_presses_are_summed_for_each_verification() -> None:
     assert there.sent[-1] == (5, 9)
 
 
-def test_a_paired_identity_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    assert identity.read_identity() is None
-    with HeadsetServer(KEY) as server:
-        invitation = server.invite()
-        found, paired = identity.pair(invitation.digits, server.address)
-    assert found == server.address
-    assert identity.read_identity() == paired
-    assert paired[1].decode() != KEY.decode()
-    (file,) = (tmp_path / "handcal").iterdir()
-    assert file.stat().st_mode & 0o077 == 0
+def test_the_headset_of_this_computer_needs_no_pairing(tmp_path: Path) -> None:
+    file = tmp_path / "pairing.key"
+    with HeadsetServer(Pairings.read(file)) as server:
+        device_id, key = paired_identity(Pairings.read(file))
+        with HeadsetClient(server.address, key, HeadsetIdentity(device_id)) as client:
+            client.wait_connected(10.0)  # within a second, in which the PC reads its file again
+    assert paired_identity(Pairings.read(file)) == (device_id, key)
