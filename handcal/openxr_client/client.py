@@ -143,7 +143,7 @@ def run_openxr_client(
         link = stack.enter_context(connect(server, pairing_key, identity, clock_ns))
         wearer = _Wearer(link)
         waiting = f"Waiting for the PC at {server[0]}:{server[1]}"
-        while not (is_stopped() or link.dismissed or runtime.is_over):
+        while not (is_stopped() or runtime.is_over):  # also after a session of the PC has ended
             frame = runtime.wait()
             if frame is None:
                 continue
