@@ -16,16 +16,16 @@ from PySide6.QtWidgets import QApplication, QPushButton
 
 from handcal.rig.example import example_rig
 from handcal.sim.photographs import BOARD, write_photographs
-from handcal_gui.theme import use_theme
-from handcal_gui.widgets.job_bar import JobBar
-from handcal_gui.windows.rig.project_folder import (
+from handcal_gui.app.theme import use_theme
+from handcal_gui.rig.project_folder import (
     DisplayEntries,
     ProjectFolder,
     RigInputs,
     StereoEntries,
     ViewpointEntries,
 )
-from handcal_gui.windows.rig.wizard import RigWizard
+from handcal_gui.rig.wizard import RigWizard
+from handcal_gui.widgets.job_bar import JobBar
 
 PICTURES = Path(__file__).parent / "pictures"
 STEPS = ("", "stereo", "", "left", "", "result")

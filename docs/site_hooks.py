@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[1]
 ROOT_PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "THIRD-PARTY.md")
 LOGO = "resources/icons/handcal.svg"
 _OUTSIDE = re.compile(r"\]\(\.\./([^)#\s]+)")
+_CODE = re.compile(r"<code>[^<]*</code>")
 _AT_ROOT = re.compile(r"\]\((?!docs/|https?:|#)([^)#\s]+)")
 
 
@@ -38,3 +39,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     if page.file.src_uri in ROOT_PAGES:
         return markdown.replace("](docs/", "](")
     return _OUTSIDE.sub(r"](\1", markdown)
+
+
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:  # noqa: ARG001
+    """Remove the backslashes before bars, which code in tables needs only in Markdown."""
+    return _CODE.sub(lambda code: code[0].replace("\\|", "|"), html)

@@ -40,13 +40,13 @@ def pseudo(text: str) -> str:
 
 def run_pseudo(folder: Path) -> None:
     """Let the program operate itself in the made-up language; list what is wrong on its pages."""
-    from handcal_gui.translation import use_translator
+    from handcal_gui.app.translation import use_translator
 
     use_translator(pseudo)
     from PySide6.QtWidgets import QApplication, QWidget
 
-    from handcal_gui import app
-    from handcal_gui.autopilot.screenshots import Screenshots
+    from handcal_gui.app import start
+    from handcal_gui.app.autopilot.screenshots import Screenshots
 
     said: set[str] = set()
     save = Screenshots.save
@@ -61,12 +61,12 @@ def run_pseudo(folder: Path) -> None:
                         sys.stdout.write(f"{name}: {line}\n")
 
     Screenshots.save = save_and_look  # type: ignore[method-assign]
-    app.translate_texts = lambda _app: None  # the made-up language stays
+    start.translate_texts = lambda _app: None  # the made-up language stays
     folder.mkdir(parents=True, exist_ok=True)
     arguments = ["--screenshots", folder, "--output", folder / "output", "--seed", "3"]
     arguments += ["--preferences", folder / "preferences.json", "--size", "1366x768"]
     sys.argv[1:] = map(str, arguments)
-    app.main()
+    start.main()
 
 
 def faults(widget: object) -> list[str]:

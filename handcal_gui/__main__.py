@@ -1,6 +1,6 @@
 """``python -m handcal_gui``."""
 
-from handcal_gui.app import main
+from handcal_gui.app.start import main
 
 if __name__ == "__main__":
     main()

@@ -37,11 +37,11 @@ from handcal.link.transport import UdpTransport
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
-from handcal_gui.app import keep_window_quick, use_english_capitals
+from handcal_gui.app.preferences import PreferencesFile
+from handcal_gui.app.program import Program
+from handcal_gui.app.start import keep_window_quick, use_english_capitals
+from handcal_gui.calibrate.guide.view import Action
 from handcal_gui.engine.garbage import collect_in_this_thread
-from handcal_gui.pages.wizard.view import Action
-from handcal_gui.preferences import PreferencesFile
-from handcal_gui.program import Program
 
 RATES_HZ = (30, 60, 90)
 _LIMITS = {30: (None, 30.0, 80.0), 60: (59.0, 12.0, 33.0), 90: (80.0, None, None)}
@@ -66,7 +66,7 @@ with HeadsetClient(pc, key, HeadsetIdentity(new_device_id())) as headset:
         time.sleep(1 / 60)
 """
 _FIRST_WINDOW = (
-    "from handcal_gui.app import first_window as show; from PySide6.QtCore import QSize; "
+    "from handcal_gui.app.start import first_window as show; from PySide6.QtCore import QSize; "
     "from PySide6.QtWidgets import QApplication; a = QApplication([]); a.setStyle('Fusion'); "
     "w = show(QSize(1280, 800))"
 )

@@ -67,8 +67,8 @@ _LONG = {
 }
 """Files of long series that are not quick; the files beside them test the same code."""
 _PROGRAMS = {
-    "tests/gui/test_real_window.py",
-    "tests/gui/test_app.py",
+    "tests/gui/app/test_real_window.py",
+    "tests/gui/app/test_start.py",
     "tests/station/test_station.py",
     "tests/cli/test_demo.py",
 }

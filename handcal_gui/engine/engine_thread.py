@@ -17,8 +17,8 @@ from handcal.core.errors import HandcalError
 from handcal.session.unfinished import summarize
 from handcal.station.snapshot import Snapshot
 from handcal.station.station import Station
+from handcal_gui.app.translation import tr
 from handcal_gui.engine.worker import Worker
-from handcal_gui.translation import tr
 
 _LOG = logging.getLogger(__name__)
 

@@ -10,8 +10,8 @@ from PySide6.QtCore import Signal
 
 from handcal.core.errors import CancelledError, HandcalError
 from handcal.core.progress import Progress
+from handcal_gui.app.translation import tr
 from handcal_gui.engine.worker import Worker
-from handcal_gui.translation import tr
 
 _LOG = logging.getLogger(__name__)
 _STEPS = 1000

@@ -6,9 +6,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QWidget
 
-from handcal_gui.keys import add_action
-from handcal_gui.theme import SPACING_PX
-from handcal_gui.translation import tr
+from handcal_gui.app.keys import add_action
+from handcal_gui.app.theme import SPACING_PX
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.job_bar import JobBar
 from handcal_gui.widgets.key_cap import KeyCap

@@ -7,8 +7,8 @@ import logging
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
-from handcal_gui.translation import tr
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import hbox
 from handcal_gui.widgets.sentence import sentence

@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QGuiApplication, QPalette
 from PySide6.QtWidgets import QFrame, QLabel, QLineEdit, QWidget
 
-from handcal_gui.theme import SPACING_PX
-from handcal_gui.translation import tr
+from handcal_gui.app.theme import SPACING_PX
+from handcal_gui.app.translation import tr
 
 _SHOWN_MS = 3000
 

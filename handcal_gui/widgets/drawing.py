@@ -10,8 +10,8 @@ from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.io.resources import resource_path
-from handcal_gui.theme import colors, follow_theme
-from handcal_gui.translation import tr
+from handcal_gui.app.theme import colors, follow_theme
+from handcal_gui.app.translation import tr
 
 _LARGEST_SCALE = 1.25
 """At which the text is half as large again as the window's."""

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.widgets.fields import label_for, make_equally_wide
 from handcal_gui.widgets.layouts import fit_soon
 from handcal_gui.widgets.path_field import PathField

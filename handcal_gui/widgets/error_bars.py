@@ -12,8 +12,8 @@ from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPixmap
 from handcal.core.types import EYES, Eye, VerdictName
 from handcal.session.judged_trials import is_doubted
 from handcal.session.library import EyeOutcome
-from handcal_gui.theme import Colors, colors
-from handcal_gui.translation import tr
+from handcal_gui.app.theme import Colors, colors
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.result_rows import EYE_NAMES, NOTHING, VERDICT_COLORS
 
 PICTURE_PX = QSize(40, 23)

@@ -25,9 +25,9 @@ from PySide6.QtWidgets import (
 )
 
 from handcal.report.cells import MINUS, with_minus
-from handcal_gui.keys import add_action, native
-from handcal_gui.theme import SPACING_PX, scale_font, set_style
-from handcal_gui.translation import tr
+from handcal_gui.app.keys import add_action, native
+from handcal_gui.app.theme import SPACING_PX, scale_font, set_style
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.brief import show_briefly
 from handcal_gui.widgets.layouts import hbox
 

@@ -8,8 +8,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from handcal.station.checks.doctor import Finding, Health
-from handcal_gui.theme import SPACING_PX, colors, follow_theme, icon
-from handcal_gui.translation import tr
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import button, paragraph, with_name
 from handcal_gui.widgets.sentence import sentence
 

@@ -12,7 +12,7 @@ from PySide6.QtGui import QImage, QPainter, QPaintEvent, QTransform
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from handcal.core.types import UInt8, UInt16
-from handcal_gui.theme import SPACING_PX
+from handcal_gui.app.theme import SPACING_PX
 
 Image: TypeAlias = UInt8 | UInt16
 

@@ -8,9 +8,9 @@ from typing import Any
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QLabel, QMessageBox, QProgressBar, QWidget
 
+from handcal_gui.app.theme import SPACING_PX
+from handcal_gui.app.translation import tr
 from handcal_gui.engine.jobs import Job, Work
-from handcal_gui.theme import SPACING_PX
-from handcal_gui.translation import tr
 from handcal_gui.widgets.elided_label import ElidedLabel
 from handcal_gui.widgets.fields import button, fill_row, with_name
 

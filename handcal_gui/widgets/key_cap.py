@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
-from handcal_gui.keys import native
-from handcal_gui.theme import SPACING_PX, scale_font, set_style
+from handcal_gui.app.keys import native
+from handcal_gui.app.theme import SPACING_PX, scale_font, set_style
 from handcal_gui.widgets.fields import with_name
 
 

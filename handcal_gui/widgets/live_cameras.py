@@ -14,8 +14,8 @@ from handcal.camera.settings import RealSenseSettings
 from handcal.camera.view_source import REALSENSE, open_view_source
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.types import CameraIdentity, Frame, UInt8
-from handcal_gui.theme import SPACING_PX
-from handcal_gui.translation import tr
+from handcal_gui.app.theme import SPACING_PX
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import choice, label_for
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.live_images import Images, LiveImages

@@ -12,8 +12,8 @@ from PySide6.QtCore import QObject, Signal
 from handcal.camera.viewpoint import ViewpointCamera
 from handcal.core.errors import CameraTimeoutError, HandcalError
 from handcal.core.types import UInt8
+from handcal_gui.app.translation import tr
 from handcal_gui.engine.worker import Worker
-from handcal_gui.translation import tr
 
 _LOG = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel
 
-from handcal_gui.theme import number_font
+from handcal_gui.app.theme import number_font
 
 UNKNOWN = "–"
 

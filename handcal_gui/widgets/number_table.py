@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal_gui.theme import SPACING_PX, flat_header, number_font, set_style
+from handcal_gui.app.theme import SPACING_PX, flat_header, number_font, set_style
 
 _PARTS = re.compile(" (?=±|mm)")
 """Between the parts of a cell that can have their own lines."""

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QGuiApplication
 from PySide6.QtWidgets import QMessageBox, QWidget
 
-from handcal_gui.translation import tr
+from handcal_gui.app.translation import tr
 
 
 def open_path(window: QWidget, path: Path) -> None:

@@ -22,8 +22,8 @@ from PySide6.QtWidgets import (
 
 from handcal.core.errors import HandcalError
 from handcal.io.files import user_path
-from handcal_gui.keys import native
-from handcal_gui.translation import tr
+from handcal_gui.app.keys import native
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import button, fill_row, plain_tooltip
 
 INTRINSICS_FILES = tr("Intrinsics (*.yaml *.yml *.xml *.json)")

@@ -9,7 +9,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QWidget
 
 from handcal.report.cells import with_minus
-from handcal_gui.theme import SPACING_PX, colors, follow_theme
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme
 from handcal_gui.widgets.layouts import vbox
 
 pg.setConfigOptions(antialias=True)
@@ -84,7 +84,7 @@ class Plot(QWidget):
         Parameters
         ----------
         role : str
-            A field of `handcal_gui.theme.Colors`.
+            A field of `handcal_gui.app.theme.Colors`.
         name : str or None
             Name in the legend.
         dashed : bool

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
 
 from handcal.core.errors import FileError
 from handcal.io.files import write_atomic
-from handcal_gui.translation import tr
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.brief import show_briefly
 from handcal_gui.widgets.fields import plain_message
 from handcal_gui.widgets.sentence import sentence

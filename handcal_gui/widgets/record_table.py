@@ -16,9 +16,9 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from handcal_gui.keys import add_action
-from handcal_gui.theme import SPACING_PX, colors, flat_header, number_font
-from handcal_gui.translation import tr
+from handcal_gui.app.keys import add_action
+from handcal_gui.app.theme import SPACING_PX, colors, flat_header, number_font
+from handcal_gui.app.translation import tr
 
 _EMPTY_MARGINS = QMargins(*4 * (2 * SPACING_PX,))
 _NO_INDEX = QModelIndex()

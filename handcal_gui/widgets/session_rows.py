@@ -14,7 +14,7 @@ from handcal.report.cells import signed
 from handcal.session.session import SessionRecord
 from handcal.session.state import Kind, SessionEvent
 from handcal.session.trial import Trial, TrialSpread, trial_spread
-from handcal_gui.translation import tr
+from handcal_gui.app.translation import tr
 from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.record_table import RecordColumn

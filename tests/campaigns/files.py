@@ -110,7 +110,7 @@ def _make_seeds(seeds: Path) -> None:
     boxes = {"color.jpg": [[10.0, 10.0, 100.0, 100.0]]}
     (seeds / "boxes.json").write_text(json.dumps(boxes))
     with contextlib.suppress(ImportError):
-        from handcal_gui.preferences import Preferences, PreferencesFile
+        from handcal_gui.app.preferences import Preferences, PreferencesFile
 
         PreferencesFile(seeds / "preferences.json").save(Preferences())
 
@@ -151,7 +151,7 @@ def _cases(seeds: Path) -> Iterable[tuple[str, Case]]:
         return make
 
     def preferences(path: str) -> Callable[[], object]:
-        from handcal_gui.preferences import PreferencesFile
+        from handcal_gui.app.preferences import PreferencesFile
 
         return lambda: PreferencesFile(Path(path)).load()
 

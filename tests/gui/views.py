@@ -18,9 +18,9 @@ from handcal.session.session import SessionRecord
 from handcal.session.state import SessionEvent, SessionState
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
-from handcal_gui.pages.wizard.step_views import save_view
-from handcal_gui.pages.wizard.steps import Wizard
-from handcal_gui.pages.wizard.view import Action, Step, WizardView
+from handcal_gui.calibrate.guide.step_views import save_view
+from handcal_gui.calibrate.guide.steps import Wizard
+from handcal_gui.calibrate.guide.view import Action, Step, WizardView
 
 RECOMMENDED = PlanSettings("recommended", is_automatic=True)
 _ZERO = (0.0, 0.0, 0.0)

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.theme import use_theme
+from handcal_gui.app.theme import use_theme
 from handcal_gui.widgets.drawing import Drawing, themed_drawing
 from tests.helpers import ROOT
 

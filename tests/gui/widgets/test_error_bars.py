@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QImage
 from handcal.core.types import Eye
 from handcal.session.judged_trials import EyeTrials
 from handcal.session.library import EyeOutcome
-from handcal_gui.theme import colors
+from handcal_gui.app.theme import colors
 from handcal_gui.widgets.error_bars import PICTURE_PX, error_bars, error_text, picture_text
 
 pytestmark = pytest.mark.usefixtures("qtbot")

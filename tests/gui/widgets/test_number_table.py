@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.theme import use_theme
+from handcal_gui.app.theme import use_theme
 from handcal_gui.widgets.number_table import NumberTable, Row
 
 ROWS = (

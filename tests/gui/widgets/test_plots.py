@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from handcal_gui import theme
+from handcal_gui.app import theme
 from handcal_gui.widgets.plots import Plot
 
 

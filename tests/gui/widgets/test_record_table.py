@@ -7,9 +7,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.theme import SPACING_PX, number_font
+from handcal_gui.app.theme import SPACING_PX, number_font
+from handcal_gui.calibrate.parts.record_tabs import RecordTabs
 from handcal_gui.widgets.record_table import RecordColumn, RecordTable
-from handcal_gui.widgets.record_tabs import RecordTabs
 from tests.gui.helpers import show
 
 COLUMNS = (RecordColumn("No.", "Number"), RecordColumn("What", "Anything", is_number=False))

@@ -1,0 +1,1 @@
+"""The program: its start, its windows' life, menus, keys, theme and preferences."""

@@ -1,0 +1,353 @@
+"""The program: builds window, pages and panels, connects them, and closes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication, QMessageBox
+
+from handcal.calibration.plan import with_eyes
+from handcal.core.errors import FileError
+from handcal.session.session import Session
+from handcal.station.settings import StationSettings
+from handcal.station.station import Station
+from handcal_gui import FIRST_SIZE_PX
+from handcal_gui.app.edit_menu import add_edit_menu
+from handcal_gui.app.help_menu import add_help_menu, read_manual
+from handcal_gui.app.keys import NoAltLetters
+from handcal_gui.app.preferences import CurrentPreferences, Preferences, PreferencesFile
+from handcal_gui.app.separate_windows import SeparateWindows
+from handcal_gui.app.theme import use_theme
+from handcal_gui.app.translation import tr
+from handcal_gui.calibrate.camera.panel import CameraPanel
+from handcal_gui.calibrate.cloud.panel import CloudPanel
+from handcal_gui.calibrate.control.compare import Comparison
+from handcal_gui.calibrate.control.live import CalibrationController
+from handcal_gui.calibrate.control.review import ReviewController
+from handcal_gui.calibrate.docks import Panels
+from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
+from handcal_gui.calibrate.guide.wizard import WizardPanel
+from handcal_gui.calibrate.results.panel import ResultsPanel
+from handcal_gui.calibrate.review_page import ReviewPage
+from handcal_gui.calibrate.rotation.panel import RotationPanel
+from handcal_gui.calibrate.session.panel import SessionPanel
+from handcal_gui.calibrate.start.example import copy_example
+from handcal_gui.calibrate.start.start_page import StartPage
+from handcal_gui.calibrate.trials.panel import TrialsPanel
+from handcal_gui.calibrate.wearer_view.panel import WearerViewPanel
+from handcal_gui.calibrate.window import MainWindow, Page
+from handcal_gui.connect.link_panel import LinkPanel
+from handcal_gui.manual.window import Manual
+from handcal_gui.widgets.fields import plain_message
+from handcal_gui.widgets.sentence import sentence
+
+_AGAIN_MS = 100
+"""Wait for the code behind a closed question to go on."""
+
+
+class Program(QObject):
+    """Owns the window, with its pages and panels, and the controllers behind it.
+
+    Parameters
+    ----------
+    file : PreferencesFile
+    remembers : bool
+        Whether changes of the preferences are written to the file.
+
+    Attributes
+    ----------
+    window : MainWindow
+    wizard_panel : WizardPanel
+    live : CalibrationController
+    review : ReviewController
+    start : StartPage
+    windows : SeparateWindows
+    manual : Manual
+    """
+
+    def __init__(self, file: PreferencesFile, remembers: bool = True) -> None:
+        super().__init__()
+        self._current = CurrentPreferences(file, remembers)
+        self._use_theme()
+        QGuiApplication.styleHints().colorSchemeChanged.connect(self._use_theme)
+        panels = Panels(
+            camera=CameraPanel(),
+            cloud=CloudPanel(),
+            wearer_view=WearerViewPanel(),
+            rotation=RotationPanel(),
+            results=ResultsPanel(),
+            fine_tune=FineTunePanel(),
+            trials=TrialsPanel(),
+            session=SessionPanel(),
+            link=LinkPanel(),
+        )
+        self.start = StartPage(self.preferences, self._current.pairings.open_key())
+        self.wizard_panel = WizardPanel()
+        review_page = ReviewPage()
+        self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
+        self.manual = Manual(self.window)
+        NoAltLetters(self.window)
+        comparison = Comparison(panels.results)
+        self.live = CalibrationController(self.window, self.wizard_panel, comparison)
+        self.review = ReviewController(self.window, review_page, comparison)
+        self.windows = SeparateWindows(
+            self.window, self.start, self.live, self.review, self._current
+        )
+        self._connect(review_page)
+        self._make_menus()
+        state = self._restore()
+        self.show_start()
+        self.window.setWindowState(state)
+        self.window.banner.show_message(self._current.complaint)
+
+    @property
+    def preferences(self) -> Preferences:
+        """The current preferences."""
+        return self._current.now
+
+    def use_for_one_run(self, settings: StationSettings) -> None:
+        """Use settings of the station that are not remembered, such as those of a command."""
+        self._current.use_for_one_run(settings)
+        self.start.show_preferences(self.preferences)
+
+    def start_calibration(self, settings: StationSettings, wearer: str) -> None:
+        """Open a station for a wearer."""
+        self._current.change(station=settings)
+        followed = self._followed(settings)
+        self._run(lambda: Station(followed, wearer, pairings=self._current.pairings))
+
+    def resume_session(self, path: Path) -> None:
+        """Resume a session, at the station that was used last or chosen since."""
+        if not self._may_leave():
+            return
+        self.start.keep_entries(self._current)
+        followed = self._followed(self.preferences.station)
+        self._run(lambda: Station(followed, resume=path, pairings=self._current.pairings))
+
+    def begin_from(self, path: Path) -> None:
+        """Begin a session from a stored one of the same wearer, whose φ is verified first."""
+        if not self._may_leave():
+            return
+        station = self.preferences.station
+        recommended = replace(station, plan=replace(station.plan, name="recommended"))
+        settings = self._followed(recommended)
+        try:
+            record = Session.open(path)
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return
+        plan = replace(settings.plan, usable_eyes=record.facts.usable_eyes)
+        settings = replace(settings, plan=plan)
+        self._run(
+            lambda: Station(settings, record.wearer, pairings=self._current.pairings, former=path)
+        )
+
+    def open_session(self, path: Path) -> None:
+        """Open a stored session for review."""
+        if not self._may_leave():
+            return
+        self.start.keep_entries(self._current)
+        self.live.stop()
+        self.window.banner.clear()
+        self.review.open(path)
+
+    def open_example(self, sessions: Path) -> None:
+        """Open the example session, copied to a session folder."""
+        try:
+            self.open_session(copy_example(sessions))
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+
+    def show_start(self) -> None:
+        """End the calibration or review, and show the start page."""
+        self.start.keep_entries(self._current)
+        self.live.stop()
+        self.review.close()
+        self.start.set_opening(False)
+        self.start.show_preferences(self.preferences)
+        self.window.show_page("start")
+
+    def end(self) -> None:
+        """Close the window without asking, as nobody may be there to answer."""
+        self.window.may_close = lambda: True
+        if (asked := QApplication.activeModalWidget()) is not None:
+            asked.close()
+        self.window.close()
+        if self.window.isVisible():  # it asked whether it may close, and has not gone on yet
+            QTimer.singleShot(_AGAIN_MS, self.end)
+
+    def close(self) -> None:
+        """Save the window's layout and end all running work; safe to call twice."""
+        layouts = self.window.layouts()
+        self.start.keep_entries(self._current)
+        self._current.change(
+            geometry=self.window.saveGeometry().toBase64().toStdString(),
+            live_layout=layouts.get("live", ""),
+            review_layout=layouts.get("review", ""),
+            fine_tune_step_m=self.window.panels.fine_tune.step_m,
+            hidden_layers=self.window.panels.cloud.hidden_layers,
+        )
+        self.windows.close()
+        self.live.stop()
+        self.review.close()
+        self.start.stop()
+
+    def _connect(self, review_page: ReviewPage) -> None:
+        self.start.start_requested.connect(self.start_calibration)
+        self.start.cancel_requested.connect(self.live.cancel)
+        self.start.resume_requested.connect(self.resume_session)
+        self.start.open_requested.connect(self.open_session)
+        self.start.example_requested.connect(self.open_example)
+        self.start.library_requested.connect(self.windows.show_library)
+        self.start.rig_wanted.connect(self.windows.calibrate_rig)
+        self.start.connect_wanted.connect(self.windows.connect_headset)
+        self.start.evaluation_wanted.connect(self.windows.evaluate)
+        self.windows.open_requested.connect(self.open_session)
+        self.windows.resume_requested.connect(self.resume_session)
+        self.windows.manual_wanted.connect(partial(read_manual, self.window, self.manual))
+        self.live.ended.connect(self._on_ended)
+        self.live.opened.connect(self._current.add_session)
+        self.live.export_requested.connect(lambda: self.windows.export())
+        self.live.next_wearer_requested.connect(self._show_next_wearer)
+        self.review.opened.connect(self._current.add_session)
+        self.review.failed.connect(self._on_ended)
+        review_page.export_requested.connect(lambda: self.windows.export())
+        review_page.openxr_requested.connect(lambda: self.windows.use_in_openxr())
+        review_page.resume_requested.connect(self._resume_reviewed)
+        review_page.again_requested.connect(self._begin_from_shown)
+        self.live.slipped.connect(self._begin_from_shown)
+        review_page.close_requested.connect(self.show_start)
+        self.wizard_panel.eyes_chosen.connect(lambda eyes: self._current.change(plan=eyes))
+        self.wizard_panel.hold_changed.connect(
+            lambda is_held: self._current.change(runs_itself=not is_held)
+        )
+        self.window.arrangement_changed.connect(
+            lambda chosen: self._current.change(arrangement=chosen)
+        )
+        panels = self.window.panels
+        panels.session.export_requested.connect(lambda: self.windows.export())
+        panels.session.inspect_requested.connect(self.windows.inspect)
+        panels.link.new_key_requested.connect(self._renew_key)
+        panels.link.connect_requested.connect(self.windows.connect_headset)
+        self._current.not_saved.connect(self.window.banner.show_message)
+        self.window.closing.connect(self.close)
+        self.window.may_close = self._may_leave
+
+    def _make_menus(self) -> None:
+        add = self.window.add_action
+        add("File", tr("&Next wearer"), "Ctrl+N", self._show_next_wearer)
+        add("File", tr("&Open session…"), "Ctrl+O", self.windows.browse)
+        add("File", tr("&Sessions…"), "Ctrl+L", self.windows.show_library)
+        export = add("File", tr("&Export…"), "Ctrl+E", self.windows.export)
+        openxr = add("File", tr("&Use in OpenXR programs…"), "", self.windows.use_in_openxr)
+        inspect = add("File", tr("&Inspect in 3D"), "", self.windows.inspect)
+        self.window.say_why_not(export, self.windows.why_no_export)
+        self.window.say_why_not(openxr, self.windows.why_no_export)
+        self.window.say_why_not(inspect, self.windows.why_no_inspection)
+        add("File", tr("Connect a &headset…"), "", self.windows.connect_headset)
+        add("File", tr("&Calibrate a rig…"), "", self.windows.calibrate_rig)
+        add("File", tr("E&valuate…"), "", self.windows.evaluate)
+        add("File", tr("&Preferences…"), "Ctrl+,", self.windows.edit_preferences)
+        add("File", tr("&Quit"), "Ctrl+Q", self.window.close)
+        add("View", tr("&Reset layout"), "", self.window.reset_layout)
+        add_edit_menu(self.window, self.windows.show_library)
+        add_help_menu(self.window, self.manual, self.windows.make_support_bundle)
+
+    def _restore(self) -> Qt.WindowState:
+        """Restore the window as it was left, and return its state, which is set when all is done.
+
+        Of a hidden window that is maximized, Qt keeps each layout of docks that is restored, to
+        apply it later: with tab bars that are deleted meanwhile, which crashed.
+        """
+        preferences = self.preferences
+        self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
+        self.window.panels.cloud.hide_layers(preferences.hidden_layers)
+        geometry = QByteArray.fromBase64(preferences.geometry.encode())
+        if not self.window.restoreGeometry(geometry):  # none, or that of a far larger screen
+            screen = QGuiApplication.primaryScreen().availableSize()
+            self.window.resize(screen.boundedTo(QSize(*FIRST_SIZE_PX)))
+        state = self.window.windowState()
+        self.window.setWindowState(Qt.WindowState.WindowNoState)
+        layouts: dict[Page, str] = {
+            "live": preferences.live_layout,
+            "review": preferences.review_layout,
+        }
+        self.window.restore_layouts({page: text for page, text in layouts.items() if text})
+        self.window.use_arrangement(preferences.arrangement)
+        return state
+
+    def _use_theme(self) -> None:
+        use_theme(self.preferences.theme)
+
+    def _followed(self, settings: StationSettings) -> StationSettings:
+        """Return settings whose plan the station follows, in the order of eyes that was chosen."""
+        plan = replace(settings.plan, is_automatic=True)
+        if plan.name == "paper":
+            plan = with_eyes(plan, self.preferences.plan)
+        return replace(settings, plan=plan)
+
+    def _run(self, open_station: Callable[[], Station]) -> None:
+        self.review.close()
+        self.window.banner.clear()
+        is_held = not self.preferences.runs_itself
+        self.live.start(open_station, bridges=self.preferences.bridges, is_held=is_held)
+        self.start.set_opening(True)
+        self.window.show_page("start")
+
+    def _show_next_wearer(self) -> None:
+        if self._may_leave():
+            self.window.banner.clear()  # what was said of the former wearer
+            self.show_start()
+
+    def _may_leave(self) -> bool:
+        """Ask before a calibration ends whose newest data could not be written yet."""
+        snapshot = self.live.snapshot
+        problems = [snapshot.not_stored if snapshot else "", self.live.save_notes()]
+        told = [sentence(problem) for problem in problems if problem]
+        if not told:
+            return True
+        told.append(tr("They are lost if the calibration ends now. Cancel, and see to this first."))
+        buttons = QMessageBox.StandardButton
+        answer = QMessageBox.warning(
+            self.window,
+            tr("Not saved yet"),
+            plain_message("\n\n".join(told)),
+            buttons.Discard | buttons.Cancel,
+            buttons.Cancel,
+        )
+        return answer == buttons.Discard
+
+    def _resume_reviewed(self) -> None:
+        if self.review.record is not None:
+            self.resume_session(self.review.record.path)
+
+    def _begin_from_shown(self) -> None:
+        record = self.windows.record
+        if record is not None:
+            self.begin_from(record.path)
+
+    def _on_ended(self, why: str) -> None:
+        if why:
+            self.show_start()
+            self.window.banner.show_message(why)
+        elif self.window.page == "start":  # cancelled
+            self.start.set_opening(False)
+
+    def _renew_key(self) -> None:
+        question = tr(
+            "Make a new pairing key? From the next calibration on, no headset connects until the "
+            "new key is entered in it."
+        )
+        buttons = QMessageBox.StandardButton
+        if QMessageBox.question(self.window, tr("New key"), question) != buttons.Yes:
+            return
+        self._current.renew_pairing_key()
+        self.start.set_pairing_key(self._current.pairings.open_key())
+        self.window.banner.show_message(
+            tr("A new pairing key was made. Enter it in the headsets before the next calibration.")
+        )

@@ -1,0 +1,281 @@
+"""The camera panel: the camera's images with the segmented hand, and its frame rate."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import QBuffer, QIODevice, Qt
+from PySide6.QtGui import QAction, QResizeEvent
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QComboBox,
+    QFileDialog,
+    QLabel,
+    QMessageBox,
+    QWidget,
+)
+
+from handcal.calibration.states import Observation
+from handcal.camera.feed import CameraStatus
+from handcal.core.errors import FileError
+from handcal.core.types import Frame
+from handcal.hand.overlay import contour_px
+from handcal.hand.settings import SegmentSettings
+from handcal.io.files import write_atomic
+from handcal.station.snapshot import Snapshot
+from handcal_gui.app.theme import SPACING_PX, follow_theme, icon
+from handcal_gui.app.translation import tr
+from handcal_gui.calibrate.camera.depth_scale import DepthColors, DepthLegend
+from handcal_gui.calibrate.camera.hand_overlay import HandOverlay
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import let_keys_choose, plain_message, tool_button
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.layouts import hbox, vbox
+from handcal_gui.widgets.number_label import UNKNOWN, NumberLabel
+from handcal_gui.widgets.sentence import sentence
+
+_STATUS_NS = 200_000_000
+"""Interval of the numbers below the image; nobody reads faster."""
+_LONG = 60
+"""Characters of a reason beside the image; the guide and the cloud have the whole."""
+_EMPTY = tr("The camera's image will appear here.")
+_NO_COLOR = tr("This camera has no colour image.")
+
+
+class Mode(StrEnum):
+    """The images that are shown."""
+
+    COLOR = tr("Colour")
+    DEPTH = tr("Depth")
+    BOTH = tr("Both")
+
+
+class CameraPanel(QWidget):
+    """Shows colour and depth with the hand, and the camera's frame rate, latency and losses.
+
+    Parameters
+    ----------
+    parent : QWidget or None
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("camera-panel")
+        self._frame: Frame | None = None
+        self._caption = ""
+        self._status_ns = 0
+        self._pictures = _Pictures()
+        self._status = _Status()
+        self._freeze = QAction(tr("Freeze"), self, checkable=True, autoRepeat=False)
+        self._freeze.setToolTip(tr("Freeze the image (F)"))
+        self._freeze.setWhatsThis(tr("Freeze the camera's image"))
+        self._freeze.setShortcut("F")
+        self._freeze.setIconText(tr("Freeze (F)"))
+        self._mode = QComboBox()
+        self._mode.setAccessibleName(tr("Displayed image"))
+        self._mode.setToolTip(tr("Show the colour image, the depth image or both"))
+        self._mode.addItems(list(Mode))
+        let_keys_choose(self._mode, self, tr("Next displayed image"), "M")
+        self._mode.currentTextChanged.connect(lambda text: self._pictures.set_mode(Mode(text)))
+        save = QAction(tr("Save image…"), self)
+        save.triggered.connect(self._ask_where_to_save)
+        self.addAction(save)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+        self._lay_out()
+        self._pictures.set_mode(Mode.COLOR)
+        follow_theme(self, self._draw_icons)
+        self.begin(SegmentSettings())
+
+    def begin(self, settings: SegmentSettings) -> None:
+        """Clear the images, and mark the depth gate of a session's settings."""
+        self._frame = None
+        self._freeze.setChecked(False)
+        self._pictures.begin(DepthColors((settings.depth_min_m, settings.depth_max_m)))
+        self._pictures.show_text(message=_EMPTY)
+
+    def set_mode(self, mode: Mode) -> None:
+        """Show the colour image, the depth image or both."""
+        self._mode.setCurrentText(mode)
+
+    def show_snapshot(self, snapshot: Snapshot) -> None:
+        """Show the newest frame, unless frozen, and the state of the camera."""
+        if not self._freeze.isChecked() and snapshot.frame is not None:
+            self._show_frame(snapshot.frame, snapshot.observation)
+        message = "" if self._frame else _EMPTY
+        if self._frame and snapshot.camera.problem:
+            message = tr("No image")
+        caption = tr("Frozen") if self._freeze.isChecked() else self._caption
+        self._pictures.show_text(message=message, caption="" if message else caption)
+        if 0 < snapshot.t_host_ns - self._status_ns < _STATUS_NS:
+            return
+        self._status_ns = snapshot.t_host_ns
+        age_ms = (snapshot.t_host_ns - self._frame.t_host_ns) / 1e6 if self._frame else None
+        self._status.show_status(snapshot.camera, age_ms)
+
+    def save_picture(self, path: Path) -> None:
+        """Save the displayed image as PNG; FileError if it cannot be written."""
+        buffer = QBuffer()
+        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+        self._pictures.grab().save(buffer, "PNG")
+        write_atomic(path, bytes(buffer.data().data()))
+
+    def _lay_out(self) -> None:
+        top = hbox(self._mode, (self._status.name, 1), spacing=SPACING_PX)
+        freeze = tool_button(self._freeze)
+        freeze.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        top.addWidget(freeze)
+        vbox(
+            top, (self._pictures, 1), self._status, on=self, margins=SPACING_PX, spacing=SPACING_PX
+        )
+
+    def _draw_icons(self) -> None:
+        self._freeze.setIcon(icon("pause"))
+
+    def _show_frame(self, frame: Frame, seen: Observation | None) -> None:
+        if frame is not self._frame:
+            self._pictures.show_frame(frame)
+        self._frame = frame
+        if seen is not None:
+            self._pictures.show_hand(frame, seen)
+            self._caption = _caption(seen)
+
+    def _ask_where_to_save(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(
+            self, tr("Save image"), "image.png", tr("PNG images (*.png)")
+        )
+        if name:
+            try:
+                self.save_picture(Path(name).with_suffix(".png"))
+            except FileError as error:
+                QMessageBox.warning(self, tr("Save image"), plain_message(str(error)))
+
+
+class _Pictures(QWidget):
+    """The two images, side by side or stacked, whichever makes them larger."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._color = ImageView(tr("Colour image"), has_caption_beside=True)
+        self._color.setObjectName("colour-image")
+        self._depth = ImageView(
+            tr("Depth image"),
+            lambda depth: self._depth_colors.colorize(depth),
+            has_caption_beside=True,
+        )
+        self._depth.setObjectName("depth-image")
+        self._legend = DepthLegend()
+        self._depth_side = QWidget()
+        hbox(
+            (self._depth, 1), self._legend, on=self._depth_side, margins=0, spacing=SPACING_PX // 2
+        )
+        self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(SPACING_PX)
+        self._layout.addWidget(self._color, 1)
+        self._layout.addWidget(self._depth_side, 1)
+
+    def begin(self, depth_colors: DepthColors) -> None:
+        self._depth_colors = depth_colors
+        self._legend.show_colors(depth_colors)
+        for view in (self._color, self._depth):
+            view.show_image(None)
+            view.show_overlay(None)
+
+    def set_mode(self, mode: Mode) -> None:
+        self._color.setVisible(mode is not Mode.DEPTH)
+        self._depth_side.setVisible(mode is not Mode.COLOR)
+
+    def show_frame(self, frame: Frame) -> None:
+        self._depth_colors.set_scale(frame.depth_scale_m)
+        self._color.show_image(frame.color)
+        self._depth.show_image(frame.depth)
+
+    def show_hand(self, frame: Frame, seen: Observation) -> None:
+        if seen.cloud is None:
+            self._color.show_overlay(None)
+            self._depth.show_overlay(None)
+            return
+        cloud = seen.cloud
+        depth_px, color_px = contour_px(cloud, frame)
+        self._depth.show_overlay(HandOverlay(cloud, depth_px, depth_px, seen.is_over_limit).draw)
+        if color_px is not None:
+            self._color.show_overlay(
+                HandOverlay(cloud, depth_px, color_px, seen.is_over_limit).draw
+            )
+
+    def show_text(self, *, message: str, caption: str = "") -> None:
+        is_in_depth = not self._color.has_image and not self._depth_side.isHidden()
+        is_in_color = not self._color.isHidden() and not is_in_depth
+        self._depth.show_text(message=message, caption="" if is_in_color else caption)
+        if self._depth.has_image and not self._color.has_image:
+            message = message or _NO_COLOR
+        self._color.show_text(message=message, caption=caption if is_in_color else "")
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Stack the images if that makes them larger."""
+        super().resizeEvent(event)
+        width, height = 9 * self.width(), 16 * self.height()
+        is_stacked = min(width, height / 2) > min(width / 2, height)
+        directions = QBoxLayout.Direction
+        self._layout.setDirection(directions.TopToBottom if is_stacked else directions.LeftToRight)
+
+
+class _Status(QWidget):
+    """One line of numbers with fixed widths; the camera's name stands elsewhere."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.name = ElidedLabel()
+        self.name.setObjectName("camera-name")
+        self._rate = NumberLabel(
+            "camera-rate", "999.9 fps", tr("Frames per second over the last second")
+        )
+        self._age = NumberLabel(
+            "camera-age", "9999.9 ms", tr("Time since the displayed frame arrived, in milliseconds")
+        )
+        self._dropped = NumberLabel(
+            "camera-dropped",
+            "99999",
+            tr("Frames missing from the camera's own count since it started"),
+        )
+        hbox(
+            self._rate,
+            0,
+            QLabel(tr("Age")),
+            self._age,
+            0,
+            QLabel(tr("Dropped")),
+            self._dropped,
+            on=self,
+            margins=0,
+            spacing=SPACING_PX // 2,
+        )
+        self.show_status(CameraStatus(UNKNOWN), None)
+
+    def show_status(self, camera: CameraStatus, age_ms: float | None) -> None:
+        self.name.setText(camera.name)
+        self._rate.setText(f"{camera.rate_hz:.1f} fps")
+        self._age.setText(_age(age_ms))
+        self._dropped.setText(str(camera.dropped))
+
+
+def _age(age_ms: float | None) -> str:
+    if age_ms is None:
+        return UNKNOWN
+    if age_ms < 1_000:
+        return f"{age_ms:.1f} ms"
+    return f"{age_ms / 1e3:.1f} s" if age_ms < 10_000 else f"{age_ms / 1e3:.0f} s"
+
+
+def _caption(seen: Observation) -> str:
+    """Return a caption for the hand."""
+    if seen.has_changed:
+        return sentence(seen.shape_text)
+    if seen.is_over_limit and seen.rotation_rad is not None:
+        return tr("Rotated by {:.1f}°: too far").format(
+            np.degrees(np.linalg.norm(seen.rotation_rad))
+        )
+    problem = sentence(seen.problem)
+    return problem if len(problem) <= _LONG else problem.split(";")[0].split(",")[0]

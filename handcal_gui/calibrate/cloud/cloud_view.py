@@ -1,0 +1,235 @@
+"""A 3D view of points that can be rotated, zoomed and panned with the mouse or keys.
+
+Drawn by `handcal_gui.calibrate.parts.splat` instead of OpenGL, which is missing or slow with
+software rendering, on remote desktops and in virtual machines.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPixmap,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from handcal.core.types import Float64, UInt8
+from handcal_gui.app.keys import add_action
+from handcal_gui.app.theme import SPACING_PX, colors, number_font
+from handcal_gui.app.translation import tr
+from handcal_gui.calibrate.cloud.box_axes import Box, draw_box, draw_scale
+from handcal_gui.calibrate.cloud.orbit import Direction, Orbit
+from handcal_gui.calibrate.parts.paint_turns import update_in_turn
+from handcal_gui.calibrate.parts.residual_scale import OUTLIER, draw_crosses
+from handcal_gui.calibrate.parts.splat import rgb, splat
+
+_RAD_PER_PX = 0.01
+_ZOOM_PER_NOTCH = 1.2
+_KEY_TURN_RAD = math.radians(10.0)
+_POINT_MM = 1.5
+"""Size of a point, about the distance between neighbours on a hand; limited in pixels."""
+_LEAST_POINT_PX, _MOST_POINT_PX = 2.0, 6.0
+_LABELS_EMS = (7.0, 4.5)
+"""Space for the box's labels: left and right together, and above and below together."""
+_UNLABELLED_EMS = (1.0, 1.0)
+_LEAST_LABELLED_EMS = 11.0
+"""Height below which the box has no labels: the hand would be too small beside them."""
+_NONE = np.empty((0, 3))
+
+
+class CloudView(QWidget):
+    """Shows coloured points in a box with millimetre axes, from any direction."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("cloud-view")
+        self.setAccessibleName(tr("3D view of the hand cloud"))
+        self.setToolTip(
+            tr(
+                "Drag to rotate, drag with the right or middle button to move, scroll to zoom, "
+                "double-click to reset the view. Keys: arrows, +, −, 1, 2, 3 and R."
+            )
+        )
+        self.setMinimumSize(160, 80)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # as ImageView
+        self._points_mm, self._colors = _NONE, np.empty((0, 3), np.uint8)
+        self._from_mm = self._to_mm = _NONE
+        self._text = ""
+        self._box: Box | None = None
+        self._orbit = Orbit()
+        self._is_fitted = True
+        self._dragged_from = QPointF()
+        self._backdrop_key: object = None
+        self._backdrop = QPixmap()
+        self._add_actions()
+
+    @property
+    def orbit(self) -> Orbit:
+        """The present view of the points."""
+        return self._orbit
+
+    def show_points(self, points_mm: Float64, point_colors: UInt8, text: str) -> None:
+        """Show points with a caption, or a message if there are none; outliers are crosses.
+
+        Parameters
+        ----------
+        points_mm : (N, 3) float64
+            Right, down and away.
+        point_colors : (N, 3) uint8
+            RGB.
+        text : str
+        """
+        self._points_mm, self._colors, self._text = points_mm, point_colors, text
+        if len(points_mm):
+            smallest = Box.around(points_mm)
+            if self._box is None or not self._box.still_fits(smallest):
+                self._box = smallest
+        self.setAccessibleDescription(text)
+        update_in_turn(self)
+
+    def show_lines(self, from_mm: Float64, to_mm: Float64) -> None:
+        """Show lines over the points, between (M, 3) start points and (M, 3) end points."""
+        self._from_mm, self._to_mm = from_mm, to_mm
+        update_in_turn(self)
+
+    def look(self, direction: Direction) -> None:
+        """Show the whole scene from one of the given directions."""
+        self._orbit = self._orbit.looking(direction)
+        self._is_fitted = True
+        update_in_turn(self)
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Draw box, points, lines, scale and caption, or the message."""
+        painter = QPainter(self)
+        painter.setPen(self.palette().windowText().color())
+        if not len(self._points_mm) or self._box is None:
+            painter.fillRect(self.rect(), QColor(colors().canvas))
+            margin = 2 * SPACING_PX
+            within = self.rect().adjusted(margin, margin, -margin, -margin)
+            flags = Qt.AlignmentFlag.AlignCenter.value | Qt.TextFlag.TextWordWrap.value
+            painter.drawText(within, flags, self._text)
+            return
+        if self._is_fitted:
+            em = self.fontMetrics().height()
+            across, down = _LABELS_EMS if self._is_labelled else _UNLABELLED_EMS
+            self._orbit = self._orbit.fitted(
+                self._box.corners_mm, self.width() - across * em, self.height() - down * em
+            )
+        painter.drawPixmap(0, 0, self._draw_backdrop(self._box))
+        self._paint_points(painter)
+        self._paint_lines(painter)
+        if self._is_labelled:  # the caption explains the labels
+            top = SPACING_PX + self.fontMetrics().ascent()  # the scale bar is at the bottom
+            painter.drawText(QPointF(SPACING_PX, top), self._text)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Start dragging."""
+        self._dragged_from = event.position()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Rotate with the left button, move with any other."""
+        moved = event.position() - self._dragged_from
+        self._dragged_from = event.position()
+        if event.buttons() & Qt.MouseButton.LeftButton:
+            self._turn(-_RAD_PER_PX * moved.x(), _RAD_PER_PX * moved.y())
+        else:
+            self._change(self._orbit.panned(moved.x(), moved.y()))
+
+    def mouseDoubleClickEvent(self, _: QMouseEvent) -> None:
+        """Reset the view."""
+        self.look(Direction.ASLANT)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom."""
+        self._change(self._orbit.zoomed(_ZOOM_PER_NOTCH ** (event.angleDelta().y() / 120)))
+
+    def _add_actions(self) -> None:
+        """Rotate by arrow keys, zoom by + and −, select a direction by 1, 2, 3 and R."""
+        turn, zoom = _KEY_TURN_RAD, _ZOOM_PER_NOTCH
+        for text, keys, do in (
+            (tr("Rotate left"), "Left", lambda: self._turn(turn, 0.0)),
+            (tr("Rotate right"), "Right", lambda: self._turn(-turn, 0.0)),
+            (tr("Rotate up"), "Up", lambda: self._turn(0.0, -turn)),
+            (tr("Rotate down"), "Down", lambda: self._turn(0.0, turn)),
+            (tr("Zoom in"), "+ =", lambda: self._change(self._orbit.zoomed(zoom))),
+            (tr("Zoom out"), "-", lambda: self._change(self._orbit.zoomed(1.0 / zoom))),
+            (tr("Front"), "1", lambda: self.look(Direction.FRONT)),
+            (tr("Side"), "2", lambda: self.look(Direction.SIDE)),
+            (tr("Top"), "3", lambda: self.look(Direction.TOP)),
+            (tr("Reset"), "R", lambda: self.look(Direction.ASLANT)),
+        ):
+            add_action(self, text, keys, do, context=Qt.ShortcutContext.WidgetShortcut)
+
+    def _turn(self, yaw_rad: float, pitch_rad: float) -> None:
+        self._orbit = self._orbit.turned(yaw_rad, pitch_rad)
+        update_in_turn(self)
+
+    def _change(self, orbit: Orbit) -> None:
+        """Set a zoom or position chosen by the user; the view is no longer fitted."""
+        self._orbit = orbit
+        self._is_fitted = False
+        update_in_turn(self)
+
+    def _paint_points(self, painter: QPainter) -> None:
+        ratio, size = self.devicePixelRatio(), self._device_size()
+        points_px = ratio * self._orbit.project(self._points_mm)
+        points_px[:, :2] += np.divide(size, 2.0)
+        background = rgb(colors().canvas)
+        point_px = np.clip(_POINT_MM * self._orbit.px_per_mm, _LEAST_POINT_PX, _MOST_POINT_PX)
+        seen, shades = points_px, self._colors
+        # Channel by channel, a tenth of the time; a live cloud, painted for every frame, has none.
+        red, green, blue = (shades[:, i] == shade for i, shade in enumerate(rgb(OUTLIER)))
+        if (is_outlier := red & green & blue).any():
+            seen, shades = seen[~is_outlier], shades[~is_outlier]
+        image = splat(seen, shades, background, size, round(ratio * point_px))
+        painter.drawImage(QRectF(self.rect()), image)
+        painter.setPen(QPen(QColor(OUTLIER), 1))
+        draw_crosses(painter, points_px[is_outlier, :2] / ratio, point_px)
+        painter.setPen(self.palette().windowText().color())
+
+    def _paint_lines(self, painter: QPainter) -> None:
+        if not len(self._from_mm):
+            return
+        painter.save()
+        painter.translate(self.width() / 2, self.height() / 2)
+        painter.setPen(QPen(QColor(colors().good), 1))
+        ends = np.hstack([self._orbit.project(p)[:, :2] for p in (self._from_mm, self._to_mm)])
+        painter.drawLines([QLineF(*end) for end in ends.tolist()])
+        painter.restore()
+
+    def _draw_backdrop(self, box: Box) -> QPixmap:
+        """Return the canvas with box and scale; redrawn only if one of them has changed."""
+        ratio = self.devicePixelRatio()
+        key = box, self._orbit, self.size(), ratio, colors(), self.palette().cacheKey()
+        if key != self._backdrop_key:
+            self._backdrop_key = key
+            self._backdrop = QPixmap(*self._device_size())
+            self._backdrop.setDevicePixelRatio(ratio)
+            self._backdrop.fill(QColor(colors().canvas))
+            painter = QPainter(self._backdrop)
+            painter.setPen(self.palette().windowText().color())
+            corner = QPointF(self.width() - SPACING_PX, self.height() - SPACING_PX)
+            draw_scale(painter, self._orbit, corner)
+            painter.setFont(number_font(0.85))
+            painter.translate(self.width() / 2, self.height() / 2)
+            draw_box(painter, box, self._orbit, is_labelled=self._is_labelled)
+            painter.end()
+        return self._backdrop
+
+    @property
+    def _is_labelled(self) -> bool:
+        return self.height() >= _LEAST_LABELLED_EMS * self.fontMetrics().height()
+
+    def _device_size(self) -> tuple[int, int]:
+        ratio = self.devicePixelRatio()
+        return round(ratio * self.width()), round(ratio * self.height())

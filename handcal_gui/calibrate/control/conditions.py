@@ -1,0 +1,148 @@
+"""The message about the worst problem at present; it does not flash or appear during the start."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+from handcal.calibration.states import Observation
+from handcal.camera.feed import CameraStatus
+from handcal.station.snapshot import Snapshot
+from handcal_gui.app.translation import tr
+
+_LASTS_S = 0.8
+"""Time for which a problem lasts before it is shown."""
+_STARTING_S = 4.0
+"""The same before the first frame and pose: camera and headset take time to start."""
+_SLOW_HZ, _FAST_HZ = 8.0, 10.0
+"""Frame rates below which, and above which again, hand and confirmation are hard to match."""
+_SLOW_S = 3.0
+_ENOUGH_HZ, _MOST_LOST = 20.0, 0.5
+"""Below this rate, frames lost in this computer are named if they are more than this share of the
+frames taken."""
+_LOST_OVER_S = 1.0
+_FEW_POSES_HZ = 5.0
+"""Poses a second below which no hand can be placed in time."""
+_FEW_POSES = tr("The headset sends too few poses to place a hand; close other programs on it")
+
+
+class Conditions:
+    """Watches the snapshots of one calibration.
+
+    Parameters
+    ----------
+    is_usb : bool
+        True if the camera is connected by USB, which may be too slow.
+    is_virtual : bool
+        True if the headset is virtual: without it the simulated camera sees nothing.
+
+    Attributes
+    ----------
+    is_slow : bool
+        True if too few frames per second are processed.
+    """
+
+    def __init__(self, *, is_usb: bool = False, is_virtual: bool = False) -> None:
+        self.is_slow = False
+        self._is_usb = is_usb
+        self._is_virtual = is_virtual
+        self._slow_text = ""
+        self._rate_since_s: float | None = None
+        self._dropped: deque[tuple[float, int]] = deque()
+        self._problem, self._problem_since_s = "", 0.0
+        self._hand_problem, self._hand_since_s = "", 0.0
+        self._seen: Observation | None = None
+        self._seen_s = 0.0
+        self._has_started = False
+
+    def condition(self, snapshot: Snapshot) -> str:
+        """Return the message about the most important problem that lasts; empty if there is none.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+            The newest one.
+        """
+        now_s = 1e-9 * snapshot.t_host_ns
+        camera, link = snapshot.camera, snapshot.link
+        self._has_started |= camera.rate_hz > 0 and link.pose_rate_hz > 0
+        self._watch_rate(camera, now_s)
+        # The only virtual headset that asks to connect is the connected one, after a stall.
+        is_stall = self._is_virtual and snapshot.link_problem == link.notice
+        link_problem = "" if is_stall else snapshot.link_problem
+        ended = link_problem if self._is_virtual and self._has_started else ""
+        found = (
+            (tr("{}; press Restart headset in Link").format(ended.rstrip(".")) if ended else "")
+            or snapshot.not_stored
+            or (tr("{}; see Link").format(snapshot.problem) if snapshot.problem else "")
+            or camera.problem
+            or link_problem
+            or (_FEW_POSES if link.connected and link.pose_rate_hz < _FEW_POSES_HZ else "")
+            or snapshot.contradiction
+            or self._slow_text
+        )
+        if found != self._problem:
+            is_first = not self._problem
+            self._problem = found
+            if is_first or not found:
+                self._problem_since_s = now_s
+        lasts_s = _LASTS_S if self._has_started else _STARTING_S
+        return found if now_s - self._problem_since_s >= lasts_s else ""
+
+    def calm(self, snapshot: Snapshot) -> Snapshot:
+        """Return the snapshot without a passing problem of a hand that is seen.
+
+        While the camera is late, the newest observation stays.
+        """
+        seen, now_s = snapshot.observation, 1e-9 * snapshot.t_host_ns
+        if seen is not None:
+            self._seen, self._seen_s = seen, now_s
+        elif self._is_late(snapshot, now_s):
+            seen = self._seen
+            snapshot = replace(snapshot, observation=seen)
+        problem = "" if seen is None or seen.cloud is None else seen.problem
+        if bool(problem) != bool(self._hand_problem):
+            self._hand_since_s = now_s
+        self._hand_problem = problem
+        if seen is None or not problem or now_s - self._hand_since_s >= _LASTS_S:
+            return snapshot
+        return replace(snapshot, observation=replace(seen, problem=""))
+
+    def _is_late(self, snapshot: Snapshot, now_s: float) -> bool:
+        """Return True if the newest observation still holds: its next frame is only late."""
+        is_same_state = self._seen is not None and self._seen.state is snapshot.procedure.state
+        is_new = now_s - self._seen_s < _LASTS_S
+        return is_same_state and is_new and not snapshot.camera.problem
+
+    def _watch_rate(self, camera: CameraStatus, now_s: float) -> None:
+        """Note that frames are few or many are lost, or that it is over, once this has lasted."""
+        rate_hz, lost_hz = camera.rate_hz, self._lost_hz(camera, now_s)
+        is_few = rate_hz < (_FAST_HZ if self.is_slow else _SLOW_HZ)
+        loses = rate_hz < _ENOUGH_HZ and lost_hz > _MOST_LOST * rate_hz
+        if not self._has_started or rate_hz == 0.0 or (is_few or loses) == self.is_slow:
+            self._rate_since_s = None
+        elif self._rate_since_s is None:
+            self._rate_since_s = now_s
+        elif now_s - self._rate_since_s >= _SLOW_S:
+            self.is_slow, self._rate_since_s = not self.is_slow, None
+            self._slow_text = ""
+            if self.is_slow:
+                # Frames that the camera counted, but nobody took, are lost in this computer.
+                is_camera = self._is_usb and lost_hz == 0.0
+                self._slow_text = _slow_text(rate_hz, is_camera=is_camera)
+
+    def _lost_hz(self, camera: CameraStatus, now_s: float) -> float:
+        """Return the frames per second that were lost recently."""
+        self._dropped.append((now_s, camera.dropped))
+        while len(self._dropped) > 2 and now_s - self._dropped[1][0] >= _LOST_OVER_S:
+            self._dropped.popleft()
+        since_s, before = self._dropped[0]
+        return (camera.dropped - before) / max(now_s - since_s, _LOST_OVER_S)
+
+
+def _slow_text(rate_hz: float, *, is_camera: bool) -> str:
+    """Return the warning; without the rate, which changes and which the camera panel shows."""
+    if rate_hz >= _SLOW_HZ:
+        return tr("fewer than two thirds of the camera's frames are used; close other programs")
+    advice = tr("plug the camera into a USB 3 port") if is_camera else tr("close other programs")
+    return tr("frames per second: often below the {:.0f} needed; {}").format(_SLOW_HZ, advice)

@@ -1,0 +1,1 @@
+"""Parts that several panels and pages of the main window use."""

@@ -1,0 +1,183 @@
+"""The page of a stored session: a summary, and buttons to export or resume it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
+
+from handcal.core.types import Eye
+from handcal.register.results import Results
+from handcal.session.judged_trials import eye_trials
+from handcal.session.session import SessionRecord
+from handcal_gui.app.theme import SPACING_PX, font_px, scale_font
+from handcal_gui.app.translation import tr
+from handcal_gui.calibrate.parts.result_card import ResultCard
+from handcal_gui.calibrate.results.residuals_tab import ResidualsTab
+from handcal_gui.widgets.elided_label import ElidedLabel
+from handcal_gui.widgets.fields import button, main_button, paragraph
+from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
+from handcal_gui.widgets.numbers import pluralize
+from handcal_gui.widgets.result_rows import eyes_text, fine_tuned_texts
+from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.session_rows import RESUME_HELP
+from handcal_gui.widgets.times import local_time
+
+_LOW = 34
+"""Height below which the page leaves out details, in sizes of the font."""
+_LEAST_MAP_PX = 240
+"""Height below which the residual map is left to the panel of the results."""
+_EXPORT = tr("Look at the result, then export it, or resume the session to add to it.")
+_RESUME = tr("Resume the session to make its first alignment.")
+
+
+class ReviewPage(QWidget):
+    """A summary of a session; the panels show its contents.
+
+    Attributes
+    ----------
+    residuals : ResidualsTab
+        The residual map of an alignment, where the window is high enough.
+    export_requested, openxr_requested, resume_requested : Signal()
+    again_requested, close_requested : Signal()
+        *again_requested*: the wearer is to be calibrated again, beginning from this session.
+    """
+
+    export_requested = Signal()
+    openxr_requested = Signal()
+    resume_requested = Signal()
+    again_requested = Signal()
+    close_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("reviewPage")
+        self._title: QLabel = ElidedLabel()
+        scale_font(self._title, 1.6, is_bold=True)
+        self._task = paragraph("reviewTask")
+        self._has_maps = False
+        self._fit_soon = fit_soon(self._fit, self)
+        self._facts = QFormLayout()
+        self._facts.setHorizontalSpacing(2 * SPACING_PX)
+        self._facts.setVerticalSpacing(SPACING_PX)
+        self._card = ResultCard()
+        self.residuals = ResidualsTab()
+        self._export = main_button("reviewExport", tr("E&xport…"))
+        self._openxr = button("reviewOpenxr", tr("&Use in XR"))
+        self._openxr.setToolTip(tr("Use for every OpenXR program on this computer"))
+        self._resume = button("reviewResume", tr("&Resume"))
+        self._resume.setToolTip(RESUME_HELP)
+        self._again = button("reviewAgain", tr("Calibrate &again"))
+        self._again.setToolTip(
+            tr(
+                "For the same wearer again, or after the headset has slipped: starts from "
+                "this result and first verifies each eye"
+            )
+        )
+        close = button("reviewClose", tr("Clo&se"))
+        self._export.clicked.connect(self.export_requested)
+        self._openxr.clicked.connect(self.openxr_requested)
+        self._resume.clicked.connect(self.resume_requested)
+        self._again.clicked.connect(self.again_requested)
+        close.clicked.connect(self.close_requested)
+        buttons = hbox(self._export, self._openxr, self._resume, self._again, 0, close)
+        vbox(
+            self._title,
+            self._task,
+            self._facts,
+            self._card,
+            buttons,
+            (self.residuals, 1),
+            0,
+            on=self,
+            margins=2 * SPACING_PX,
+            spacing=2 * SPACING_PX,
+        )
+
+    def show_session(
+        self,
+        record: SessionRecord,
+        results: Results | None,
+        target_arcmin: float,
+        note: str = "",
+    ) -> None:
+        """Show a session and, if it has been solved, its results.
+
+        Parameters
+        ----------
+        record : SessionRecord
+        results : Results or None
+            None while it is being solved, or if it cannot be solved.
+        target_arcmin : float
+            The lab's target when the session was made.
+        note : str
+            The current activity, or the reason why there are no results or alignments.
+        """
+        self.show_wearer(record.wearer)
+        self._export.setEnabled(record.is_solvable)
+        self._openxr.setEnabled(record.is_solvable)
+        self._again.setEnabled(results is not None)
+        self._task.setText(_EXPORT if record.is_solvable else _RESUME)
+        trials = eye_trials(results, record, target_arcmin) if results else {}
+        self._card.show_results(results, target_arcmin, trials)
+        self._card.setVisible(results is not None)
+        if results is not None:
+            self.residuals.show_results(results, record.alignments)
+        self._has_maps = results is not None and bool(results.alignments)
+        self._fit()
+        while self._facts.rowCount():
+            self._facts.removeRow(0)
+        tuned = list(fine_tuned_texts(results, record)) if results else []
+        for name, caption, fact in _facts(record, tuned, note):
+            text = paragraph(f"review{name}", fact)
+            text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            self._facts.addRow(QLabel(caption, alignment=Qt.AlignmentFlag.AlignTop), text)
+
+    def show_wearer(self, wearer: str) -> None:
+        """Show the wearer's name as the title."""
+        self._title.setText(wearer or tr("Session without a name"))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show the residual map only where it fits below the rest."""
+        super().resizeEvent(event)
+        self._fit_soon.start()
+
+    def _fit(self) -> None:
+        viewport, layout = self.parentWidget() or self, self.layout()
+        is_low = viewport.height() < _LOW * font_px()
+        self._card.show_details(not is_low)
+        if layout is not None:
+            layout.setSpacing(SPACING_PX if is_low else 2 * SPACING_PX)
+        parts = self._title, self._task, self._facts, self._card, self._export
+        others_px = sum(2 * SPACING_PX + part.sizeHint().height() for part in parts)
+        room_px = viewport.height() - others_px - 4 * SPACING_PX
+        self.residuals.setVisible(self._has_maps and room_px > _LEAST_MAP_PX)
+
+
+def _facts(
+    record: SessionRecord, tuned: Sequence[Eye], note: str
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the name, the caption and the text of each fact about a session."""
+    yield "Started", tr("Started"), local_time(record.events[0].time)
+    yield "Rig", tr("Rig"), record.rig.name
+    state = tr("finished") if record.is_finished else tr("not finished")
+    alignments, verified = len(record.alignments), len(record.facts.verified)
+    counts = (
+        pluralize(verified, tr("verified eye"), tr("verified eyes"))
+        if verified and not alignments
+        else pluralize(alignments, tr("alignment"), tr("alignments")),
+        pluralize(len(record.trials), tr("trial"), tr("trials")),
+    )
+    by_hand = (tr("{} fine-tuned").format(eyes_text(tuned).lower()),) if tuned else ()
+    back = (tr("with another φ after going back"),) if record.went_back else ()
+    yield "Contents", tr("Contents"), f"{', '.join((*counts, *by_hand, *back))}; {state}"
+    yield "Folder", tr("Folder"), str(record.path)
+    if note:
+        yield "Note", tr("Note"), note
+    if record.left_out:
+        advice = tr("Repair, in All sessions (Ctrl+L), copies what is sound.")
+        yield "Damaged", tr("Damaged"), f"{sentence(record.left_out)}. {advice}"
+    if record.torn_bytes:
+        yield "Journal", tr("Journal"), tr("The last line is incomplete, as after a crash.")

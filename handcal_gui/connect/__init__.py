@@ -1,0 +1,1 @@
+"""Connecting headsets and other programs: pairing, the link, OpenXR."""

@@ -1,1 +1,0 @@
-"""The panels: each shows one thing and asks for changes by signals; none does any maths."""

@@ -1,1 +1,0 @@
-"""The link panel: the connection to the headset."""

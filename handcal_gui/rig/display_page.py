@@ -1,0 +1,275 @@
+"""The fourth and fifth steps: one eye's display, seen by the viewpoint camera behind it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.types import Eye
+from handcal.io.images import write_png
+from handcal.rig.assemble import screen_of
+from handcal.rig.boards.choose import ALIKE
+from handcal.rig.displays.grid import Grid, draw_grid, grid_on
+from handcal.rig.steps import view_in
+from handcal.station.checks.doctor import Finding, Health
+from handcal_gui.app.translation import tr
+from handcal_gui.rig.file_dialogs import ask_save
+from handcal_gui.rig.images_panel import ImagesPanel
+from handcal_gui.rig.project import RigProject
+from handcal_gui.rig.project_folder import DisplayEntries, Distance
+from handcal_gui.rig.solve import CAMERA_MISSING, SolvedPart, solve_display
+from handcal_gui.rig.step_page import StepPage, images_needed
+from handcal_gui.widgets.entries_form import EntriesForm
+from handcal_gui.widgets.fields import button, choice, make_linked, number, whole_number
+from handcal_gui.widgets.path_field import PathField
+
+_DISTANCES: dict[Distance, str] = {
+    "measured": tr("measured"),
+    "solved": tr("from the squares' angle"),
+}
+_GRID_HINT = tr(
+    "Save the grid and show it on this display unscaled. With the viewpoint camera at the eye "
+    "position, focused on the display, take 3 or more images in the dark."
+)
+_BOARD_HINT = tr(
+    "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
+    "through it while the headset tracks the board. Save one JSON file with the name of each "
+    'image and the pose of its board in the headset rig: <a href="{}">its contents</a>.'
+).format("docs/rig-guide.md#left-and-right-display")
+
+
+class DisplayPage(StepPage):
+    """Images of the grid and of the tracked board, and the display calibrated from them.
+
+    Parameters
+    ----------
+    project : RigProject
+    eye : {"left", "right"}
+
+    Attributes
+    ----------
+    manual_wanted : Signal(str)
+        The user wants to read a page of the manual.
+    """
+
+    manual_wanted = Signal(str)
+
+    def __init__(self, project: RigProject, eye: Eye, parent: QWidget | None = None) -> None:
+        distance = choice(
+            "distance",
+            tr("Distance of the virtual screen"),
+            _DISTANCES,
+            tr(
+                "Distance of the virtual screen from the viewpoint camera, z(C0→S): measured, for "
+                "example by the camera's focus, or solved from the angle that a square subtends "
+                "at the nominal distance."
+            ),
+        )
+        distance_m = number(
+            "distanceM",
+            0.1,
+            100.0,
+            0.01,
+            " m",
+            tr("Measured distance of the virtual screen, in metres."),
+        )
+        arcmin = number(
+            "arcmin",
+            1.0,
+            1e4,
+            0.1,
+            "′",
+            tr("Angle that a square of the grid subtends, in arcminutes."),
+        )
+        nominal = number(
+            "nominal",
+            0.1,
+            100.0,
+            0.01,
+            " m",
+            tr("Nominal distance for this angle, from the manufacturer, in metres."),
+        )
+        square = whole_number(
+            "gridSquare", 20, 2000, tr("Side length of the grid's squares, in pixels.")
+        )
+        square.setSuffix(" px")
+        tracked = PathField(tr("Tracked poses"), "file", tr("Tracked poses (*.json)"))
+        tracked.setToolTip(
+            tr(
+                "Poses of the board as tracked by the headset, for each image: {}, in metres."
+            ).format('{"handcal_tracked": 1, "T_H_B": {"image.png": [4 rows of 4]}}')
+        )
+        stereo = PathField(
+            tr("Stereo calibration"),
+            "file",
+            tr("Stereo calibrations (*.json)"),
+            tr("Instead of the images of the board"),
+        )
+        stereo.setToolTip(
+            tr(
+                "Instead of images and poses of the board: the result of 'handcal rig stereo' with "
+                "the viewpoint camera as depth camera."
+            )
+        )
+        files = tr("Matrices (*.txt *.json *.yaml *.yml)")
+        view = PathField(tr("Rendering camera"), "file", files, tr("As in the rig"), read=view_in)
+        view.setToolTip(
+            tr(
+                "Transform from the headset rig to this eye's rendering camera, T_V_H, as the "
+                "headset reports it: 4 rows of 4 numbers, in metres; x right, y down, z forward. "
+                "If empty, that of the initial rig is used."
+            )
+        )
+        form = EntriesForm(
+            {
+                "grid_images": (tr("Images of t&he grid"), PathField(tr("Grid images"), "folder")),
+                "square_px": (tr("Grid s&quares"), square),
+                "board_images": (
+                    tr("Images o&f the board"),
+                    PathField(tr("Board images"), "folder"),
+                ),
+                "tracked": (tr("&Poses of the board"), tracked),
+                "stereo": (tr("S&tereo calibration"), stereo),
+                "view": (tr("R&endering camera's pose"), view),
+                "distance": (tr("S&creen's distance"), distance),
+                "distance_m": (tr("Me&asured distance"), distance_m),
+                "square_arcmin": (tr("An&gle of a square"), arcmin),
+                "nominal_m": (tr("Nominal &distance"), nominal),
+            }
+        )
+        form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
+        keys = tr("&Take images…"), tr("Find the grid &again")
+        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
+        keys = tr("Ta&ke images…"), tr("Find t&he board again")
+        board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
+        panels = {tr("Grid on the displa&y"): grid, tr("Ca&mera pose"): board}
+        super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
+        make_linked(board.hint).linkActivated.connect(self.manual_wanted)
+        self._eye: Eye = eye
+        self._grid, self._board = grid, board
+        self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
+        self._save = button(
+            "saveGrid", tr("Save &grid…"), help_text=tr("PNG, to show on the display")
+        )
+        grid.add_button(self._save)
+        self._save.clicked.connect(self._save_grid)
+        self._grid.take_requested.connect(self._take_grid)
+        self._board.take_requested.connect(self._take_board)
+        self.show_known()
+
+    @property
+    def _entries(self) -> DisplayEntries:
+        work = self.project.inputs
+        return work.left if self._eye == "left" else work.right
+
+    def enter(self) -> None:
+        """Search the folders for grid and board, unless already done."""
+        entries = self._entries
+        for distance, fields in self._by_distance.items():
+            for field in fields:
+                field.setEnabled(distance == entries.distance)
+        self._board.look((entries.board_images,), self.project.inputs.board, entries.dropped_board)
+        if (grid := self._shown()) is not None:
+            self._grid.look((entries.grid_images,), grid.board, entries.dropped_grid)
+
+    def keep(self) -> None:
+        """Store the entries, and search new folders for grid and board."""
+        entries = self.form.take(self._entries)
+        entries = replace(
+            entries,
+            dropped_grid=self._grid.dropped_of(entries.dropped_grid),
+            dropped_board=self._board.dropped_of(entries.dropped_board),
+        )
+        self.project.enter(**{self._eye: entries})
+        self.enter()
+
+    def solve(self) -> None:
+        """Solve from the images that are not excluded."""
+        work = partial(
+            solve_display,
+            self._grid.shots,
+            self._board.shots,
+            self._entries,
+            self._eye,
+            self.project.rig,
+            self.project.camera_file,
+        )
+        self.box.run(work, self._show_solved)
+
+    @property
+    def need(self) -> str:
+        """The viewpoint camera's intrinsics, or images, if there are none."""
+        if not self.project.camera_file.exists():
+            return CAMERA_MISSING
+        grid = tr("to solve, take images of the grid, or choose their folder")
+        board = tr(
+            "to solve, take images of the board, or choose their folder or a stereo calibration in "
+            "Inputs"
+        )
+        poses = tr(
+            "to solve, choose the file of the poses of the board in Inputs, or a stereo calibration"
+        )
+        need = images_needed(self._grid, grid)
+        if need or self._entries.stereo:
+            return need
+        return images_needed(self._board, board) or ("" if self._entries.tracked else poses)
+
+    def _show_solved(self, solved: tuple[SolvedPart, SolvedPart]) -> None:
+        display, place = solved
+        self.box.show_solved(display, self.project.add_part(self._eye, display, self.solved_with))
+        self._grid.show_solved(display)
+        self._board.show_solved(place)
+        self.show_if_changed()
+
+    def _shown(self) -> Grid | None:
+        """Return the grid for the display; if it does not fit, show why and return None."""
+        screen = screen_of(self.project.rig, self._eye)
+        try:
+            return grid_on(screen.width_px, screen.height_px, self._entries.square_px)
+        except HandcalError as error:
+            self._grid.look(("",), self.project.inputs.board, ())
+            self._grid.show_trouble(str(error))
+            return None
+
+    def _save_grid(self) -> None:
+        if (grid := self._shown()) is None:
+            return
+        name = f"grid-{self._eye}.png"
+        path = ask_save(self.project, self, tr("Save the grid"), name, tr("PNG (*.png)"))
+        if path is None:
+            return
+        try:
+            write_png(path, draw_grid(grid))
+        except FileError as error:
+            self._grid.show_trouble(str(error))
+            return
+        columns, rows = grid.squares
+        saved = tr("{}×{} squares saved as {}").format(columns, rows, path)
+        self.box.show_finding(Finding("", Health.GOOD, saved, tr("show it unscaled")))
+
+    def _take_grid(self) -> None:
+        if (grid := self._shown()) is None:
+            return
+        folder = self.project.folder.path / f"grid-{self._eye}"
+        self.take_images(
+            {tr("Viewpoint camera"): folder},
+            grid.board,
+            self._grid,
+            lambda: self.form.enter(grid_images=str(folder)),
+            ALIKE,
+            asked=3,
+        )
+
+    def _take_board(self) -> None:
+        folder = self.project.folder.path / f"board-{self._eye}"
+        self.take_images(
+            {tr("Viewpoint camera"): folder},
+            self.project.inputs.board,
+            self._board,
+            lambda: self.form.enter(board_images=str(folder)),
+            asked=8,
+        )

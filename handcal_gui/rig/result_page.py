@@ -1,0 +1,269 @@
+"""The last step: checking, comparing and saving the rig."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QHideEvent
+from PySide6.QtWidgets import (
+    QFormLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QMessageBox,
+    QTabWidget,
+    QWidget,
+)
+
+from handcal.core.errors import FileError, HandcalError
+from handcal.core.types import PART_NAMES, RIG_PARTS, Rig
+from handcal.io.files import user_path
+from handcal.rig.check import MAX_NAME
+from handcal.rig.report import RigFinding, report_rig
+from handcal.rig.rig_file import read_rig
+from handcal.station.checks.doctor import Finding, Health
+from handcal_gui.app.theme import SPACING_PX
+from handcal_gui.app.translation import tr
+from handcal_gui.rig.accept_dialog import AcceptDialog
+from handcal_gui.rig.file_dialogs import ask_save
+from handcal_gui.rig.finding_list import FindingList
+from handcal_gui.rig.project import RigProject
+from handcal_gui.rig.rows import COLUMNS, difference_rows, rig_rows
+from handcal_gui.rig.step_inputs import STEP_TITLES
+from handcal_gui.widgets.action_strip import action_strip
+from handcal_gui.widgets.fields import button, label_for, main_button, paragraph, with_name
+from handcal_gui.widgets.finding_line import FindingLine
+from handcal_gui.widgets.layouts import vbox
+from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.times import local_time
+
+_RIG_FILES = tr("Rig files (*.yaml *.yml)")
+
+
+class ResultPage(QWidget):
+    """Shows the findings on the rig and its numbers, compares it with others, and saves it.
+
+    Attributes
+    ----------
+    rig_saved : Signal(Path)
+        Rig file to use for the next calibration.
+    """
+
+    rig_saved = Signal(object)
+
+    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("resultPage")
+        self._project = project
+        self._acceptance: AcceptDialog | None = None
+        self._name = with_name(QLineEdit(maxLength=MAX_NAME), "rigName", tr("Name of the rig"))
+        self._name_problem = paragraph(
+            "rigNameProblem", tr("Enter a name of printable characters, to save the rig.")
+        )
+        self._findings = FindingList(tr("Check of the rig"))
+        self._numbers = NumberTable("numbers-of-the-rig", tr("Numbers of the rig"))
+        self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
+        self._differences = NumberTable("differences", tr("Differences"))
+        self._compared = FindingLine("compared")
+        self._end = FindingLine("savedRig")
+        self.main = main_button("saveRig", tr("&Save rig file…"))
+        self.strip = action_strip(self.main)
+        self._accept = button(
+            "acceptRig",
+            tr("&Accept…"),
+            help_text=tr("Check what the displays draw, with a camera at the eye position"),
+        )
+        self._use = button("useRig", tr("&Use for the next calibration"))
+        self._lay_out()
+        self.enter()
+        self._other.changed.connect(self._compare)
+        self._name.textChanged.connect(self._show_name_problem)
+        self._name.editingFinished.connect(self._on_name_edited)
+        self.main.clicked.connect(self.save)
+        self._accept.clicked.connect(self._open_acceptance)
+        self._use.clicked.connect(self._ask_to_use)
+        project.rig_changed.connect(self.enter)
+
+    def enter(self) -> None:
+        """Show the present rig."""
+        rig = self._project.rig
+        self._name.setText(rig.name)
+        findings = (*report_rig(rig), *self._outdated(), self._accepted())
+        self._findings.show_findings([_unless_initial(one, rig) for one in findings])
+        self._numbers.show_rows(COLUMNS, rig_rows(rig))
+        saved = self._project.saved_file
+        self._use.setEnabled(saved is not None)
+        self._use.setToolTip("" if saved is not None else tr("Save the rig file first"))
+        summary = _summary(rig, findings)
+        if saved is not None:
+            words = tr("saved as {}; {}").format(saved, summary.found)
+            is_broken = summary.health is Health.BROKEN
+            summary = Finding("", summary.health, words, summary.advice if is_broken else "")
+        self._end.show_finding(summary)
+        self._compare()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Store the typed name: clicking a button may leave the focus in the field."""
+        self._on_name_edited()
+        super().hideEvent(event)
+
+    def save(self) -> None:
+        """Choose a path and save the rig file."""
+        plain = re.sub(r"[^A-Za-z0-9]+", "-", self._name.text()).strip("-").lower()
+        proposed = f"{plain or 'rig'}.yaml"
+        path = ask_save(self._project, self, tr("Save the rig file"), proposed, _RIG_FILES)
+        if path and self._confirm_mixed():
+            self.save_as(path)
+
+    def save_as(self, path: Path) -> None:
+        """Save the rig file."""
+        self._on_name_edited()
+        try:
+            self._project.save_rig_as(path)
+        except FileError as error:
+            found = tr("not saved: {}").format(error)
+            advice = tr("save it in another folder, or under another name")
+            self._end.show_finding(Finding("", Health.BROKEN, found, advice))
+
+    def stop(self) -> None:
+        """Close the acceptance, if it is open."""
+        if self._acceptance is not None:
+            self._acceptance.reject()
+
+    def _outdated(self) -> list[RigFinding]:
+        """Return the steps that were solved with other inputs than the present ones."""
+        expected = tr("solved with the present inputs")
+        found = {title: self._project.outdated(step) for step, title in STEP_TITLES.items()}
+        return [RigFinding(title, why, False, expected) for title, why in found.items() if why]
+
+    def _accepted(self) -> RigFinding:
+        """Return the last acceptance of this rig."""
+        what, last = tr("Acceptance"), self._project.acceptance
+        if last is None:
+            return RigFinding(what, tr("not yet, or the rig has changed"), is_known=False)
+        found = f"{local_time(last.made)}: {last.words}"
+        passed = last.is_passed
+        return RigFinding(what, found, passed, tr("the rig passes"), has_failed=not passed)
+
+    def _confirm_mixed(self) -> bool:
+        """Ask before a rig is saved whose parts are not all solved with the present inputs."""
+        mixed = "\n".join(f"{one.what}: {one.found}." for one in self._outdated())
+        if not mixed:
+            return True
+        yes, no = QMessageBox.StandardButton.Yes, QMessageBox.StandardButton.No
+        text = tr("The rig is of mixed inputs. Save it nevertheless?\n\n{}").format(mixed)
+        return QMessageBox.question(self, tr("Save the rig file"), text, yes | no, no) == yes
+
+    def _open_acceptance(self) -> None:
+        self._acceptance = AcceptDialog(self._project, self)
+        self._acceptance.finished.connect(self.enter)
+        self._acceptance.open()
+
+    def _show_name_problem(self) -> None:
+        self._name_problem.setVisible(not self._is_name)
+        self.main.setEnabled(self._is_name)
+
+    @property
+    def _is_name(self) -> bool:
+        name = self._name.text().strip()
+        return bool(name) and name.isprintable()
+
+    def _on_name_edited(self) -> None:
+        name = self._name.text().strip()
+        if name == self._project.rig.name or not self._is_name:
+            return
+        try:
+            self._project.use_rig(replace(self._project.rig, name=name))
+        except HandcalError as error:
+            self._name.setText(self._project.rig.name)
+            self._end.show_finding(Finding("", Health.BROKEN, str(error)))
+
+    def _ask_to_use(self) -> None:
+        if (saved := self._project.saved_file) is not None:
+            self.rig_saved.emit(saved)
+            text = tr("the next calibration uses this rig")
+            self._end.show_finding(Finding("", Health.GOOD, text))
+
+    def _compare(self) -> None:
+        self._differences.hide()
+        if not self._other.path:
+            self._compared.show_finding(
+                Finding(
+                    "",
+                    Health.LIMITED,
+                    tr("choose a rig file, such as the last calibration of this rig"),
+                )
+            )
+            return
+        try:
+            other = read_rig(user_path(self._other.path))
+        except FileError as error:
+            self._compared.show_finding(Finding("", Health.BROKEN, str(error)))
+            return
+        self._compared.show_finding(
+            Finding("", Health.GOOD, tr("compared with {}").format(other.name))
+        )
+        self._differences.show_rows((tr("Difference"),), difference_rows(other, self._project.rig))
+        self._differences.show()
+
+    def _lay_out(self) -> None:
+        compare = QWidget()
+        vbox(self._other, self._compared, (self._differences, 1), 0, on=compare, spacing=SPACING_PX)
+        tabs = QTabWidget(documentMode=True)
+        tabs.addTab(self._findings, tr("C&heck"))
+        tabs.addTab(self._numbers, tr("Nu&mbers"))
+        tabs.addTab(compare, tr("Com&pare"))
+        form = QFormLayout()
+        form.setHorizontalSpacing(2 * SPACING_PX)
+        form.addRow(label_for(self._name, tr("Nam&e")), self._name)
+        form.addRow("", self._name_problem)
+        self._name_problem.hide()
+        foot = QHBoxLayout()
+        foot.setSpacing(2 * SPACING_PX)
+        foot.addWidget(self._end, 1, Qt.AlignmentFlag.AlignVCenter)
+        foot.addWidget(self._accept)
+        foot.addWidget(self._use)
+        vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)
+
+
+def _unless_initial(finding: RigFinding, rig: Rig) -> RigFinding:
+    """Return a finding without a judgement if it is fine but of the initial rig's values."""
+    initial = [part for part in finding.parts if part not in rig.origins]
+    if not initial or not finding.is_fine:
+        return finding
+    is_whole = len(initial) == len(finding.parts)
+    told = tr("{}, as in the initial rig") if is_whole else tr("{}, partly as in the initial rig")
+    return replace(finding, found=told.format(finding.found), expected="")
+
+
+def _summary(rig: Rig, findings: Sequence[RigFinding]) -> Finding:
+    """Return how many findings failed, are doubtful or not known, and what is not calibrated.
+
+    Its advice says how to go on with a rig that is not saved.
+    """
+    failed = sum(one.has_failed for one in findings)
+    doubtful = sum(not one.is_fine for one in findings) - failed
+    missing = [part for part in RIG_PARTS if part not in rig.origins]
+    unknown = sum(not one.is_known for one in findings) - len(missing)
+    names = ", ".join(PART_NAMES[part] for part in missing)
+    told = {
+        tr("{} failed").format(failed): failed,
+        tr("{} doubtful (see Check)").format(doubtful): doubtful,
+        tr("{} not calibrated by handcal: {}").format(len(missing), names): missing,
+        tr("{} not known or not made").format(unknown): unknown,
+        tr("none doubtful"): not failed and not doubtful,
+    }
+    text = "; ".join(words for words, is_so in told.items() if is_so)
+    health = Health.LIMITED if doubtful or unknown or missing else Health.GOOD
+    if failed:
+        health = Health.BROKEN
+    advice = tr("save the rig file to use it")
+    if missing:
+        advice = tr("solve these steps, or save the rig file to use it as it is")
+    if failed:
+        advice = tr("follow the advice under Acceptance, then accept the rig again")
+    return Finding("", health, text, advice)

@@ -1,1 +1,0 @@
-"""Separate windows: rig calibration, evaluation, library and manual."""

@@ -1,0 +1,56 @@
+"""Pictures of the window: one for each thing that a step offers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QLabel, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal.core.errors import FileError
+from handcal_gui.app.autopilot.screenshots import Screenshots
+from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Step, WizardView
+from handcal_gui.widgets.layouts import hbox
+from tests.gui.helpers import show
+
+
+@pytest.fixture
+def label(qtbot: QtBot) -> QLabel:
+    label = QLabel("handcal")
+    qtbot.addWidget(label)
+    label.resize(120, 40)
+    return label
+
+
+def view(step: Step, label: str) -> WizardView:
+    return WizardView(step, "Do it.", (), ButtonSpec(Action.TAKE_STEP, label))
+
+
+def test_each_offer_of_a_step_is_pictured_once(label: QLabel, tmp_path: Path) -> None:
+    screenshots = Screenshots(label, tmp_path / "pictures")
+    for offer in ("Solve", "Send", "Solve"):
+        screenshots.save_step(view(Step.SOLVE, offer))
+    screenshots.save_step(view(Step.SHOW_HAND, "Next"))
+    names = sorted(path.name for path in (tmp_path / "pictures").iterdir())
+    assert names == ["step-2-show-hand.png", "step-5-solve-send.png", "step-5-solve.png"]
+    picture = QImage(str(tmp_path / "pictures" / "step-5-solve.png"))
+    assert (picture.width(), picture.height()) == (120, 40)
+
+
+def test_a_picture_that_cannot_be_written_is_said(label: QLabel, tmp_path: Path) -> None:
+    screenshots = Screenshots(label, tmp_path / "pictures")
+    (tmp_path / "pictures" / "start.png").mkdir()
+    with pytest.raises(FileError, match=r"start\.png"):
+        screenshots.save("start")
+
+
+def test_a_picture_has_the_layout_of_what_it_shows(qtbot: QtBot, tmp_path: Path) -> None:
+    window, eyes = QWidget(), [QLabel("left"), QLabel("right")]
+    hbox(*((eye, 1) for eye in eyes), on=window, margins=0, spacing=0)
+    show(qtbot, window, 200, 40)
+    assert eyes[0].width() == 100
+    eyes[1].hide()
+    Screenshots(window, tmp_path).save("one")
+    assert eyes[0].width() == 200

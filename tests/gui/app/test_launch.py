@@ -1,0 +1,145 @@
+"""From the first window to the main one: nothing typed meanwhile is lost or presses a button."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from argparse import Namespace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, QSize, Qt, QTimer
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication, QComboBox, QWidget
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.app import launch
+from handcal_gui.app.preferences import PreferencesFile
+from handcal_gui.app.program import Program
+from handcal_gui.calibrate.start.start_page import StartPage
+from handcal_gui.calibrate.window import MainWindow
+from tests.gui.helpers import child
+
+
+@pytest.fixture
+def arguments(qapp: QApplication, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Namespace:
+    """Arguments of the command line, for a launch that leaves the tests' process as it was."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # put back at the end
+    for name in ("setApplicationDisplayName", "setWindowIcon"):
+        monkeypatch.setattr(qapp, name, lambda _: None)
+    monkeypatch.setattr(launch, "gc", SimpleNamespace(freeze=lambda: None))
+    for name in ("close_on_signals", "collect_in_this_thread", "_log_to"):
+        monkeypatch.setattr(launch, name, lambda *_: None)
+    return Namespace(
+        preferences=tmp_path / "preferences.json",
+        size=None,
+        session=None,
+        source=None,
+        rig=None,
+        seed=None,
+        autopilot=False,
+        screenshots=None,
+    )
+
+
+@pytest.fixture
+def first(qtbot: QtBot) -> QWidget:
+    """The window shown until the main window replaces it."""
+    first = QWidget()
+    qtbot.addWidget(first)
+    first.show()
+    return first
+
+
+def test_text_typed_while_it_starts_goes_to_the_wearers_name_and_no_other_key_does_anything(
+    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keys = Qt.Key
+    for key, text in (
+        *((keys.Key_Space, " "), (keys.Key_A, "a"), (keys.Key_X, "x"), (keys.Key_Backspace, "")),
+        *((keys.Key_Tab, "\t"), (keys.Key_D, "d"), (keys.Key_Return, "\r"), (keys.Key_A, "a")),
+    ):
+        event = QKeyEvent(QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier, text)
+        QCoreApplication.postEvent(first.windowHandle(), event)  # handled once all is imported
+    seen = []
+
+    def look() -> None:
+        window = next(one for one in qapp.topLevelWidgets() if isinstance(one, MainWindow))
+        wearer = child(child(window, StartPage), QComboBox, "wearer")
+        seen.append((wearer.currentText(), window.page, first.isVisible()))
+
+    monkeypatch.setattr(qapp, "exec", look)
+    launch.launch(qapp, arguments, first)
+    assert seen == [("ada", "start", False)]
+
+
+def test_a_window_closed_before_the_event_loop_begins_ends_the_program(
+    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a signal does whose event is handled while keys typed at the start are read."""
+    monkeypatch.setattr(
+        launch, "close_on_signals", lambda window, _: QTimer.singleShot(0, window.close)
+    )
+    entered = []
+    monkeypatch.setattr(qapp, "exec", lambda: entered.append(True))
+    launch.launch(qapp, arguments, first)
+    assert not entered
+    assert arguments.preferences.exists()
+
+
+def test_a_size_is_that_of_the_window_although_it_was_maximized_when_closed(
+    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments.preferences.parent.mkdir(exist_ok=True)
+    program = Program(PreferencesFile(arguments.preferences))
+    program.window.showMaximized()
+    program.window.close()
+    arguments.size = QSize(1100, 650)
+    before = set(qapp.topLevelWidgets())
+    seen: list[tuple[bool, QSize]] = []
+
+    def look() -> None:
+        opened = set(qapp.topLevelWidgets()) - before
+        windows = [one for one in opened if isinstance(one, MainWindow)]
+        seen.extend((one.isMaximized(), one.size()) for one in windows)
+
+    monkeypatch.setattr(qapp, "exec", look)
+    launch.launch(qapp, arguments, first)
+    assert seen == [(False, arguments.size)]
+
+
+class _Windows(QObject):
+    """Names the windows that are shown, over all of the application."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.shown: list[str] = []
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() is QEvent.Type.Show and isinstance(watched, QWidget) and watched.isWindow():
+            self.shown.append(watched.objectName() or type(watched).__name__)
+        return False
+
+
+def test_no_part_of_the_window_is_shown_before_it(qtbot: QtBot, tmp_path: Path) -> None:
+    windows, app = _Windows(), QApplication.instance()
+    assert app is not None
+    app.installEventFilter(windows)
+    program = Program(PreferencesFile(tmp_path / "preferences.json"))
+    app.removeEventFilter(windows)
+    qtbot.addWidget(program.window)
+    assert windows.shown == []
+
+
+@pytest.mark.process
+def test_a_crash_in_a_library_leaves_the_places_of_all_threads_in_the_log(tmp_path: Path) -> None:
+    crash = (
+        "import faulthandler, sys; from pathlib import Path;"
+        "from handcal_gui.app.launch import _log_to;"
+        "_log_to(Path(sys.argv[1])); faulthandler._sigabrt()"
+    )
+    path = tmp_path / "handcal.log"
+    ended = subprocess.run([sys.executable, "-c", crash, str(path)], check=False)
+    assert ended.returncode != 0
+    assert "Fatal Python error: Aborted" in path.read_text()

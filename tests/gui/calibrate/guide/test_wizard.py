@@ -1,0 +1,388 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushButton
+from pytestqt.qtbot import QtBot
+
+from handcal.calibration.plan import PlanSettings, StepName
+from handcal.calibration.states import State
+from handcal.core.types import EYES
+from handcal.session.session import SessionRecord
+from handcal.station.snapshot import Snapshot
+from handcal_gui.app.theme import use_theme
+from handcal_gui.calibrate.guide.progress_ring import ProgressRing
+from handcal_gui.calibrate.guide.steps import Wizard
+from handcal_gui.calibrate.guide.view import Action, Step
+from handcal_gui.calibrate.guide.wizard import WizardPanel
+from handcal_gui.calibrate.wearer_view.eye_canvas import EyeCanvas
+from handcal_gui.widgets.image_view import ImageView
+from handcal_gui.widgets.result_rows import EYE_NAMES
+from tests.gui.helpers import text
+from tests.gui.views import NUDGED, VERIFIED, all_views, begun, judged, planned_snapshot
+
+Maker = Callable[..., Snapshot]
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> WizardPanel:
+    panel = WizardPanel()
+    qtbot.addWidget(panel)
+    panel.resize(460, 420)
+    panel.show()
+    qtbot.addWidget(panel.bar)
+    panel.bar.resize(900, panel.bar.height())
+    panel.bar.show()
+    panel.wizard = begun(is_held=True)
+    return panel
+
+
+def child(panel: WizardPanel, name: str) -> QPushButton:
+    found = panel.bar.findChild(QPushButton, name)
+    assert isinstance(found, QPushButton)
+    return found
+
+
+def test_the_main_button_asks_for_what_it_says(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.ALIGNED))
+    button = child(panel, "wizardMain")
+    assert button.text() == "Solve"
+    with qtbot.waitSignal(panel.asked) as asked:
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert asked.args == [Action.TAKE_STEP]
+    with qtbot.waitSignal(panel.asked) as asked:
+        panel.press_main()
+    assert asked.args == [Action.TAKE_STEP]
+
+
+def test_another_step_is_reported_once(qtbot: QtBot, panel: WizardPanel, snapshot: Maker) -> None:
+    with qtbot.waitSignal(panel.step_changed) as told:
+        panel.show_snapshot(snapshot(State.ALIGN))
+    assert told.args == [Step.ALIGN]
+    with qtbot.assertNotEmitted(panel.step_changed):
+        panel.show_snapshot(snapshot(State.ALIGN))
+    with qtbot.waitSignal(panel.step_changed) as told:
+        panel.show_snapshot(snapshot(State.ALIGNED))
+    assert told.args == [Step.SOLVE]
+
+
+def test_a_disabled_main_button_asks_for_nothing(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.APPLYING))
+    with qtbot.assertNotEmitted(panel.asked):
+        panel.press_main()
+
+
+def test_the_main_button_has_its_colour_only_where_a_press_is_needed_and_the_bar_says_why(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    def is_colored() -> bool:
+        shade = child(panel, "wizardMain").palette().button().color()
+        is_quiet = shade == QApplication.palette().button().color()
+        assert bool(text(panel.bar, "wizardMainQuiet")) == is_quiet
+        return not is_quiet
+
+    try:
+        for theme in ("light", "dark"):
+            use_theme(theme)
+            panel.show_snapshot(snapshot(State.ALIGNED))
+            assert is_colored()
+            for asked in (
+                snapshot(State.ALIGN),
+                snapshot(State.VERIFY, procedure={"verifying": NUDGED}),
+            ):
+                panel.show_snapshot(asked)
+                assert not is_colored()
+                assert "wearer confirms" in text(panel.bar, "wizardMainQuiet")
+    finally:
+        use_theme("system")
+
+
+def test_the_present_step_has_the_colour_of_a_new_theme(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.APPLIED))
+    [step] = (one for one in panel.findChildren(QLabel) if one.text().startswith("▸"))
+    try:
+        for theme in ("light", "dark"):
+            use_theme(theme)
+            QApplication.processEvents()
+            assert QApplication.palette().windowText().color().name() in step.styleSheet()
+    finally:
+        use_theme("system")
+
+
+def test_a_large_guide_has_larger_texts(panel: WizardPanel, snapshot: Maker) -> None:
+    panel.show_snapshot(snapshot(State.APPLIED))
+    assert panel.shown is not None
+    verdict = panel.findChild(QLabel, "card-verdict-left")
+    sentence = next(one for one in panel.findChildren(QLabel) if one.text() == panel.shown.sentence)
+    assert isinstance(verdict, QLabel)
+    before = [one.fontInfo().pointSizeF() for one in (sentence, verdict)]
+    for size_px, scale in (((2000, 1500), 1.5), ((460, 420), 1.0)):
+        panel.resize(*size_px)
+        now = [one.fontInfo().pointSizeF() for one in (sentence, verdict)]
+        assert now == pytest.approx([scale * one for one in before], rel=0.1)
+
+
+def test_the_other_buttons_come_and_go(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    none = replace(record, alignments={})
+    panel.show_snapshot(snapshot(State.ALIGNED))
+    other = child(panel, "wizardOther0")
+    assert (other.isVisible(), other.text()) == (True, "&Discard and repeat")
+    qtbot.waitUntil(other.isEnabled)
+    with qtbot.waitSignal(panel.asked) as asked:
+        QTest.mouseClick(other, Qt.MouseButton.LeftButton)
+    assert asked.args == [Action.REDO]
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.NUDGE))
+    assert other.text() == "&Undo"
+    panel.show_snapshot(snapshot(State.ALIGNED, record=none))
+    assert not other.isVisible()
+
+
+def test_nothing_jumps_when_the_texts_change(panel: WizardPanel, snapshot: Maker) -> None:
+    places = set()
+    layout, main = panel.bar.layout(), child(panel, "wizardMain")
+    assert layout is not None
+    refused = {"refusal": "Your hand is turned by 14.0°, more than 9°. Turn it as the cursor is."}
+    for made in (snapshot(), snapshot(procedure=refused), snapshot(State.ALIGNED)):
+        panel.show_snapshot(made)
+        layout.activate()
+        places.add((main.geometry().getRect(), panel.bar.height()))
+    assert len(places) == 1
+
+
+def test_every_label_fits_the_main_button(
+    panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    main = child(panel, "wizardMain")
+    for view in all_views(snapshot, record):
+        panel.bar.show_view(view)
+        assert main.text() == view.main.label
+        assert main.sizeHint().width() <= main.width()
+        assert main.sizeHint().height() <= main.height()
+
+
+def test_every_other_button_has_a_letter_and_none_that_discards_has_the_focus(
+    panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    menus_and_choice = set("FTVHY")
+    for view in all_views(snapshot, record):
+        panel.bar.show_view(view)
+        letters = []
+        for i, offer in enumerate(view.others):
+            other = child(panel, f"wizardOther{i}")
+            discards = offer.action is Action.REDO
+            assert bool(offer.discards) == discards
+            policy = Qt.FocusPolicy.NoFocus if discards else Qt.FocusPolicy.TabFocus
+            assert other.focusPolicy() == policy
+            letters.append(other.shortcut().toString())
+            assert letters[-1] in other.toolTip()
+        assert all(letters)
+        assert len(set(letters)) == len(letters)
+        assert not {letter[-1] for letter in letters} & menus_and_choice
+
+
+def test_a_click_meant_for_the_button_before_does_not_discard(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.ALIGN))
+    other = child(panel, "wizardOther0")
+    qtbot.waitUntil(other.isEnabled)
+    panel.show_snapshot(snapshot(State.ALIGNED))  # the wearer has confirmed
+    with qtbot.assertNotEmitted(panel.asked):
+        QTest.mouseClick(other, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(other.isEnabled)
+    with qtbot.waitSignal(panel.asked) as asked:
+        QTest.mouseClick(other, Qt.MouseButton.LeftButton)
+    assert asked.args == [Action.REDO]
+
+
+def test_the_focus_does_not_stay_on_a_button_that_becomes_another(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    accepted = judged(snapshot, "accept", "accept", State.APPLIED)
+    panel.show_snapshot(accepted)
+    other = child(panel, "wizardOther0")
+    panel.bar.activateWindow()
+    qtbot.waitActive(panel.bar)
+    other.setFocus()
+    assert other.hasFocus()
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.RAISE))
+    assert other.text() == "&Back"
+    assert panel.bar.focusWidget() is None
+
+
+def test_the_key_shown_is_the_one_that_works(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.show_snapshot(snapshot(State.ALIGNED))
+    key = panel.bar.findChild(QLabel, "wizardMainKey")
+    assert isinstance(key, QLabel)
+    field = QLineEdit(panel.bar)
+    field.show()
+    panel.bar.activateWindow()
+    qtbot.waitActive(panel.bar)
+    assert key.text() == "Space"
+    width = key.width()
+    field.setFocus()
+    assert key.text() == "Ctrl+Return"
+    assert key.width() == width >= key.sizeHint().width() - 2
+    QTest.keyClick(field, Qt.Key.Key_Space)
+    assert field.text() == " "
+    with qtbot.waitSignal(panel.asked) as asked:
+        QTest.keyClick(field, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert asked.args == [Action.TAKE_STEP]
+    field.setReadOnly(True)
+    field.clearFocus()
+    assert key.text() == "Space"
+
+
+def test_the_plan_is_chosen_before_the_cursor_is_made(
+    qtbot: QtBot, panel: WizardPanel, snapshot: Maker
+) -> None:
+    plan = panel.findChild(QComboBox, "wizardPlan")
+    assert isinstance(plan, QComboBox)
+    panel.show_snapshot(snapshot(State.SHOW_HAND))
+    assert (plan.currentText(), plan.isEnabled()) == ("Both eyes at once", True)
+    with qtbot.waitSignal(panel.eyes_chosen) as chosen:
+        plan.setCurrentText("Right eye only")
+    assert chosen.args == ["right"]
+    panel.show_snapshot(snapshot(State.SHOW_HAND, number=2))
+    assert plan.currentText() == "Right eye only", "until the station has heard of it"
+    right = PlanSettings("paper", ("right",))
+    with qtbot.assertNotEmitted(panel.eyes_chosen):
+        panel.show_snapshot(snapshot(State.SHOW_HAND, plan=right))
+        panel.show_snapshot(snapshot(State.SHOW_HAND, plan=PlanSettings("paper", in_turn=True)))
+    assert plan.currentText() == "One eye after the other"
+    panel.show_snapshot(snapshot(State.ALIGN, plan=right))
+    assert not plan.isEnabled()
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.RAISE))
+    assert not plan.isVisible(), "the recommended plan chooses"
+
+
+def test_the_refusal_is_read(panel: WizardPanel, snapshot: Maker) -> None:
+    panel.show_snapshot(
+        snapshot(procedure={"refusal": "the headset's poses have a gap of 466 ms."})
+    )
+    note = panel.findChild(QLabel, "wizardNote")
+    assert isinstance(note, QLabel)
+    assert note.text() == "The headset's poses have a gap of 466 ms."
+
+
+def test_after_a_slip_no_step_is_ticked_that_was_left_out_and_the_ring_counts_eyes(
+    panel: WizardPanel, snapshot: Maker, record: SessionRecord
+) -> None:
+    ring = panel.findChild(ProgressRing)
+    assert isinstance(ring, ProgressRing)
+    first = planned_snapshot(snapshot, StepName.SOLVE)
+    panel.show_snapshot(first)
+    assert "✓ Align" in _texts(panel)
+    assert ring.accessibleDescription() == "2/2 aligned"
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.ALIGN))
+    assert ring.accessibleDescription().startswith("2/3 aligned"), "one more is being made"
+    panel.show_snapshot(first)
+    panel.show_snapshot(planned_snapshot(snapshot, StepName.VERIFY))
+    assert ring.accessibleDescription() == "0/2 verified"
+    again = replace(
+        record,
+        facts=replace(record.facts, former="ada-1"),
+        alignments={},
+        verified_now=frozenset({"left"}),
+    )
+    slipped = planned_snapshot(snapshot, StepName.VERIFY, record=again, verified={"left": VERIFIED})
+    panel.show_snapshot(slipped)
+    texts = _texts(panel)
+    assert "✓ Show hand" in texts
+    assert {"Make cursor", "Align", "Solve"} <= texts
+    assert ring.accessibleDescription().startswith("1/2 verified")
+    once_more = replace(slipped.procedure, state=State.VERIFY, verifying=NUDGED)
+    panel.show_snapshot(replace(slipped, procedure=once_more))
+    assert ring.accessibleDescription().startswith("0/2 verified"), "the left eye once more"
+
+
+def test_names_and_paths_like_markup_are_shown_as_they_are(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    panel.start(Wizard())
+    panel.show_snapshot(snapshot(State.SHOW_HAND, camera={"name": "<b>D415</b>"}))
+    [label] = [one for one in panel.findChildren(QLabel) if "D415" in one.text()]
+    assert label.textFormat() is Qt.TextFormat.PlainText
+
+
+def _texts(panel: WizardPanel) -> set[str]:
+    return {label.text() for label in panel.findChildren(QLabel)}
+
+
+def test_the_picture_is_of_the_eye_that_the_sentence_names(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    for eye in EYES:
+        panel.show_snapshot(snapshot(State.ALIGN, procedure={"eyes": (eye,)}))
+        open_eyes = [
+            one.accessibleName()
+            for one in panel.picture.findChildren(EyeCanvas)
+            if one.isVisibleTo(panel)
+        ]
+        assert open_eyes == [f"Guide {EYE_NAMES[eye]}"]
+
+
+def test_before_the_first_image_nothing_of_the_session_before_is_shown(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    camera = panel.picture.findChild(ImageView)
+    assert isinstance(camera, ImageView)
+    panel.show_snapshot(snapshot(State.SHOW_HAND))
+    assert camera.has_image
+    panel.picture.begin()
+    broken = snapshot(State.SHOW_HAND, frame=None, camera={"problem": "unplugged"})
+    panel.picture.show_snapshot(broken)
+    assert not camera.has_image
+
+
+def test_while_drawings_are_compared_the_guide_asks_for_the_answer(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    applied = snapshot(State.APPLIED)
+    panel.show_snapshot(applied)
+    assert child(panel, "wizardMain").isEnabled()
+    panel.show_snapshot(replace(applied, comparing="first"))
+    assert not child(panel, "wizardMain").isEnabled()
+    assert any(text.startswith("The wearer compares two drawings.") for text in _texts(panel))
+
+
+def test_the_box_shows_the_eyes_of_the_plan_after_a_refused_choice(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    shown = snapshot(plan=PlanSettings("paper"))
+    panel.show_snapshot(shown)
+    box = panel.findChild(QComboBox, "wizardPlan")
+    assert isinstance(box, QComboBox)
+    before = box.currentText()
+    box.setCurrentIndex(box.count() - 1)
+    assert box.currentText() != before
+    panel.show_eyes_again()
+    panel.show_snapshot(shown)
+    assert box.currentText() == before
+
+
+def test_the_ring_counts_all_alignments_of_the_paper_s_plan(
+    panel: WizardPanel, snapshot: Maker
+) -> None:
+    ring = panel.findChild(ProgressRing)
+    assert isinstance(ring, ProgressRing)
+    for plan, planned in (
+        (PlanSettings("paper", alignments=3), 3),
+        (PlanSettings("paper", alignments=3, in_turn=True), 6),
+    ):
+        panel.show_snapshot(planned_snapshot(snapshot, StepName.RAISE, plan=plan))
+        assert f"/{planned} aligned" in ring.accessibleDescription()

@@ -1,0 +1,45 @@
+"""The steps of the rig wizard: solving them, and what the window shows of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtWidgets import QLabel, QListWidget, QPushButton, QTabWidget
+from pytestqt.qtbot import QtBot
+
+from handcal_gui.rig.wizard import RigWizard
+from handcal_gui.widgets.job_bar import JobBar
+
+BOARDS, STEREO, VIEWPOINT, LEFT, RIGHT, RESULT = range(6)
+
+
+def child(wizard: RigWizard, kind: Any, name: str) -> Any:
+    """Return the child of a name that can be seen."""
+    (found,) = (one for one in wizard.findChildren(kind, name) if one.isVisible())
+    return found
+
+
+def solve(qtbot: QtBot, wizard: RigWizard, step: int) -> str:
+    """Solve a step once its images have been looked through; return the verdict's text."""
+    wizard.show_step(step)
+    wait(qtbot, wizard)
+    child(wizard, QPushButton, "solve").click()
+    wait(qtbot, wizard)
+    return str(child(wizard, QLabel, "verdictFound").text())
+
+
+def wait(qtbot: QtBot, wizard: RigWizard) -> None:
+    bars = wizard.findChildren(JobBar)
+    qtbot.waitUntil(lambda: not any(bar.is_busy for bar in bars), timeout=30_000)
+
+
+def show_tab(wizard: RigWizard, title: str) -> None:
+    tabs = child(wizard, QTabWidget, "")
+    (place,) = (i for i in range(tabs.count()) if tabs.tabText(i).replace("&", "") == title)
+    tabs.setCurrentIndex(place)
+
+
+def marks(wizard: RigWizard) -> list[str]:
+    rail = wizard.findChild(QListWidget, "rigRail")
+    assert isinstance(rail, QListWidget)
+    return [rail.item(row).toolTip() for row in range(rail.count())]
