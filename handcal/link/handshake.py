@@ -41,7 +41,7 @@ class Refusal:
 
     @property
     def error(self) -> LinkError:
-        """What to tell the wearer of the refused headset."""
+        """The reason, and what the wearer can do, as an error."""
         if self.is_key_taken:
             belongs = f"this pairing key belongs to {self.other}"
             return LinkError(belongs, "ask the PC for a key of your own")

@@ -267,7 +267,7 @@ class Runtime(Closable):
 
     def _open_window(self, stack: ExitStack) -> None:
         glfw = self._glfw
-        if sys.platform == "linux":  # the runtime is told of GLX, which Wayland has not
+        if sys.platform == "linux":  # the runtime takes a context of GLX
             glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_X11)
         if not glfw.init():
             raise HandcalError("no display found for the client's window", "set DISPLAY")

@@ -1,4 +1,4 @@
-"""What the wearer sees: the strokes of each eye, and the matrices and OpenGL that draw them.
+"""The strokes that each eye is shown, and the matrices and OpenGL that draw them.
 
 Nothing here knows OpenXR. An image covers an eye's whole display, so the projection of the
 protocol, which is in the display's pixels, holds for an image of any size.

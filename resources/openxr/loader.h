@@ -1,5 +1,5 @@
-/* What this folder's layer and test runtime share of OpenXR's loader and of newer headers. The
- * interface of the loader is in openxr_loader_negotiation.h only since 1.0.33. */
+/* Of OpenXR's loader and of newer headers, for the layer and the test runtime. The interface of the
+ * loader is in openxr_loader_negotiation.h only since 1.0.33. */
 #ifndef HANDCAL_LOADER_H
 #define HANDCAL_LOADER_H
 
