@@ -116,29 +116,6 @@ def test_clouds_arrive_whole_and_what_has_not_changed_once(
         assert set(receive(connection, output, blind)) == {"POLYDATA CursorInWorld"}
 
 
-def test_a_client_that_takes_no_data_is_disconnected_with_one_line(
-    output: SlicerOutput, snapshot: Snapshot, said: list[str]
-) -> None:
-    with (
-        socket.create_connection(output.address) as stuck,
-        socket.create_connection(output.address) as reading,
-    ):
-        reading.settimeout(0.01)
-        stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        for number in range(2000):
-            output.send(replace(snapshot, number=number))
-            if said:
-                break
-            try:
-                while reading.recv(1 << 20):
-                    pass
-            except TimeoutError:
-                pass
-        name = "{}:{}".format(*stuck.getsockname())
-        assert said == [f"OpenIGTLink client {name} disconnected: it takes no data"]
-        assert "POLYDATA HandInWorld" in receive(reading, output, replace(snapshot, number=-1))
-
-
 def test_a_client_that_dies_gives_one_line(
     output: SlicerOutput, snapshot: Snapshot, said: list[str]
 ) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handcal.core.errors import CancelledError, FileError
+from handcal.core.errors import FileError
 from handcal.core.progress import Progress
 from handcal.export.export import write_archive
 from handcal.session.session import Session, SessionRecord
@@ -40,22 +40,6 @@ def test_extracted_it_is_the_session(tmp_path: Path, record: SessionRecord) -> N
         session.finish()
 
 
-def test_an_empty_session_can_go_on_too(
-    tmp_path: Path, empty: SessionRecord, record: SessionRecord
-) -> None:
-    write_archive(tmp_path / "s.zip", empty, tmp_path)
-    with zipfile.ZipFile(tmp_path / "s.zip") as file:
-        file.extractall(tmp_path)
-    with Session(tmp_path / empty.path.name) as session:
-        assert session.save_alignment(record.alignments[1]) == 1
-
-
-def test_equal_sessions_give_equal_bytes(tmp_path: Path, record: SessionRecord) -> None:
-    for name in ("a", "b"):
-        write_archive(tmp_path / name, record, tmp_path)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-
-
 def test_only_what_belongs_to_the_session_goes_in(tmp_path: Path, empty: SessionRecord) -> None:
     write_archive(tmp_path / "s.zip", empty, tmp_path)
     with zipfile.ZipFile(tmp_path / "s.zip") as file:
@@ -71,11 +55,6 @@ def test_only_what_belongs_to_the_session_goes_in(tmp_path: Path, empty: Session
     (folder / "alignments" / "elsewhere").symlink_to("/etc")
     write_archive(tmp_path / "t.zip", before, folder / "exports")
     assert (tmp_path / "t.zip").read_bytes() == (tmp_path / "s.zip").read_bytes()
-
-
-def test_giving_up_ends_it(tmp_path: Path, record: SessionRecord) -> None:
-    with pytest.raises(CancelledError):
-        write_archive(tmp_path / "s.zip", record, tmp_path, Progress(is_cancelled=lambda: True))
 
 
 def test_too_much_is_refused(

@@ -19,7 +19,6 @@ from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
 from handcal.export.export import ExportSettings, export_session
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
-from handcal.io.settings import read_settings, settings_json
 from handcal.session.session import SessionRecord
 
 resource = pytest.importorskip("resource")
@@ -222,12 +221,6 @@ def test_the_session_itself_stays_as_it_is(tmp_path: Path, record: SessionRecord
     before = tree(record.path)
     export_session(record, tmp_path, ExportSettings(LIGHT))
     assert tree(record.path) == before
-
-
-def test_settings_come_back_from_json() -> None:
-    settings = ExportSettings(("csv", "json"), near_m=0.2, far_m=20.0)
-    stored = json.loads(json.dumps(settings_json(settings)))
-    assert read_settings(ExportSettings, stored) == settings
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from handcal.core.geometry import transform
-from handcal.export.figures import CELL_MM, overlay_outlines, residual_cells
+from handcal.export.figures import CELL_MM, residual_cells
 from handcal.export.outcome import SessionOutcome
 from handcal.export.report import (
-    convergence_rows,
     distance_rows,
     overlay_rows,
     residual_rows,
@@ -17,19 +16,6 @@ from handcal.export.report import (
     session_report,
 )
 from handcal.report.document import Table
-
-
-def test_convergence_ends_at_what_was_solved(outcome: SessionOutcome) -> None:
-    assert outcome.results is not None
-    rows = list(convergence_rows(outcome.results))
-    for number, shifts in outcome.results.alignments.items():
-        for eye, shift in shifts.items():
-            found = [row for row in rows if (row["alignment"], row["eye"]) == (number, eye)]
-            assert [row["iteration"] for row in found] == list(range(1, len(found) + 1))
-            np.testing.assert_allclose(
-                np.array([row["rms_mm"] for row in found], dtype=float),
-                1e3 * np.sqrt(shift.history_m2),
-            )
 
 
 def test_distances_are_those_of_the_benefit(outcome: SessionOutcome) -> None:
@@ -69,16 +55,6 @@ def test_outlines_are_told_corner_by_corner() -> None:
     assert {(row["calibration"], row["of"]) for row in rows} == {("before", "cursor")}
     assert [row["outline"] for row in rows] == [1] * 4 + [2] * 4
     assert [[row["x_px"], row["y_px"]] for row in rows[:4]] == square.tolist()
-
-
-def test_the_outline_of_what_covers_part_of_the_display_surrounds_it(
-    outcome: SessionOutcome,
-) -> None:
-    alignment, display = outcome.record.alignments[1], outcome.record.rig.eyes["left"]
-    found = overlay_outlines(display, alignment, "left", np.zeros(3))
-    assert set(found) == {"hand", "cursor"}
-    for outline in found["hand"] + found["cursor"]:
-        np.testing.assert_array_equal(outline[0], outline[-1])
 
 
 def test_the_running_mean_is_of_each_eye_alone(outcome: SessionOutcome) -> None:

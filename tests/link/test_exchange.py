@@ -1,9 +1,5 @@
 """Pairing by digits: the mathematics, the PC's limits, and both ends over real sockets."""
 
-import secrets
-import socket
-import threading
-from contextlib import suppress
 from dataclasses import replace
 
 import pytest
@@ -250,36 +246,6 @@ def test_a_device_is_paired_by_the_qr_code(server: HeadsetServer) -> None:
     photographed = invitation.code.encode()
     with HeadsetClient(server.address, photographed, stranger) as client, pytest.raises(LinkError):
         client.wait_connected(0.5)
-
-
-def test_pairing_goes_on_under_fifty_attempts_a_second(server: HeadsetServer) -> None:
-    """Half of them return their cookie, from a socket of their own."""
-    ended = threading.Event()
-
-    def burn() -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-            stranger.settimeout(0.02)
-            cookie = b""
-            while not ended.is_set():
-                stranger.sendto(request(secrets.token_bytes(16), cookie=cookie), server.address)
-                with suppress(TimeoutError):
-                    cookie = opened(stranger.recv(2000)).retry.cookie or cookie
-
-    burning = threading.Thread(target=burn)
-    burning.start()
-    try:
-        for _ in range(5):
-            invitation = server.invite()
-            eventually(lambda: server.pairing_attempts.count >= MAX_ATTEMPTS)
-            assert "from 127.0.0.1" in str(server.pairing_attempts)
-            device_id = new_device_id()
-            connects(
-                server, device_id, pair_by_digits(server.address, device_id, invitation.digits)
-            )
-            eventually(lambda: not server.connected)
-    finally:
-        ended.set()
-        burning.join()
 
 
 def test_guessing_ends_the_code(server: HeadsetServer, monkeypatch: pytest.MonkeyPatch) -> None:

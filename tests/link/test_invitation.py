@@ -7,12 +7,10 @@ from hypothesis import strategies as st
 from handcal.core.errors import LinkError
 from handcal.link.invitation import (
     Invitation,
-    new_code,
     qr_lines,
     qr_matrix,
     read_invitation,
 )
-from handcal.link.pairing import Pairing
 
 CODE = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
@@ -56,11 +54,6 @@ def test_any_text_is_read_or_refused_in_one_line(text: str) -> None:
     with pytest.raises(LinkError) as error:
         read_invitation(text)
     assert "\n" not in str(error.value)
-
-
-def test_a_code_is_a_pairing_key() -> None:
-    assert new_code() != new_code()
-    Pairing(new_code())
 
 
 def test_a_reader_finds_the_text_in_the_code() -> None:

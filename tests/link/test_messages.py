@@ -77,17 +77,6 @@ def test_projection_prompt_poses_and_confirmation_survive_exactly() -> None:
     assert (confirm.t_headset_ns, confirm.cursor_id, confirm.drawn) == (9, 4, bytes(16))
 
 
-def test_a_target_survives_exactly_and_can_be_taken_away() -> None:
-    corners_m = np.random.default_rng(0).normal(size=(4, 3))
-    read = messages.read_target(sent(messages.target(Target("right", corners_m))).target)
-    assert read is not None
-    assert read.eye == "right"
-    np.testing.assert_array_equal(read.corners_V_m, corners_m)
-    taken_away = sent(messages.target(None))
-    assert taken_away.WhichOneof("body") == "target"
-    assert messages.read_target(taken_away.target) is None
-
-
 @given(
     st.lists(st.builds(Receipt, st.integers(1, 6), st.integers(0, 99), st.integers(0, 2**256 - 1)))
 )
