@@ -5,13 +5,14 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from handcal.bridge import slicer
 from handcal.bridge.bridges import Bridge
 from handcal.bridge.slicer import MAX_POINTS, SlicerOutput
 from handcal.cli.main import main
@@ -157,3 +158,28 @@ def test_a_wrong_address_is_one_line(
         main()
     assert stopped.value.code == 2
     assert "an address is HOST:PORT" in capsys.readouterr().err
+
+
+def test_clients_that_never_read_delay_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    def large(_: object) -> Mapping[str, tuple[object, Callable[[], bytes]]]:
+        return {"Cloud": (time.monotonic(), lambda: bytes(100_000))}
+
+    monkeypatch.setattr(slicer, "igtl_messages", large)
+    said: list[str] = []
+    output = SlicerOutput(said.append, port=0, send_s=0.3)
+    stuck = [socket.create_connection(output.address) for _ in range(7)]
+    with socket.create_connection(output.address) as good:
+        good.settimeout(1.0)
+        slowest_s = 0.0
+        end_s = time.monotonic() + 10.0
+        while len(said) < 7 and time.monotonic() < end_s:
+            began_s = time.monotonic()
+            output.send(None)  # type: ignore[arg-type]
+            slowest_s = max(slowest_s, time.monotonic() - began_s)
+            good.recv(1 << 20)
+        assert len(said) == 7
+        assert all("takes no data" in one for one in said)
+        assert slowest_s < 1.0  # seven that block would take 2.1 s
+    for one in stuck:
+        one.close()
+    output.close()

@@ -1,4 +1,7 @@
+from __future__ import annotations
+
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -7,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import handcal.link
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Float64, HeadsetIdentity, HeadsetView, Projection
 from handcal.link import handcal_pb2 as pb
@@ -187,3 +191,14 @@ def test_any_bytes_are_an_envelope_or_malformed(data: bytes) -> None:
         assert isinstance(messages.parse(data), pb.Envelope)
     except MalformedError:
         return
+
+
+FOLDER = Path(handcal.link.__file__).parent
+
+
+def test_the_generated_code_is_that_of_the_schema(tmp_path: Path) -> None:
+    protoc = pytest.importorskip("grpc_tools.protoc")
+    arguments = [f"-I{FOLDER}", f"--python_out={tmp_path}", f"--pyi_out={tmp_path}"]
+    assert protoc.main(["protoc", *arguments, str(FOLDER / "handcal.proto")]) == 0
+    for name in ("handcal_pb2.py", "handcal_pb2.pyi"):
+        assert (tmp_path / name).read_text() == (FOLDER / name).read_text(), f"regenerate {name}"
