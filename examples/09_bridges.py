@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pylsl
 
-from handcal.bridge.bridge import Bridge
+from handcal.bridge.bridges import Bridge
 from handcal.bridge.lsl import LslOutput
 from handcal.bridge.slicer import DEFAULT_PORT, SlicerOutput
 from handcal.station.run import RunSettings, run_calibration

@@ -33,7 +33,6 @@ from handcal.io.closable import Closable
 from handcal.lab.bench.speed import noisy_frames
 from handcal.lab.bench.trials import BenchFigure
 from handcal.link.pairing import new_pairing_key
-from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
 from handcal.station.settings import StationSettings
 from handcal.station.snapshot import Snapshot
@@ -300,7 +299,7 @@ def _headset(port: int) -> Iterator[None]:
 
 
 def _free_port() -> int:
-    transport = UdpTransport(("127.0.0.1", 0), DEFAULT_SETTINGS.receive_buffer_bytes)
+    transport = UdpTransport(("127.0.0.1", 0))
     transport.close()
     return transport.address[1]
 

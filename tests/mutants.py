@@ -79,7 +79,7 @@ MUTANTS = (
     ),
     Mutant(
         "any cookie accepted",
-        "handcal/link/cookies.py",
+        "handcal/link/handshake.py",
         "return bool(cookie) and any(",
         "return bool(cookie) or any(",
         "tests/link/test_handshake.py",

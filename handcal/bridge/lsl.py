@@ -44,7 +44,7 @@ class LslOutput:
             import pylsl
         except (ImportError, RuntimeError) as error:  # the latter without the library liblsl
             raise HandcalError(
-                "Lab Streaming Layer needs pylsl: pip install 'handcal[lsl]'"
+                "Lab Streaming Layer needs pylsl", "pip install 'handcal[lsl]'"
             ) from error
         self._clock = pylsl.local_clock
         info = pylsl.StreamInfo(STREAM_NAME, STREAM_TYPE, 1, 0.0, pylsl.cf_string, source_id)

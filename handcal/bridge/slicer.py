@@ -63,7 +63,9 @@ class SlicerOutput:
         try:
             import pyigtl  # noqa: F401
         except ImportError as error:
-            raise HandcalError("OpenIGTLink needs pyigtl: pip install 'handcal[slicer]'") from error
+            raise HandcalError(
+                "OpenIGTLink needs pyigtl", "pip install 'handcal[slicer]'"
+            ) from error
         self._tell = tell
         self._send_s = send_s
         self._clients: list[_Client] = []

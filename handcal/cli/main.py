@@ -46,6 +46,7 @@ COMMANDS: Mapping[str, str | Group] = {
             "use": "openxr",
             "status": "openxr",
             "remove": "openxr",
+            "client": "openxr",
         },
     ),
     "session": Group(

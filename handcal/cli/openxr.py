@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 from dataclasses import asdict
 from pathlib import Path
 
-from handcal.cli.output import console, save
-from handcal.cli.terminal import arg, command, flag
+from handcal.cli.output import console, save, until_interrupted
+from handcal.cli.terminal import arg, command, file_option, flag
 
 
 @command()
@@ -54,4 +55,39 @@ def status(arguments: argparse.Namespace) -> None:
     found = layer_status()
     save(arguments.json, asdict(found))
     for line in found.lines:
-        console.print(line)
+        console.print(line, markup=False)
+
+
+@command(
+    arg(
+        "address",
+        nargs="?",
+        default="127.0.0.1",
+        metavar="HOST[:PORT]",
+        help="the computer that runs handcal (default: this one, port 47800)",
+    ),
+    file_option(
+        "--key-file",
+        "pairing key of another computer (default: HANDCAL_PAIRING_KEY, else paired with this one)",
+    ),
+)
+def client(arguments: argparse.Namespace) -> None:
+    """Be the headset of a calibration, on any OpenXR headset of this computer."""
+    from handcal.link.pairing import KEY_VARIABLE, Pairings, pairing_file, read_pairing_key
+    from handcal.openxr_client.client import paired_identity, run_openxr_client
+    from handcal.station.settings import DEFAULT_PORT
+
+    host, colon, port = arguments.address.rpartition(":")
+    if not colon or not port.isdecimal() or (":" in host and not host.endswith("]")):
+        host, port = arguments.address, str(DEFAULT_PORT)
+    if arguments.key_file or os.environ.get(KEY_VARIABLE):
+        device_id, key = "", read_pairing_key(arguments.key_file)
+    else:
+        device_id, key = paired_identity(Pairings.read(pairing_file()))
+    console.print(
+        "Enter or space, a controller's trigger or a pinch of the other hand confirms; in the "
+        "window, arrows, + and - move the drawing, and Esc ends.",
+        markup=False,
+    )
+    with until_interrupted() as is_stopped:
+        run_openxr_client((host.strip("[]"), int(port)), key, device_id, is_stopped)

@@ -273,7 +273,7 @@ def _next_step(verdict: VerdictName, settings: DemoSettings, session: str) -> st
 )
 def headset(arguments: argparse.Namespace) -> None:
     """Run a virtual headset with a simulated wearer, connected by the real protocol."""
-    from handcal.link.ask_to_pair import pair_by_code, pair_by_digits
+    from handcal.link.exchange import pair_by_code, pair_by_digits
     from handcal.link.impair import Impairment
     from handcal.link.invitation import read_invitation
     from handcal.link.pairing import new_device_id, read_pairing_key

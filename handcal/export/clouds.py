@@ -109,7 +109,7 @@ def read_cloud(path: str | PathLike[str]) -> tuple[Float64, Bool | None]:
         import open3d
     except ImportError as error:
         raise HandcalError(
-            "reading clouds needs Open3D, which is not installed: pip install 'handcal[3d]'"
+            "reading clouds needs Open3D, which is not installed", "pip install 'handcal[3d]'"
         ) from error
     if path.suffix.lower() == ".xyz":
         return _parse_xyz(path, data), None

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import shutil
 import sys
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
+from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
-from handcal.export.archive import write_archive
-from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.clouds import write_clouds
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.export.north_star import write_northstar
 from handcal.export.outcome import SessionOutcome, load_outcome
-from handcal.export.staging import Staging
 from handcal.export.tables import write_comparisons, write_parameters, write_trials
-from handcal.export.tools import write_openxr, write_slicer, write_unity
-from handcal.session.session import SessionRecord
+from handcal.export.tools import (
+    write_calibration_json,
+    write_calibration_yaml,
+    write_openxr,
+    write_slicer,
+    write_unity,
+)
+from handcal.io.closable import Closable
+from handcal.io.files import make_folder, open_no_link, refuse_links, sync_folder
+from handcal.io.lock import FileLock
+from handcal.session.journal import JOURNAL_END
+from handcal.session.session import Session, SessionRecord
 
 _ALL = {**FORMATS, **TOOL_FORMATS}
 
@@ -152,3 +164,267 @@ def _import_drawing(progress: Progress) -> None:
     for heavy in ("matplotlib.figure", "matplotlib.backends.backend_pdf", "jinja2"):
         import_module(heavy)
         progress.check()
+
+
+MAX_ARCHIVE_BYTES = 4 * 2**30
+_CHUNK_BYTES = 2**19
+
+
+def write_archive(
+    path: Path, record: SessionRecord, excluded: Path, progress: Progress = Progress()
+) -> None:
+    """Write a session's folder as a zip file, under its own name.
+
+    Equal sessions give equal bytes: files are sorted and have no timestamps. Left out are locks,
+    hidden and temporary files, links, and events recorded after the record was read, with the
+    file that names the last one.
+
+    Parameters
+    ----------
+    path : Path
+    record : SessionRecord
+    excluded : Path
+        A folder to leave out if it lies in the session's: that of the exports.
+    progress : Progress
+        Reported to every half megabyte at the latest.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read or written, or the session exceeds 4 GiB.
+    """
+    folder = record.path.absolute()
+    try:
+        sizes = {
+            found: 0 if found.is_dir() else found.stat().st_size
+            for found in _contents(folder, excluded.absolute())
+        }
+        sizes[folder / "journal.jsonl"] = record.journal_bytes
+        total_bytes = sum(sizes.values())
+        if total_bytes > MAX_ARCHIVE_BYTES:
+            raise FileError(
+                f"{folder} has {total_bytes:,} bytes, more than the {MAX_ARCHIVE_BYTES:,} "
+                "that fit in one zip file",
+                "copy the folder instead",
+            )
+        with path.open("xb") as stream:
+            done_bytes = 0
+            with zipfile.ZipFile(stream, "w") as archive:
+                for found, left_bytes in sizes.items():
+                    name = found.relative_to(folder.parent).as_posix()
+                    if found.is_dir():
+                        archive.writestr(_entry(f"{name}/"), b"")
+                        continue
+                    with (
+                        open(found, "rb", opener=open_no_link) as source,
+                        archive.open(_entry(name), "w") as target,
+                    ):
+                        while chunk := source.read(min(left_bytes, _CHUNK_BYTES)):
+                            target.write(chunk)
+                            left_bytes -= len(chunk)
+                            done_bytes += len(chunk)
+                            progress.at(done_bytes / total_bytes)
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _contents(folder: Path, excluded: Path) -> Iterator[Path]:
+    """Yield the files and folders in a session's folder, sorted."""
+    for path in sorted(folder.iterdir()):
+        if path.is_symlink() or path.name.startswith(".") or path == excluded:
+            continue
+        if path.is_dir():
+            yield path
+            yield from _contents(path, excluded)
+        elif path.is_file() and path.name not in ("lock", JOURNAL_END):
+            yield path
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(name)  # dated 1980, so that the bytes do not depend on the time
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    entry.external_attr = (0o40755 << 16) | 0x10 if entry.is_dir() else 0o100644 << 16
+    return entry
+
+
+class Staging(Closable):
+    """A hidden folder for new files of another, which is unchanged unless `publish` succeeds.
+
+    Parameters
+    ----------
+    folder : Path
+        Destination of the files; it need not exist.
+
+    Attributes
+    ----------
+    path : Path
+        Folder to write them to.
+
+    Raises
+    ------
+    FileError
+        If another program is exporting to the same folder, or it cannot be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder.absolute()
+        # In the folder itself if it exists: it may be a separate disk.
+        home = next(path for path in (self._folder, *self._folder.parents) if path.exists())
+        if not home.is_dir():
+            raise FileError(f"cannot write to {self._folder}: {home} is a file, not a folder")
+        self._root = home / f".{self._folder.name}.handcal-export"
+        refuse_links(self._root, home)
+        try:
+            self._lock = FileLock(make_folder(self._root) / "lock")
+        except FileError as error:  # it names a folder that nobody chose
+            what = error.what.replace(str(self._root), str(self._folder))
+            raise FileError(what, error.advice) from error
+        self.path = self._root / "new"
+        self._old = self._root / "old"
+        try:
+            for leftover in (self.path, self._old):
+                if leftover.exists():
+                    shutil.rmtree(leftover)
+                leftover.mkdir()
+        except OSError as error:
+            self.close()
+            raise FileError(f"cannot write to {self._folder}: {error.strerror or error}") from error
+
+    def publish(self, replaced: Sequence[str]) -> tuple[Path, ...]:
+        """Move the files into place and return their new paths, sorted.
+
+        Parameters
+        ----------
+        replaced : sequence of str
+            Patterns, relative to the folder, of the files to replace: matching files that are not
+            among the new ones are removed.
+
+        Raises
+        ------
+        FileError
+            If a file cannot be moved or replaced, or a subfolder is a link; the folder is then
+            unchanged.
+        """
+        names = sorted(
+            path.relative_to(self.path) for path in self.path.rglob("*") if path.is_file()
+        )
+        try:
+            if self._folder.exists():
+                self._merge(names, replaced)
+            else:
+                make_folder(self._folder.parent)
+                for folder in {(self.path / name).parent for name in names}:
+                    sync_folder(folder)
+                self.path.rename(self._folder)
+                sync_folder(self._folder.parent)
+        except OSError as error:
+            raise FileError(
+                f"cannot write to {self._folder}: {error.strerror or error} "
+                f"({Path(error.filename or self._folder).name})"
+            ) from error
+        return tuple(self._folder / name for name in names)
+
+    def close(self) -> None:
+        """Remove unpublished files; safe to call twice."""
+        self._lock.release()
+        shutil.rmtree(self._root, ignore_errors=True)
+
+    def _merge(self, names: Sequence[Path], replaced: Sequence[str]) -> None:
+        """Move each file atomically into the existing folder; undo all moves if one fails."""
+        stale = {
+            path.relative_to(self._folder)
+            for pattern in replaced
+            for path in self._folder.glob(pattern)
+        } - set(names)
+        affected = [*names, *stale]
+        for name in affected:
+            refuse_links((self._folder / name).parent, self._folder)
+            if os.path.lexists(self._folder / name):
+                make_folder((self._old / name).parent)
+                shutil.copy2(self._folder / name, self._old / name, follow_symlinks=False)
+        try:
+            for name in names:
+                make_folder((self._folder / name).parent)
+                (self.path / name).replace(self._folder / name)
+            for name in stale:
+                (self._folder / name).unlink()
+            for folder in {(self._folder / name).parent for name in affected}:
+                sync_folder(folder)
+        except (OSError, FileError):
+            for name in affected:
+                # A file that cannot be put back, such as one open elsewhere, was not moved.
+                with contextlib.suppress(OSError):
+                    self._put_back(name)
+            raise
+
+    def _put_back(self, name: Path) -> None:
+        if os.path.lexists(self._old / name):
+            (self._old / name).replace(self._folder / name)
+        else:
+            (self._folder / name).unlink(missing_ok=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """Result of an export of one or several sessions."""
+
+    files: tuple[Path, ...]
+    missing: tuple[str, ...] = ()
+    """Sessions that were not exported, each with the reason."""
+
+
+def export_sessions(
+    paths: Sequence[Path], folder: Path, settings: ExportSettings, progress: Progress = Progress()
+) -> Exported:
+    """Export sessions, each into a folder of its name.
+
+    A session that cannot be exported does not keep the others from it. If it is cancelled, the
+    sessions exported before stay.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Sessions of different names, as in one folder.
+    folder : Path
+        Created if needed.
+    settings : ExportSettings
+    progress : Progress
+        Its activity begins with the session's number and wearer.
+
+    Raises
+    ------
+    CancelledError
+        If it was cancelled before the first session was exported.
+    """
+    files: list[Path] = []
+    missing: list[str] = []
+    for done, path in enumerate(paths):
+        try:
+            files += _export(path, folder, settings, progress, done, len(paths))
+        except FileError as error:
+            missing.append(f"{path.name}: {error}")
+        except CancelledError:
+            if not files:
+                raise
+            missing += (f"{one.name}: cancelled" for one in paths[done:])
+            break
+    return Exported(tuple(files), tuple(missing))
+
+
+def _export(
+    path: Path, folder: Path, settings: ExportSettings, progress: Progress, done: int, count: int
+) -> tuple[Path, ...]:
+    name = f"{done + 1} of {count}: {path.name}"
+    progress.at(done / count, name)
+    record = Session.open(path)
+    if not record.is_solvable:
+        raise FileError("it has no alignments")
+    name = f"{done + 1} of {count}: {record.wearer or path.name}"
+
+    def report(what: str, share: float) -> None:
+        progress.report(f"{name}, {what[:1].lower()}{what[1:]}", share)
+
+    part = replace(progress, report=report).part(done / count, (done + 1) / count)
+    return export_session(record, folder / path.name, settings, part)

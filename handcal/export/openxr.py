@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -121,10 +123,8 @@ def install_layer() -> Path:
     try:  # not copied over: running programs have the old one in their memory
         write_atomic(library, data)
     except FileError as error:
-        raise FileError(
-            f"{error}",
-            "if OpenXR programs are running, end them and try again",
-        ) from error
+        advice = "if OpenXR programs are running, end them and try again"
+        raise FileError(error.what, advice) from error
     manifest = _manifest()
     make_folder(manifest.parent)
     layer = {
@@ -195,6 +195,24 @@ def use_calibration(record: SessionRecord, *, keep: bool = False) -> None:
     values["rigSha256"] = rig_sha256(record.path)
     make_folder(in_force_path().parent)
     write_json(in_force_path(), values)
+
+
+@contextmanager
+def correction_owner(name: str) -> Iterator[None]:
+    """Have the layer pass this program's views through, as the program corrects by itself.
+
+    It names the owner to the installed layer, if there is one, which is loaded into this process.
+    """
+    library = None
+    with suppress(FileError, OSError, AttributeError):  # none for this system, or an older one
+        if _manifest().exists():
+            library = ctypes.CDLL(str(_library()))
+            library.handcal_correction_owner(name.encode())
+    try:
+        yield
+    finally:
+        if library is not None:
+            library.handcal_correction_owner(None)
 
 
 def layer_status() -> LayerStatus:

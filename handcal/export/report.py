@@ -2,36 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from handcal.core.types import EYES, Alignment, Eye, EyeShift, Verdict, VerdictName
+from handcal.core.types import EYES, Alignment, Eye, EyeShift, Float64, Verdict, VerdictName
 from handcal.export import figures
-from handcal.export.definitions import DEFINITIONS
-from handcal.export.figure_rows import (
-    convergence_rows,
-    distance_rows,
-    overlay_rows,
-    residual_rows,
-)
 from handcal.export.figures import ResidualCells
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, printable
-from handcal.export.tables import parameter_rows
-from handcal.export.trial_sections import (
-    comparisons_section,
-    trials_section,
-    user_test_section,
-)
+from handcal.export.tables import corner_rows, parameter_rows
 from handcal.register.benefit import BY_DISTANCE
 from handcal.register.results import Results
-from handcal.report.cells import length_mm
-from handcal.report.document import Column, Figure, Item, Report, Section, Table, facts
+from handcal.report.cells import extremes, interval_ends, length_mm, mean_sd, median_quartiles
+from handcal.report.document import Column, Figure, FigureRow, Item, Report, Section, Table, facts
 from handcal.report.provenance import at_minute, made_with, settings_items
+from handcal.report.statistics import mean_interval
 from handcal.session.record import eye_trials
-from handcal.session.trial import EyeTrials, is_doubted, read_comparisons
+from handcal.session.trial import (
+    Comparison,
+    ErrorStatistics,
+    EyeTrials,
+    Trial,
+    calibration_numbers,
+    count_comparisons,
+    is_doubted,
+    read_comparisons,
+    summarise_trials,
+)
 
 _ORIGINS: Mapping[ShiftOrigin, str] = {
     "fine_tuned": "fine-tuned by hand",
@@ -400,3 +401,252 @@ def _registered(shift: EyeShift) -> list[str]:
 
 def _yes(truth: bool) -> str:
     return "yes" if truth else "no"
+
+
+DEFINITIONS = {
+    "φ = (φ₁, φ₂, φ₃)": (
+        "Position of the wearer's eye relative to the viewpoint camera of the offline calibration: "
+        "right, down and forward, along the axes of E."
+    ),
+    "± σ": (
+        "One standard deviation, from the covariance's diagonal. For the method “consistent” it "
+        "covers the registration and, if fused, how precisely people align. For an alignment by "
+        "another method it is plain least squares with independent pairs, which is optimistic."
+    ),
+    "fused": (
+        "All alignments combined, weighted by their covariances, with the prior: the size of the "
+        "eye box, and how far the φ of the two eyes differ."
+    ),
+    "final, applied": (
+        "The final φ is the one tuned by hand if there is one, else the solved one. It is applied "
+        "if the headset acknowledged it and rendered with it at the end."
+    ),
+    "expected error": (
+        "Error in the display that φ's covariance predicts: root mean square at the corners of an "
+        "8 cm square straight ahead at half a metre, in arcminutes (′, a sixtieth of a degree)."
+    ),
+    "error in depth": (
+        "Distance along the viewing direction by which an object at 0.5 m must move to cover its "
+        "drawing: expected without the calibration → with it."
+    ),
+    "eye distance": "Distance between the two solved eyes, from φ and the rig.",
+    "residual, RMS": (
+        "Distance of a hand point to its partner on the cursor after registration; RMS over the "
+        "inliers of all alignments."
+    ),
+    "inliers": (
+        "Share of the hand's points whose partner is near, and not beside a cut edge such as the "
+        "forearm's."
+    ),
+    "rotation": "Angle between the hand and the cursor at the confirmation.",
+    "reprojection error": (
+        "In the user test: distance in the display between a corner of the target drawn with the "
+        "calibrated φ (the solved one, or 0 for an eye that keeps the offline calibration) and "
+        "with the φ that was adjusted by hand until the drawn target covered the real one."
+    ),
+    "W, H, D": "Frames: the world, the headset's rig, the depth camera.",
+    "C0, C1": "The viewpoint of the offline calibration, and the wearer's eye.",
+    "E, S, V": (
+        "The ideal on-axis eye-display camera at C0, the display's focal plane, and the headset's "
+        "rendering camera. Axes: x right, y down, z forward."
+    ),
+    "method": (
+        "Hu, Rodriguez y Baena, Cutolo: Rotation-constrained optical see-through headset "
+        "calibration with bare-hand alignment. ISMAR 2021. “paper” is its solver as published; "
+        "“linear” the same model with all equations of each pair; “consistent” the exact model, "
+        "robust to cut edges and a rotated hand; “icp” the rigid baseline."
+    ),
+}
+
+
+def convergence_rows(results: Results) -> Iterator[FigureRow]:
+    """Yield a row for every iteration of every alignment and eye."""
+    for number, shifts in results.alignments.items():
+        for eye, shift in shifts.items():
+            for iteration, rms_m in enumerate(np.sqrt(shift.history_m2), 1):
+                yield {
+                    "alignment": number,
+                    "eye": eye,
+                    "iteration": iteration,
+                    "rms_mm": 1e3 * float(rms_m),
+                }
+
+
+def distance_rows(results: Results) -> Iterator[FigureRow]:
+    """Yield a row for every eye and distance of the error against distance."""
+    for eye, benefit in results.benefits.items():
+        for one in benefit.by_distance:
+            yield {"eye": eye, **asdict(one)}
+
+
+def residual_rows(number: int, cells: Mapping[Eye, ResidualCells]) -> Iterator[FigureRow]:
+    """Yield a row for every cell of an alignment's residual maps."""
+    for eye, of_eye in cells.items():
+        for x_mm, y_mm, points, inliers, mean_mm in zip(
+            of_eye.x_mm, of_eye.y_mm, of_eye.points, of_eye.inliers, of_eye.mean_mm, strict=True
+        ):
+            yield {
+                "alignment": number,
+                "eye": eye,
+                "x_mm": float(x_mm),
+                "y_mm": float(y_mm),
+                "points": int(points),
+                "inliers": int(inliers),
+                "mean_residual_mm": float(mean_mm) if inliers else None,
+            }
+
+
+def overlay_rows(
+    number: int, eye: Eye, outlines: Mapping[str, Mapping[str, Sequence[Float64]]]
+) -> Iterator[FigureRow]:
+    """Yield a row for every corner of the outlines, by calibration and object."""
+    for when, of_what in outlines.items():
+        for what, closed in of_what.items():
+            for place, outline in enumerate(closed, 1):
+                for x_px, y_px in outline.tolist():
+                    yield {
+                        "alignment": number,
+                        "eye": eye,
+                        "calibration": when,
+                        "of": what,
+                        "outline": place,
+                        "x_px": x_px,
+                        "y_px": y_px,
+                    }
+
+
+def running_mean_rows(trials: Mapping[int, Trial]) -> Iterator[FigureRow]:
+    """Yield a row for every trial, with the mean of the eye's trials so far."""
+    errors: dict[Eye, list[float]] = {}
+    for number, trial in trials.items():
+        so_far = errors.setdefault(trial.eye, [])
+        so_far.append(float(trial.error_arcmin.mean()))
+        yield {
+            "trial": number,
+            "eye": trial.eye,
+            "mean_arcmin": so_far[-1],
+            "mean_so_far_arcmin": float(np.mean(so_far)),
+        }
+
+
+def user_test_section(outcome: SessionOutcome) -> Section:
+    """Return the errors of all trials together, by eye and by distance."""
+    record = outcome.record
+    statistics = summarise_trials(record.trials.values())
+    groups = {"all": statistics.total} if statistics.total else {}
+    groups |= {f"{eye} eye": errors for eye, errors in statistics.by_eye.items()}
+    groups |= {f"at {depth_m:g} m": errors for depth_m, errors in statistics.by_depth_m.items()}
+    table = Table(
+        [
+            Column("trials", "left"),
+            Column("number"),
+            Column("corners"),
+            Column("mean ± SD, px"),
+            Column("mean ± SD, arcmin"),
+            Column("median (quartiles), arcmin"),
+            Column("min–max, arcmin"),
+        ],
+        [[name, *_error_cells(errors)] for name, errors in groups.items()],
+        "Reprojection error; each corner of the target counts once.",
+    )
+    boxes = Figure(
+        "trial-errors",
+        "Boxes: quartiles and median; whiskers: the farthest within 1.5 interquartile ranges.",
+        lambda axes: figures.draw_trial_errors(axes, record.trials.values()),
+        list(corner_rows(record.trials)),
+        height_mm=62.0,
+        columns=2,
+    )
+    running = Figure(
+        "running-mean",
+        "Points: mean error of each trial; lines: mean of all so far.",
+        lambda axes: figures.draw_running_mean(axes[0], record.trials),
+        list(running_mean_rows(record.trials)),
+        height_mm=48.0,
+    )
+    return Section("User test", [table, _interval(outcome), boxes, running])
+
+
+def _interval(outcome: SessionOutcome) -> str:
+    """Return sentences on the calibrations that were tried and the uncertainty of the mean."""
+    trials = outcome.record.trials
+    calibrations = list(calibration_numbers(trials).values())
+    judged = eye_trials(outcome.results, outcome.record, math.inf) if outcome.results else {}
+    former = len(trials) - sum(one.count for one in judged.values())
+    said = (
+        f"{former} of {len(trials)} trials judge an earlier φ than the result. " if former else ""
+    )
+    if len(set(calibrations)) < 2:
+        return said + (
+            "All trials judge one calibration, so how far another would differ is not known: no "
+            "interval is given for the mean."
+        )
+    errors = [float(trial.error_arcmin.mean()) for trial in trials.values()]
+    found = mean_interval(errors, calibrations)
+    return said + (
+        f"Mean over {found.clusters} calibrations of this wearer: {found.mean:.2f} arcmin "
+        f"({100 * found.level:g} % interval {interval_ends(found)})."
+    )
+
+
+def trials_section(outcome: SessionOutcome) -> Section:
+    """Return each trial with its two φ and its error."""
+    record = outcome.record
+    table = Table(
+        [
+            Column("no."),
+            Column("time, UTC"),
+            Column("eye", "left"),
+            Column("distance, m"),
+            Column("calibrated φ, mm"),
+            Column("adjusted φ, mm"),
+            Column("mean error, px"),
+            Column("mean error, arcmin"),
+        ],
+        [
+            [
+                str(number),
+                trial.time[11:19],
+                trial.eye,
+                f"{trial.target_depth_m:g}",
+                "\u00a0\u00a0".join(map(length_mm, trial.calibrated_shift_m)),
+                "\u00a0\u00a0".join(map(length_mm, trial.adjusted_shift_m)),
+                f"{trial.error_px.mean():.2f}",
+                f"{trial.error_arcmin.mean():.2f}",
+            ]
+            for number, trial in record.trials.items()
+        ],
+    )
+    return Section("Trials", [table])
+
+
+def comparisons_section(comparisons: Sequence[Comparison]) -> Section:
+    """Return the answers of the blinded comparisons, and their sign test."""
+    counts = count_comparisons(comparisons)
+    table = Table(
+        [
+            Column("time, UTC"),
+            Column("shown first", "left"),
+            Column("answer", "left"),
+            Column("better", "left"),
+        ],
+        [[one.time[11:19], one.first, one.answer, one.better or "neither"] for one in comparisons],
+        "offline: without the calibration; applied: with it. The order was drawn by lot, and "
+        "neither wearer nor technician knew it.",
+    )
+    sentence = (
+        f"Better with the calibration: {counts.applied}; without it: {counts.offline}; neither: "
+        f"{counts.neither}. Two-sided sign test of this wearer's answers: p = {counts.p_value:.3f}."
+    )
+    return Section("Blinded comparison", [sentence, table])
+
+
+def _error_cells(errors: ErrorStatistics) -> list[str]:
+    return [
+        str(errors.trials),
+        str(errors.corners),
+        mean_sd(errors.px),
+        mean_sd(errors.arcmin),
+        median_quartiles(errors.arcmin),
+        extremes(errors.arcmin),
+    ]

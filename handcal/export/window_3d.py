@@ -20,14 +20,74 @@ from typing import Any
 import numpy as np
 
 from handcal.core.errors import FileError, HandcalError
-from handcal.core.geometry import rigid
+from handcal.core.geometry import invert, rigid, transform
 from handcal.core.progress import Progress
-from handcal.core.types import Eye, Float64
+from handcal.core.types import Eye, EyeDisplay, Float64
 from handcal.export.outcome import SessionOutcome
-from handcal.export.scene_3d import Scene3d, make_scenes
 from handcal.io.files import make_folder, read_limited, require_suffix, write_atomic
 from handcal.io.x_display import x_server_answers
 from handcal.register.verdict import RMS_MAX_M
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Eye3d:
+    """An eye and its display, in the scene's axes."""
+
+    offline_m: Float64
+    """(3,); C0, the viewpoint of the offline calibration."""
+    eye_m: Float64
+    """(3,); C1, the eye by its final φ; C0 where there is none."""
+    display_m: Float64
+    """(4, 3); corners of the display's image on its focal plane, clockwise."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene3d:
+    """One alignment in the axes of its first eye's E at t_b: x right, y down, z forward."""
+
+    title: str
+    cursor_m: Float64
+    """(N, 3)."""
+    hand_m: Float64
+    """(M, 3)."""
+    residuals_m: Mapping[Eye, Float64]
+    """each (M,); distance of each point of the hand from its partner, NaN for an outlier."""
+    eyes: Mapping[Eye, Eye3d]
+
+
+def make_scenes(outcome: SessionOutcome) -> dict[int, Scene3d]:
+    """Return a scene for each alignment of a session, by number."""
+    solved = outcome.results.alignments if outcome.results else {}
+    return {number: _make_scene(outcome, number) for number in solved}
+
+
+def _make_scene(outcome: SessionOutcome, number: int) -> Scene3d:
+    assert outcome.results is not None
+    alignment = outcome.record.alignments[number]
+    T_scene_W = alignment.T_E_W[alignment.eyes[0]]
+    eyes: dict[Eye, Eye3d] = {}
+    for eye, T_E_W in alignment.T_E_W.items():
+        corners_m = _display_corners_m(outcome.record.rig.eyes[eye])
+        points_m = np.vstack([np.zeros(3), outcome.final_shift_m(eye), corners_m])
+        placed_m = transform(T_scene_W @ invert(T_E_W), points_m)
+        eyes[eye] = Eye3d(placed_m[0], placed_m[1], placed_m[2:])
+    shifts = outcome.results.alignments[number]
+    return Scene3d(
+        title=f"alignment {number}",
+        cursor_m=transform(T_scene_W, alignment.cursor_m),
+        hand_m=transform(T_scene_W, alignment.hand_m),
+        residuals_m={eye: shift.residuals_m for eye, shift in shifts.items()},
+        eyes=eyes,
+    )
+
+
+def _display_corners_m(display: EyeDisplay) -> Float64:
+    """Return the corners of a display's image on its focal plane, (4, 3), in E."""
+    right, bottom = display.width_px - 0.5, display.height_px - 0.5
+    corners_px = np.array([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])
+    rays = np.linalg.solve(display.K @ display.H0, np.vstack([corners_px.T, np.ones(4)])).T
+    return np.asarray(display.z_C0_S_m * rays / rays[:, 2:])
+
 
 _KEYS = "N, P: next, previous alignment; E: other eye; V: view from the eye; O: oblique view"
 _SIZE_PX = 1200, 800
@@ -88,12 +148,14 @@ def inspect_session(
     number = list(scenes)[-1] if number is None else number
     if number not in scenes:
         known = ", ".join(map(str, scenes))
-        raise FileError(f"{outcome.record.path} has no alignment {number}", f"it has {known}")
+        raise FileError(f"{outcome.record.path} has no alignment {number}: it has {known}")
     if find_spec("open3d") is None:
-        raise HandcalError("Open3D is not installed: pip install 'handcal[3d]'")
+        raise HandcalError("Open3D is not installed", "pip install 'handcal[3d]'")
     if picture is None:
         if not _has_display():
-            raise HandcalError("no display found for the 3D window", "--picture FILE needs none")
+            raise HandcalError(
+                "no display found for the 3D window", "use --picture FILE, which needs none"
+            )
         _run(_Order(outcome.name, scenes, number, None), progress)
         return
     require_suffix(picture, ".png")
@@ -148,7 +210,7 @@ def _run(order: _Order, progress: Progress) -> None:
     if status:
         raise HandcalError(
             f"the 3D window crashed (status {status}), perhaps in the graphics driver",
-            "update it",
+            "update the driver",
         )
 
 

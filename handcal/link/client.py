@@ -11,9 +11,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from handcal.core.errors import LinkError
 from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
-from handcal.link import greetings, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link import handshake, messages, nudges, wire
 from handcal.link.drawn import drawn_digest, drawn_projections
 from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.fields import MalformedError, read_eyes
@@ -22,7 +23,6 @@ from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import device_number
 from handcal.link.reliable import Outgoing
-from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
 from handcal.link.shapes import Shape, Target
 from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import Packet, Rejection, Slot
@@ -30,6 +30,8 @@ from handcal.link.wire import Packet, Rejection, Slot
 MAX_WEARERS = 16
 _POSES_PER_DATAGRAM = 3
 _REFUSED_PERIOD_S = 1.0
+_HELLO_PERIOD_S = 0.1
+"""Time between two hellos, or two signs of life."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +91,6 @@ class HeadsetClient(Endpoint):
         The headset's own; its `device_id` has 16 hexadecimal digits, and belongs to this device.
     clock_ns : callable
         The headset's clock, ns.
-    settings : LinkSettings
     impairment : Impairment
         Impairments of the datagrams in both directions.
 
@@ -107,7 +108,6 @@ class HeadsetClient(Endpoint):
         pairing_key: bytes,
         identity: HeadsetIdentity,
         clock_ns: Callable[[], int] = time.monotonic_ns,
-        settings: LinkSettings = DEFAULT_SETTINGS,
         impairment: Impairment = UNIMPAIRED,
     ) -> None:
         if len(pairing_key) < wire.MIN_PAIRING_KEY_BYTES:
@@ -117,8 +117,8 @@ class HeadsetClient(Endpoint):
         self._pairing_key = pairing_key
         self._keys = wire.handshake_keys(pairing_key, self._device)
         self._server = resolve(*server)
-        transport = UdpTransport(_own_side(self._server), settings.receive_buffer_bytes)
-        super().__init__(ImpairedTransport(transport, impairment), settings)
+        transport = UdpTransport(_own_side(self._server))
+        super().__init__(ImpairedTransport(transport, impairment))
         self._identity = identity
         self._clock_ns = clock_ns
         self._recent_poses: deque[tuple[int, Float64]] = deque(maxlen=_POSES_PER_DATAGRAM)
@@ -129,7 +129,7 @@ class HeadsetClient(Endpoint):
         self._live_chunks: dict[int, Float64] = {}
         self._nonce = secrets.token_bytes(wire.NONCE_BYTES)
         self._cookie = b""
-        self._refusal = ""
+        self._refused: LinkError | None = None
         self._hello_ns = 0
         self._next_hello_s = 0.0
         self._start()
@@ -138,7 +138,7 @@ class HeadsetClient(Endpoint):
     def refusal(self) -> str:
         """The PC's reason for not connecting; empty if it has none."""
         with self._changed:
-            return self._refusal
+            return "" if self._refused is None else str(self._refused)
 
     @property
     def kept(self) -> Mapping[Owner, Mapping[Eye, Projection]]:
@@ -239,8 +239,8 @@ class HeadsetClient(Endpoint):
                 return HeadsetState(projections=self._state.projections)
             return replace(self._state, live_W_m=self._live_hand())
 
-    def _silence(self, timeout_s: float) -> str:
-        return self._refusal or super()._silence(timeout_s)
+    def _silence(self, timeout_s: float) -> LinkError:
+        return self._refused or super()._silence(timeout_s)
 
     def _greet(self, packet: Packet, datagram: bytes, address: Address) -> Rejection | None:
         if address != self._server or packet.sequence != self._device:
@@ -256,13 +256,13 @@ class HeadsetClient(Endpoint):
         match body:
             case "retry":
                 is_first = not self._cookie
-                self._cookie = envelope.retry.cookie[: greetings.MAX_COOKIE_BYTES]
+                self._cookie = envelope.retry.cookie[: handshake.MAX_COOKIE_BYTES]
                 if is_first:  # or a PC that takes no cookie would be asked without a pause
                     self._say_hello()
             case "welcome":
-                self._join(greetings.read_welcome(envelope.welcome))
+                self._join(handshake.read_welcome(envelope.welcome))
             case "refused":
-                self._refusal = str(greetings.read_refused(envelope.refused))
+                self._refused = handshake.read_refused(envelope.refused).error
                 self._begin_again()
                 self._next_hello_s = time.monotonic() + _REFUSED_PERIOD_S
         return None
@@ -272,7 +272,7 @@ class HeadsetClient(Endpoint):
         self._channel = Channel(welcome.session, self._server, keys.to_pc, keys.to_headset)
         self._begin_again()
         self._dismissed = False
-        self._refusal = ""
+        self._refused = None
         self._next_hello_s = 0.0
         self._live_frame = 0
         self._live_chunks.clear()
@@ -379,7 +379,7 @@ class HeadsetClient(Endpoint):
     def _tick(self, now_s: float) -> None:
         if now_s < self._next_hello_s:
             return
-        self._next_hello_s = now_s + self._settings.hello_period_s
+        self._next_hello_s = now_s + _HELLO_PERIOD_S
         if self._channel is not None and self._is_silent(self._channel):
             self._channel = None
         if self._channel is None:
@@ -389,8 +389,8 @@ class HeadsetClient(Endpoint):
 
     def _say_hello(self) -> None:
         self._hello_ns = max(time.time_ns(), self._hello_ns + 1)
-        hello = greetings.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
-        self._post(greetings.seal(self._keys.to_pc, self._device, hello), self._server)
+        hello = handshake.hello(self._nonce, self._hello_ns, self._cookie, self._identity.name)
+        self._post(handshake.seal(self._keys.to_pc, self._device, hello), self._server)
 
 
 def _own_side(server: Address) -> Address:

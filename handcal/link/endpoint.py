@@ -16,12 +16,17 @@ from handcal.link import handcal_pb2 as pb
 from handcal.link import messages, wire
 from handcal.link.fields import MalformedError
 from handcal.link.reliable import Delivery, Inbox, Outbox, Outgoing
-from handcal.link.settings import LinkSettings
 from handcal.link.transport import Address, Transport
 from handcal.link.wire import HANDSHAKE_SESSION, Packet, Rejection, ReplayWindow, Slot
 
 _LOG = logging.getLogger(__name__)
+SILENCE_S = 2.0
+"""Time without a datagram after which the other end counts as disconnected."""
 _BYES = 3
+_BURST_DATAGRAMS, _BURST_PAUSE_S = 16, 0.001
+"""Queued datagrams sent at once, and the pause after them, which a wireless link needs."""
+_IDLE_WAIT_S = 0.005
+"""Longest wait for a datagram while nothing is queued."""
 
 
 @dataclass(slots=True)
@@ -45,16 +50,15 @@ class Endpoint(Closable):
     subclasses, which hold `_changed` while they use state shared with the thread.
     """
 
-    def __init__(self, transport: Transport, settings: LinkSettings) -> None:
+    def __init__(self, transport: Transport) -> None:
         self._transport = transport
-        self._settings = settings
         self._changed = threading.Condition(threading.RLock())
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
         self._failure: Exception | None = None
         self._channel: Channel | None = None
         self._dismissed = False
-        self._outbox = Outbox(settings)
+        self._outbox = Outbox()
         self._stream: deque[pb.Envelope] = deque()
         self._next_burst_s = 0.0
         self._given_up = Counter[str]()
@@ -90,7 +94,7 @@ class Endpoint(Closable):
         with self._changed:
             self._wait_for(lambda: self.connected, timeout_s)
             if not self.connected:
-                raise LinkError(self._silence(timeout_s))
+                raise self._silence(timeout_s)
 
     def wait_acked(self, message: Outgoing, timeout_s: float) -> None:
         """Wait until the other end has acknowledged a message.
@@ -123,11 +127,11 @@ class Endpoint(Closable):
         self._thread.join()
         self._transport.close()
 
-    def _silence(self, timeout_s: float) -> str:
-        """Return the message for a connection that failed."""
-        return (
-            f"no device with this pairing key answered within {timeout_s:g} s; "
-            "check the address, the key and the firewall"
+    def _silence(self, timeout_s: float) -> LinkError:
+        """Return the error of a connection that failed."""
+        return LinkError(
+            f"no device with this pairing key answered within {timeout_s:g} s",
+            "check the address, the key and the firewall",
         )
 
     @abstractmethod
@@ -176,7 +180,7 @@ class Endpoint(Closable):
     def _wait_s(self) -> float:
         with self._changed:
             is_busy = self._channel and (self._stream or self._outbox.has_queued)
-        return self._settings.burst_pause_s if is_busy else self._settings.idle_wait_s
+        return _BURST_PAUSE_S if is_busy else _IDLE_WAIT_S
 
     def _take(self, datagram: bytes, address: Address) -> None:
         try:
@@ -239,15 +243,14 @@ class Endpoint(Closable):
         self._changed.notify_all()
 
     def _send_burst(self, now_s: float) -> None:
-        budget = self._settings.burst_datagrams
-        packets = self._outbox.due(now_s, budget)
+        packets = self._outbox.due(now_s, _BURST_DATAGRAMS)
         for packet in packets:
             self._send_packet(packet)
-        count = min(len(self._stream), budget - len(packets))
+        count = min(len(self._stream), _BURST_DATAGRAMS - len(packets))
         for _ in range(count):
             self._send(self._stream.popleft())
         if packets or count:
-            self._next_burst_s = now_s + self._settings.burst_pause_s
+            self._next_burst_s = now_s + _BURST_PAUSE_S
 
     def _send_reliably(self, slot: Slot, envelope: pb.Envelope) -> Outgoing:
         with self._changed:
@@ -272,4 +275,4 @@ class Endpoint(Closable):
         self._transport.send(datagram, address)
 
     def _is_silent(self, channel: Channel) -> bool:
-        return time.monotonic() - channel.heard_s > self._settings.silence_s
+        return time.monotonic() - channel.heard_s > SILENCE_S

@@ -11,17 +11,20 @@ from __future__ import annotations
 import hmac
 import re
 import secrets
+import time
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from ipaddress import ip_network
 
-from handcal.link import greetings, messages, wire
+from handcal.core.errors import LinkError
+from handcal.link import exchange, handshake, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link.cookies import Cookies
 from handcal.link.fields import MalformedError, read_text
+from handcal.link.handshake import Cookies
 from handcal.link.invitation import Invitation
-from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings
-from handcal.link.transport import Address
+from handcal.link.pairing import MAX_NAME_CHARACTERS, OFFER_S, Pairings, device_number
+from handcal.link.transport import Address, UdpTransport, local_address, resolve
 from handcal.link.wire import NONCE_BYTES, Packet, Rejection
 
 DIGITS = 8
@@ -170,12 +173,12 @@ class Exchange:
         message, device = read_pair(messages.parse(packet.payload)), packet.sequence
         answer = self._answers.get((device, message.nonce))
         if not self._cookies.accept(message.cookie, device, address, now_s):
-            answer = greetings.retry(message.nonce, self._cookies.make(device, address, now_s))
+            answer = handshake.retry(message.nonce, self._cookies.make(device, address, now_s))
         elif answer is None and not self._tallies[message.by_code].allows(address):
-            answer = greetings.refused_code(message.nonce)
+            answer = handshake.refused_code(message.nonce)
         elif answer is None:
             answer = self._answers[device, message.nonce] = self._answer(device, message, now_s)
-        return greetings.seal(PUBLIC_KEYS.to_headset, device, answer)
+        return handshake.seal(PUBLIC_KEYS.to_headset, device, answer)
 
     def _answer(self, device: int, message: pb.Pair, now_s: float) -> pb.Envelope:
         secret = new_secret()
@@ -220,7 +223,7 @@ def read_pair(envelope: pb.Envelope) -> pb.Pair:
     if (
         envelope.WhichOneof("body") != "pair"
         or len(message.nonce) != NONCE_BYTES
-        or len(message.cookie) > greetings.MAX_COOKIE_BYTES
+        or len(message.cookie) > handshake.MAX_COOKIE_BYTES
     ):
         raise MalformedError("a pairing begins with a nonce")
     _read_value(message.public_value)
@@ -243,3 +246,88 @@ def finish(message: pb.Paired, device: int, nonce: bytes, value: bytes, secret: 
     """
     agreed = agree(device, nonce, value, message.public_value, secret, is_pc=False)
     return agreed.key if hmac.compare_digest(agreed.proof, message.proof) else None
+
+
+_RESEND_S = 0.2
+_PATIENCE_S = 5.0
+
+
+def pair_by_code(
+    invitation: Invitation, device_id: str, name: str = "", timeout_s: float = _PATIENCE_S
+) -> str:
+    """Return the pairing key agreed with the PC that shows this QR code.
+
+    The PC waits for ten minutes for a connection with this key.
+
+    Raises
+    ------
+    LinkError
+        If no PC answers, the code is another one by now, or the PC takes no more attempts.
+    ValueError
+        If the identity is invalid.
+    """
+    address = invitation.host, invitation.port
+    return _pair(address, device_id, invitation.code, name, timeout_s, by_code=True)
+
+
+def pair_by_digits(
+    server: Address, device_id: str, digits: str, name: str = "", timeout_s: float = _PATIENCE_S
+) -> str:
+    """Return the pairing key agreed with a PC that shows these digits.
+
+    Raises as `pair_by_code`; ValueError also if there are not 8 digits.
+    """
+    digits = exchange.read_digits(digits)
+    return _pair(server, device_id, digits, name, timeout_s, by_code=False)
+
+
+def _pair(
+    server: Address, device_id: str, code: str, name: str, timeout_s: float, *, by_code: bool
+) -> str:
+    device = device_number(device_id)
+    nonce, secret = secrets.token_bytes(NONCE_BYTES), exchange.new_secret()
+    value = exchange.public_value(code, device, nonce, secret)
+    cookie = b""
+    address = resolve(*server)
+    transport = UdpTransport(local_address(address))
+    try:
+        end_s = time.monotonic() + timeout_s
+        while time.monotonic() < end_s:
+            asked = exchange.pair(nonce, value, name, cookie, by_code=by_code)
+            transport.send(handshake.seal(exchange.PUBLIC_KEYS.to_pc, device, asked), address)
+            for datagram, sender in transport.receive(_RESEND_S):
+                answer = _read(datagram, device) if sender == address else None
+                if answer is None:
+                    continue
+                if answer.retry.nonce == nonce:
+                    cookie = answer.retry.cookie
+                if answer.refused.nonce == nonce:
+                    raise LinkError(
+                        "the PC takes no more codes after too many wrong ones",
+                        "show a new one on it",
+                    )
+                if answer.paired.nonce == nonce:
+                    key = exchange.finish(answer.paired, device, nonce, value, secret)
+                    if key is None:
+                        raise LinkError("the code is wrong", "read it again from the PC's screen")
+                    return key
+    finally:
+        transport.close()
+    raise LinkError(
+        f"no PC at {server[0]}:{server[1]} answered within {timeout_s:g} s",
+        "let it show a code with handcal pair",
+    )
+
+
+def _read(datagram: bytes, device: int) -> pb.Envelope | None:
+    """Return the message of a PC to this device; None for anything else."""
+    packet = wire.read(datagram)
+    if (
+        not isinstance(packet, Packet)
+        or packet.sequence != device
+        or not wire.is_authentic(exchange.PUBLIC_KEYS.to_headset, datagram)
+    ):
+        return None
+    with suppress(MalformedError):
+        return messages.parse(packet.payload)
+    return None

@@ -1,4 +1,4 @@
-"""The PC's side of the handshake. No sockets; time is an argument.
+"""The messages of the handshake, and the PC's side of it. No sockets; time is an argument.
 
 A stranger costs no memory: the first hello is answered with a cookie, and only a hello that
 returns it is passed on. A hello is accepted once: its time must be greater than that of every
@@ -7,21 +7,136 @@ earlier one of its device.
 
 from __future__ import annotations
 
+import hmac
 import math
+import secrets
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
-from handcal.link import greetings, messages, wire
-from handcal.link.cookies import PERIOD_S, Cookies
-from handcal.link.exchange import Exchange
-from handcal.link.pairing import Pairing, Pairings, device_number
+from handcal.core.errors import LinkError
+from handcal.link import handcal_pb2 as pb
+from handcal.link import messages, wire
+from handcal.link.fields import MalformedError, read_text
+from handcal.link.pairing import MAX_NAME_CHARACTERS, Pairing, Pairings, device_number
 from handcal.link.transport import Address
-from handcal.link.wire import Keys, Packet, Rejection
+from handcal.link.wire import NONCE_BYTES, Keys, Packet, Rejection, Welcome
+
+MAX_COOKIE_BYTES = 32
+
+
+def seal(key: bytes, device: int, envelope: pb.Envelope) -> bytes:
+    """Return a datagram of the handshake."""
+    return wire.seal(key, Packet(envelope.SerializeToString(), sequence=device))
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """The PC's reason for refusing a session."""
+
+    is_key_taken: bool
+    """True: the pairing key belongs to another device. False: another headset is connected."""
+    other: str
+    """Name of the other device."""
+
+    @property
+    def error(self) -> LinkError:
+        """The reason, and what the wearer can do, as an error."""
+        if self.is_key_taken:
+            belongs = f"this pairing key belongs to {self.other}"
+            return LinkError(belongs, "ask the PC for a key of your own")
+        return LinkError(f"{self.other} is connected to the PC", "disconnect it first")
+
+
+def hello(nonce: bytes, time_ns: int, cookie: bytes, name: str) -> pb.Envelope:
+    """Make a hello, with the PC's cookie once it is known."""
+    return pb.Envelope(hello=pb.Hello(nonce=nonce, time_ns=time_ns, cookie=cookie, name=name))
+
+
+def read_hello(envelope: pb.Envelope) -> pb.Hello:
+    """Return the hello in an envelope."""
+    message = envelope.hello
+    if (
+        envelope.WhichOneof("body") != "hello"
+        or len(message.nonce) != NONCE_BYTES
+        or len(message.cookie) > MAX_COOKIE_BYTES
+    ):
+        raise MalformedError("a session begins with a hello")
+    read_text(message.name, MAX_NAME_CHARACTERS)
+    return message
+
+
+def retry(nonce: bytes, cookie: bytes) -> pb.Envelope:
+    """Make the request to say hello again with a cookie."""
+    return pb.Envelope(retry=pb.Retry(nonce=nonce, cookie=cookie))
+
+
+def welcome(value: Welcome) -> pb.Envelope:
+    """Make the offer of a session."""
+    return pb.Envelope(
+        welcome=pb.Welcome(
+            nonce=value.headset_nonce, session=value.session, pc_nonce=value.pc_nonce
+        )
+    )
+
+
+def read_welcome(message: pb.Welcome) -> Welcome:
+    """Read the offer of a session."""
+    if len(message.pc_nonce) != NONCE_BYTES or not message.session:
+        raise MalformedError("a welcome without a session")
+    return Welcome(message.session, message.nonce, message.pc_nonce)
+
+
+def refused(nonce: bytes, refusal: Refusal) -> pb.Envelope:
+    """Make a refusal."""
+    reason = pb.REFUSAL_KEY_TAKEN if refusal.is_key_taken else pb.REFUSAL_BUSY
+    return pb.Envelope(refused=pb.Refused(nonce=nonce, reason=reason, other=refusal.other))
+
+
+def refused_code(nonce: bytes) -> pb.Envelope:
+    """Make the refusal of a pairing by digits, after too many wrong ones."""
+    return pb.Envelope(refused=pb.Refused(nonce=nonce, reason=pb.REFUSAL_NO_CODE))
+
+
+def read_refused(message: pb.Refused) -> Refusal:
+    """Read a refusal; an unknown reason reads as another headset being connected."""
+    return Refusal(
+        message.reason == pb.REFUSAL_KEY_TAKEN, read_text(message.other, MAX_NAME_CHARACTERS)
+    )
+
+
+PERIOD_S = 120.0
+"""A cookie is valid until the end of the period after the one in which it was made."""
+_BYTES = 16
+
+
+class Cookies:
+    """Makes and checks cookies, with a secret of its own."""
+
+    def __init__(self) -> None:
+        self._secret = secrets.token_bytes(32)
+
+    def make(self, device: int, address: Address, now_s: float, age: int = 0) -> bytes:
+        """Return the cookie of the present period, or of the one before with `age` 1."""
+        period = math.floor(now_s / PERIOD_S) - age
+        who = f"{period} {device:016x} {address[1]} {address[0]}".encode()
+        return hmac.digest(self._secret, who, "sha256")[:_BYTES]
+
+    def accept(self, cookie: bytes, device: int, address: Address, now_s: float) -> bool:
+        """Return whether a cookie was made for this device and address a while ago at most."""
+        return bool(cookie) and any(
+            hmac.compare_digest(cookie, self.make(device, address, now_s, age)) for age in (0, 1)
+        )
+
 
 MAX_ANSWERS = 64
 """Addresses to which one hello is answered with a cookie."""
 _MAX_DEVICES = 64
 _MAX_DROPPED = 4096
 _FOREIGN_KEYS_HZ = 20.0
+
+PairingDesk: TypeAlias = Callable[[Packet, bytes, Address, float], bytes | Rejection]
+"""Answers a device whose key is unknown: `Exchange.hear` in `exchange.py`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +189,13 @@ class Reception:
 
     Attributes
     ----------
-    exchange : Exchange or None
+    pairing_desk : callable or None
         Answers those who ask to pair, while an invitation is shown.
     cookies : Cookies
     """
 
     def __init__(self, pairings: Pairings) -> None:
-        self.exchange: Exchange | None = None
+        self.pairing_desk: PairingDesk | None = None
         self._pairings = pairings
         self._heard: dict[int, _Heard] = {}
         self.cookies = Cookies()
@@ -108,31 +223,30 @@ class Reception:
         device = packet.sequence
         found = self._find(device, datagram, now_s)
         if found is None:
-            exchange = self.exchange
-            return (
-                exchange.hear(packet, datagram, address, now_s) if exchange else Rejection.UNPAIRED
-            )
+            if self.pairing_desk is None:
+                return Rejection.UNPAIRED
+            return self.pairing_desk(packet, datagram, address, now_s)
         pairing, keys = found
-        hello = greetings.read_hello(messages.parse(packet.payload))
+        greeting = read_hello(messages.parse(packet.payload))
         heard = self._recall(device, now_s)
-        if self.cookies.accept(hello.cookie, device, address, now_s):
-            if hello.time_ns <= heard.admitted_ns:
+        if self.cookies.accept(greeting.cookie, device, address, now_s):
+            if greeting.time_ns <= heard.admitted_ns:
                 return self._drop(datagram, address)
             heard.changed_s = now_s
-            heard.admitted_ns = hello.time_ns
-            heard.newest_ns = max(heard.newest_ns, hello.time_ns)
-            return Caller(pairing, f"{device:016x}", hello.name, hello.nonce, keys)
-        if hello.time_ns > heard.newest_ns:
+            heard.admitted_ns = greeting.time_ns
+            heard.newest_ns = max(heard.newest_ns, greeting.time_ns)
+            return Caller(pairing, f"{device:016x}", greeting.name, greeting.nonce, keys)
+        if greeting.time_ns > heard.newest_ns:
             heard.changed_s = now_s
-            heard.newest_ns = hello.time_ns
+            heard.newest_ns = greeting.time_ns
             heard.answered.clear()
-        elif hello.time_ns < heard.newest_ns:
+        elif greeting.time_ns < heard.newest_ns:
             return self._drop(datagram)
         elif address in heard.answered or len(heard.answered) >= MAX_ANSWERS:
             return self._drop(datagram, address)
         heard.answered.add(address)
-        retry = greetings.retry(hello.nonce, self.cookies.make(device, address, now_s))
-        return greetings.seal(keys.to_headset, device, retry)
+        cookie = self.cookies.make(device, address, now_s)
+        return seal(keys.to_headset, device, retry(greeting.nonce, cookie))
 
     def _drop(self, datagram: bytes, address: Address | None = None) -> Rejection:
         """Remember that a hello gets no answer, from one address or from any."""

@@ -51,7 +51,8 @@ def run_pairing(
         try:
             server = stack.enter_context(HeadsetServer(pairings, bind))
         except LinkError as error:
-            raise LinkError(f"{error}", "if handcal is open, pair there, or close it") from error
+            advice = f"if handcal is open, pair there, or close it; otherwise {error.advice}"
+            raise LinkError(error.what, advice) from error
         invitation = server.invite()
         show(invitation)
         try:

@@ -77,7 +77,7 @@ def read_pairing_key(path: Path | None = None) -> bytes:
     else:
         key = os.fsencode(os.environ.get(KEY_VARIABLE, "")).strip()
     if not key:
-        raise LinkError(f"no pairing key: set {KEY_VARIABLE} or give a file that holds it")
+        raise LinkError("no pairing key", f"set {KEY_VARIABLE} or give a file that holds it")
     if len(key) < MIN_PAIRING_KEY_BYTES:
         raise LinkError(
             f"the pairing key has {len(key)} bytes",

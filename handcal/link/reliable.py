@@ -12,10 +12,14 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 
 from handcal.link import wire
-from handcal.link.settings import LinkSettings
 from handcal.link.wire import Packet, Slot
 
 RECEIPT_COPIES = 3
+RESEND_S, RESEND_MAX_S = 0.04, 0.64
+"""First and longest wait before missing fragments are sent again; it doubles in between and is
+reset whenever fragments are acknowledged."""
+GIVE_UP_S = 5.0
+"""Time after which an unacknowledged message has failed."""
 
 
 class Delivery(Enum):
@@ -66,8 +70,7 @@ class Outbox:
         Messages acknowledged, and messages whose delivery failed.
     """
 
-    def __init__(self, settings: LinkSettings) -> None:
-        self._settings = settings
+    def __init__(self) -> None:
         self._newest: dict[Slot, Outgoing] = {}
         self._next_id = 1
         self.resent = 0
@@ -96,8 +99,8 @@ class Outbox:
             slot,
             self._next_id,
             wire.split(payload),
-            deadline_s=now_s + self._settings.give_up_s,
-            backoff_s=self._settings.resend_s,
+            deadline_s=now_s + GIVE_UP_S,
+            backoff_s=RESEND_S,
             resend_at_s=now_s,
         )
         self._next_id += 1
@@ -114,8 +117,8 @@ class Outbox:
             message.missing = set(range(len(message.fragments)))
             message.queue.clear()
             message.is_resend = False
-            message.deadline_s = now_s + self._settings.give_up_s
-            message.backoff_s = self._settings.resend_s
+            message.deadline_s = now_s + GIVE_UP_S
+            message.backoff_s = RESEND_S
             message.resend_at_s = now_s
 
     def due(self, now_s: float, budget: int) -> list[Packet]:
@@ -134,7 +137,7 @@ class Outbox:
         if not message.queue:
             message.is_resend = True
             message.resend_at_s = now_s + message.backoff_s
-            message.backoff_s = min(2 * message.backoff_s, self._settings.resend_max_s)
+            message.backoff_s = min(2 * message.backoff_s, RESEND_MAX_S)
         return Packet(
             message.fragments[index],
             slot=message.slot,
@@ -151,7 +154,7 @@ class Outbox:
             arrived = {index for index in message.missing if receipt.fragments >> index & 1}
             if arrived:
                 message.missing -= arrived
-                message.backoff_s = self._settings.resend_s
+                message.backoff_s = RESEND_S
             if not message.missing:
                 message.state = Delivery.ACKED
                 self.acked += 1

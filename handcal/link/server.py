@@ -3,35 +3,44 @@
 from __future__ import annotations
 
 import logging
+import math
 import secrets
 import time
 from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from handcal.core.errors import FileError, PosePendingError
-from handcal.core.types import Float64, HeadsetIdentity
-from handcal.link import greetings, messages, nudges, wire
+from handcal.core.types import EYES, Eye, Float64, HeadsetIdentity, Projection
+from handcal.link import endpoint, handshake, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link.clock import ClockEstimator
-from handcal.link.endpoint import Channel
+from handcal.link.drawn import drawn_digest, drawn_projections
+from handcal.link.endpoint import Channel, Endpoint
 from handcal.link.exchange import Exchange, new_digits
 from handcal.link.fields import MalformedError
-from handcal.link.greetings import Refusal
-from handcal.link.handshake import Caller, Reception
+from handcal.link.handshake import Caller, Reception, Refusal
 from handcal.link.invitation import Invitation, new_code
 from handcal.link.messages import Owner
-from handcal.link.nudges import NudgeSum
+from handcal.link.nudges import NudgeSum, VerifyRequest
 from handcal.link.pairing import Pairing, Pairings
-from handcal.link.poses import PoseBuffer
-from handcal.link.sender import Sender
-from handcal.link.settings import DEFAULT_SETTINGS, LinkSettings
+from handcal.link.poses import ClockEstimator, PoseBuffer
+from handcal.link.reliable import Outgoing
+from handcal.link.shapes import Shape, Target
 from handcal.link.statistics import LinkStatistics
 from handcal.link.transport import Address, UdpTransport, reachable_address
-from handcal.link.wire import Packet, Rejection, Welcome
+from handcal.link.wire import Packet, Rejection, Slot, Welcome
 
 LOOPBACK: Address = ("127.0.0.1", 0)
 _LOG = logging.getLogger(__name__)
 _MAX_CONFIRMATIONS = 64
+_Stamped = TypeVar("_Stamped", pb.Confirm, pb.Nudge)
+_LIVE_POINTS = 3000
+"""Most points of a live hand in one frame; enough for a closed surface."""
+_PING_PERIOD_S = 0.1
 _NOTICE_S = 5.0
 _RESTART_S = 0.5
 _REFRESH_S = 1.0
@@ -98,7 +107,7 @@ class _Session:
     welcome: Welcome
 
 
-class HeadsetServer(Sender):
+class HeadsetServer(Endpoint):
     """Waits for the headset, streams to it, and stores its poses.
 
     A headset that reconnects is sent the newest cursor, prompt, projections and so on again. One
@@ -110,7 +119,6 @@ class HeadsetServer(Sender):
         The headsets that may connect; or a key alone, for the first that connects with it.
     bind : (host, port)
         Default: loopback, any free port.
-    settings : LinkSettings
 
     Raises
     ------
@@ -120,18 +128,17 @@ class HeadsetServer(Sender):
         If the key is too short.
     """
 
-    def __init__(
-        self,
-        pairings: Pairings | bytes,
-        bind: Address = LOOPBACK,
-        settings: LinkSettings = DEFAULT_SETTINGS,
-    ) -> None:
+    def __init__(self, pairings: Pairings | bytes, bind: Address = LOOPBACK) -> None:
         if isinstance(pairings, bytes):
             pairings = Pairings((Pairing(pairings.decode()),))
-        transport = UdpTransport(bind, settings.receive_buffer_bytes)
-        super().__init__(transport, settings)
+        super().__init__(UdpTransport(bind))
         self._pairings = pairings
+        self._projections: dict[Eye, Projection] = {}
+        self._cursor: pb.Cursor | None = None
+        self._is_offline = False
+        self._live_frame = 0
         self._reception = Reception(pairings)
+        self._exchange: Exchange | None = None
         self._session: _Session | None = None
         self._device: HeadsetIdentity | None = None
         self._shown = Owner()
@@ -141,7 +148,7 @@ class HeadsetServer(Sender):
         self._step_ns, self._step_host_ns = 0, -_AROUND_STEP_NS
         # The last number of each is when it came, on the host's clock.
         self._confirms: deque[tuple[pb.Confirm, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
-        self._nudges: deque[tuple[pb.Nudge, NudgeSum, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
+        self._nudges: deque[tuple[pb.Nudge, str, int]] = deque(maxlen=_MAX_CONFIRMATIONS)
         self._lost = 0
         self._next_ping_s = 0.0
         self._next_refresh_s = 0.0
@@ -178,25 +185,25 @@ class HeadsetServer(Sender):
         with self._changed:
             self._require_running()
             self.withdraw()
-            self._reception.exchange = Exchange(
+            self._exchange = Exchange(
                 self._pairings, invitation, self._reception.cookies, time.monotonic()
             )
+            self._reception.pairing_desk = self._exchange.hear
         return invitation
 
     @property
     def pairing_attempts(self) -> PairingAttempts:
         """The attempts to pair by the present invitation."""
         with self._changed:
-            exchange = self._reception.exchange
-            if exchange is None:
+            if self._exchange is None:
                 return PairingAttempts()
-            return PairingAttempts(*exchange.tried, exchange.is_used_up)
+            return PairingAttempts(*self._exchange.tried, self._exchange.is_used_up)
 
     def withdraw(self) -> None:
         """End the invitation, if there is one."""
         with self._changed:
             self._pairings.withdraw()
-            self._reception.exchange = None
+            self._exchange = self._reception.pairing_desk = None
 
     @property
     def clock_step_s(self) -> float:
@@ -204,6 +211,144 @@ class HeadsetServer(Sender):
         with self._changed:
             is_recent = time.monotonic_ns() - self._step_host_ns < _AROUND_STEP_NS
             return 1e-9 * self._step_ns if is_recent else 0.0
+
+    def send_cursor(
+        self, points_W_m: ArrayLike, cursor_id: int, eyes: Sequence[Eye] = EYES
+    ) -> Outgoing:
+        """Send the frozen hand, (N, 3) of frame W, reliably; no points remove it.
+
+        `eyes` draw it; a headset of an older version draws it for both.
+
+        Raises
+        ------
+        ValueError
+            If the points are not finite, too many, or spread over more than 6.5 m.
+        LinkError
+            If the link is closed.
+        """
+        message = messages.cursor(points_W_m, cursor_id, eyes)
+        with self._changed:
+            outgoing = self._send_reliably(Slot.CURSOR, message)
+            self._cursor = message.cursor
+        return outgoing
+
+    def send_live_hand(
+        self,
+        points_W_m: ArrayLike,
+        is_over_limit: bool,
+        eyes: Sequence[Eye] = EYES,
+        is_outline: bool = False,
+    ) -> None:
+        """Send the live hand, (N, 3) of frame W, thinned evenly to the limit of one frame.
+
+        `is_over_limit` means that it is rotated too far; the headset then draws it red. `eyes` draw
+        it. `is_outline` means that the points are its closed outline, in order. The hand replaces
+        any that has not been sent yet.
+
+        Raises
+        ------
+        ValueError
+            As `send_cursor`.
+        LinkError
+            If the link is closed.
+        """
+        points = np.asarray(points_W_m)
+        thinned = points[:: max(1, math.ceil(len(points) / _LIVE_POINTS))]
+        with self._changed:
+            self._require_running()
+            self._live_frame += 1
+            self._stream.clear()
+            self._stream.extend(
+                messages.live_hand(thinned, is_over_limit, self._live_frame, eyes, is_outline)
+            )
+
+    def send_prompt(self, text: str, eyes: Sequence[Eye] = EYES) -> Outgoing:
+        """Send a text to show and the eyes to keep open, reliably.
+
+        Raises
+        ------
+        ValueError
+            If the text is too long.
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.PROMPT, messages.prompt(text, eyes))
+
+    def send_projection(self, projection: Projection) -> Outgoing:
+        """Send an eye's projection, reliably.
+
+        Raises
+        ------
+        ValueError
+            If it is not finite.
+        LinkError
+            If the link is closed.
+        """
+        slot = messages.PROJECTION_SLOTS[projection.eye]
+        with self._changed:
+            outgoing = self._send_reliably(slot, messages.projection(projection))
+            self._projections[projection.eye] = projection
+        return outgoing
+
+    def send_show(self, is_offline: bool) -> Outgoing:
+        """Have the headset draw with the offline calibration, or with its projections again.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            show = pb.Show(offline=is_offline)
+            outgoing = self._send_reliably(Slot.SHOW, pb.Envelope(show=show))
+            self._is_offline = is_offline
+        return outgoing
+
+    def send_target(self, target: Target | None) -> Outgoing:
+        """Send the user test's target, reliably; None removes it.
+
+        Raises
+        ------
+        ValueError
+            If it is not finite.
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.TARGET, messages.target(target))
+
+    def send_shape(self, shape: Shape | None) -> Outgoing:
+        """Send a shape fixed in the world, reliably; None removes it.
+
+        Raises
+        ------
+        ValueError
+            If it is not finite.
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.SHAPE, messages.shape(shape))
+
+    def send_verify(self, request: VerifyRequest | None) -> Outgoing:
+        """Have the wearer move what an eye draws, reliably; None ends it.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        return self._send_reliably(Slot.VERIFY, nudges.verify(request))
+
+    def send_again(self) -> None:
+        """Send the newest message of every slot again, as to a headset that has just connected.
+
+        Raises
+        ------
+        LinkError
+            If the link is closed.
+        """
+        with self._changed:
+            self._require_running()
+            self._outbox.restart(time.monotonic())
 
     def confirmations(self) -> list[Confirmation]:
         """Return the confirmations since the last call.
@@ -217,16 +362,10 @@ class HeadsetServer(Sender):
         """
         with self._changed:
             self._require_running()
-            found = []
-            while self._confirms and self._is_checked(self._confirms[0][-1]):
-                confirm, problem, came_ns = self._confirms.popleft()
-                t_host_ns, is_timed = self._when(confirm.t_headset_ns, came_ns)
-                found.append(
-                    Confirmation(
-                        confirm.t_headset_ns, t_host_ns, confirm.cursor_id, problem, is_timed
-                    )
-                )
-            return found
+            return [
+                Confirmation(message.t_headset_ns, t_host_ns, message.cursor_id, problem, is_timed)
+                for message, problem, t_host_ns, is_timed in self._checked(self._confirms)
+            ]
 
     def nudges(self) -> list[Nudge]:
         """Return the wearer's nudges since the last call; held back as `confirmations`.
@@ -239,22 +378,32 @@ class HeadsetServer(Sender):
         with self._changed:
             self._require_running()
             session = 0 if self._channel is None else self._channel.session
-            found = []
-            while self._nudges and self._is_checked(self._nudges[0][-1]):
-                nudge, moved, problem, came_ns = self._nudges.popleft()
-                t_host_ns, is_timed = self._when(nudge.t_headset_ns, came_ns)
-                found.append(
-                    Nudge(nudge.verify_id, moved, nudge.fits, t_host_ns, problem, session, is_timed)
+            return [
+                Nudge(
+                    message.verify_id,
+                    nudges.read_nudge(message),
+                    message.fits,
+                    t_host_ns,
+                    problem,
+                    session,
+                    is_timed,
                 )
-            return found
+                for message, problem, t_host_ns, is_timed in self._checked(self._nudges)
+            ]
 
-    def _is_checked(self, came_ns: int) -> bool:
-        return self._clock.fit is not None and self._clock.checked_host_ns >= came_ns
+    def _checked(
+        self, waiting: deque[tuple[_Stamped, str, int]]
+    ) -> Iterator[tuple[_Stamped, str, int, bool]]:
+        """Take the messages that came before the newest answered ping was sent.
 
-    def _when(self, t_headset_ns: int, came_ns: int) -> tuple[int, bool]:
-        """Return a stamp on the host's clock, and whether it can be trusted."""
-        is_timed = came_ns > self._step_host_ns + _AROUND_STEP_NS
-        return self._clock.to_host_ns(t_headset_ns) if is_timed else came_ns, is_timed
+        Each comes with its problem, its time on the host's clock, and whether that is trusted.
+        """
+        clock = self._clock
+        while waiting and clock.fit is not None and clock.checked_host_ns >= waiting[0][-1]:
+            message, problem, came_ns = waiting.popleft()
+            is_timed = came_ns > self._step_host_ns + _AROUND_STEP_NS
+            t_host_ns = clock.to_host_ns(message.t_headset_ns) if is_timed else came_ns
+            yield message, problem, t_host_ns, is_timed
 
     def pose_at_host_ns(self, t_host_ns: int) -> Float64:
         """Return the headset's pose ``T_W_H`` at a time of the host's monotonic clock.
@@ -273,8 +422,9 @@ class HeadsetServer(Sender):
             try:
                 return self._poses.at(self._clock.to_headset_ns(t_host_ns))
             except PosePendingError as error:
-                why = str(error) if self.connected else "the headset sends no poses"
-                raise PosePendingError(why) from None
+                if self.connected:
+                    raise
+                raise PosePendingError("the headset sends no poses") from error
 
     def statistics(self) -> LinkStatistics:
         """Return the link's counters and estimates."""
@@ -316,7 +466,7 @@ class HeadsetServer(Sender):
         if isinstance(heard, Rejection):
             return heard
         if isinstance(heard, Caller):
-            heard = greetings.seal(
+            heard = handshake.seal(
                 heard.keys.to_headset, packet.sequence, self._meet(heard, address)
             )
         self._post(heard, address)
@@ -329,19 +479,19 @@ class HeadsetServer(Sender):
         if owner_id not in ("", caller.device_id):
             owner = caller.pairing.name or "another headset"
             self._tell(f"headset {name} asks to connect with the pairing key of {owner}")
-            return greetings.refused(caller.nonce, Refusal(is_key_taken=True, other=owner))
+            return handshake.refused(caller.nonce, Refusal(is_key_taken=True, other=owner))
         channel, session = self._channel, self._session
         if channel is not None and session is not None:
             is_same = session.caller.device_id == caller.device_id
             if is_same and session.caller.nonce == caller.nonce and channel.address == address:
-                return greetings.welcome(session.welcome)  # the first one was lost
+                return handshake.welcome(session.welcome)  # the first one was lost
             # A device whose app has been restarted is silent in its old session.
-            patience_s = _RESTART_S if is_same else self._settings.silence_s
+            patience_s = _RESTART_S if is_same else endpoint.SILENCE_S
             if time.monotonic() - channel.heard_s <= patience_s:
                 holder = session.caller.name or session.caller.device_id
                 self._tell(f"headset {name} asks to connect; {holder} is connected")
-                return greetings.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
-        return greetings.welcome(self._open(caller, address))
+                return handshake.refused(caller.nonce, Refusal(is_key_taken=False, other=holder))
+        return handshake.welcome(self._open(caller, address))
 
     def _open(self, caller: Caller, address: Address) -> Welcome:
         if not caller.pairing.device_id:
@@ -378,15 +528,11 @@ class HeadsetServer(Sender):
                 self._take_poses(envelope.poses)
             case "confirm":
                 confirm = messages.read_confirm(envelope.confirm)
-                came_ns = time.monotonic_ns()
-                self._confirms.append((confirm, self._difference(confirm.drawn), came_ns))
-                self._next_ping_s = 0.0
+                self._confirms.append((confirm, *self._received_now(confirm.drawn)))
             case "nudge":
-                nudge = envelope.nudge
-                moved = nudges.read_nudge(nudge)
-                came_ns = time.monotonic_ns()
-                self._nudges.append((nudge, moved, self._difference(nudge.drawn), came_ns))
-                self._next_ping_s = 0.0
+                nudges.read_nudge(envelope.nudge)  # MalformedError now, not when it is taken
+                drawn = envelope.nudge.drawn
+                self._nudges.append((envelope.nudge, *self._received_now(drawn)))
             case "device":
                 assert self._session is not None
                 device_id = self._session.caller.device_id
@@ -395,6 +541,18 @@ class HeadsetServer(Sender):
                 self._take_pong(envelope.pong)
             case other:
                 raise MalformedError(f"a headset sends no {other}")
+
+    def _received_now(self, digest: bytes) -> tuple[str, int]:
+        """Return the problem of a message that comes now, and its time; ask for the clock soon."""
+        self._next_ping_s = 0.0
+        return self._difference(digest), time.monotonic_ns()
+
+    def _difference(self, digest: bytes) -> str:
+        """Return how a headset's drawing differs from what it was sent; empty if it does not."""
+        drawn = drawn_projections(self._projections, self._is_offline)
+        if digest == drawn_digest(drawn, self._cursor):
+            return ""
+        return "the headset draws other projections or another cursor than it was sent"
 
     def _take_poses(self, poses: pb.Poses) -> None:
         clock = self._clock
@@ -426,7 +584,7 @@ class HeadsetServer(Sender):
 
     def _take_pong(self, pong: pb.Pong) -> None:
         now_ns = time.monotonic_ns()
-        if not 0 <= now_ns - pong.t_sent_host_ns < 1e9 * self._settings.silence_s:
+        if not 0 <= now_ns - pong.t_sent_host_ns < 1e9 * endpoint.SILENCE_S:
             return  # of no ping sent lately
         self._lost = max(0, pong.highest_sequence - pong.accepted)
         was_known = self._clock.fit is not None
@@ -445,5 +603,5 @@ class HeadsetServer(Sender):
             self._next_refresh_s = now_s + _REFRESH_S
             self._refresh()
         if now_s >= self._next_ping_s:
-            self._next_ping_s = now_s + self._settings.ping_period_s
+            self._next_ping_s = now_s + _PING_PERIOD_S
             self._send(pb.Envelope(ping=pb.Ping(t_sent_host_ns=time.monotonic_ns())))

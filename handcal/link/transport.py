@@ -19,6 +19,7 @@ Address: TypeAlias = tuple[str, int]
 EVERY_NETWORK = ("0.0.0.0", "::")  # noqa: S104
 """The addresses that listen on all networks: of IPv4, and of both where the system can."""
 _MAX_BATCH = 256
+_RECEIVE_BUFFER_BYTES = 4 * 2**20  # a burst of cursor and live hand waits in it
 _MAPPED = "::ffff:"
 _ANYWHERE: tuple[Address, ...] = (("192.0.2.1", 9), ("2001:db8::1", 9))
 """Reserved for documentation, of IPv4 and IPv6; nothing is sent to them."""
@@ -51,21 +52,21 @@ class UdpTransport:
         If the address cannot be bound.
     """
 
-    def __init__(self, bind: Address, receive_buffer_bytes: int) -> None:
+    def __init__(self, bind: Address) -> None:
         family = _family(bind[0])
         self._is_ipv6 = family is socket.AF_INET6
         try:
             self._socket = socket.socket(family, socket.SOCK_DGRAM)
         except OSError as error:  # no IPv6 in this system
-            raise LinkError(_not_bound(bind, error)) from error
+            raise _not_bound(bind, error) from error
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer_bytes)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
             if self._is_ipv6:
                 self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
             self._socket.bind(bind)
         except OSError as error:
             self._socket.close()
-            raise LinkError(_not_bound(bind, error)) from error
+            raise _not_bound(bind, error) from error
         self._socket.setblocking(False)
         self.address: Address = self._socket.getsockname()[:2]
 
@@ -100,16 +101,17 @@ class UdpTransport:
         self._socket.close()
 
 
-def _not_bound(address: Address, error: OSError) -> str:
-    """Return why an address cannot be bound, and what to do."""
-    host, port = address
+def _not_bound(address: Address, error: OSError) -> LinkError:
+    """Return the error of an address that cannot be bound."""
     if error.errno == errno.EADDRINUSE:
-        why = "another program, perhaps another handcal, uses this port; end it, or choose another"
+        reason = "another program, perhaps another handcal, uses this port"
+        advice = "end it, or choose another"
     elif error.errno == errno.EADDRNOTAVAIL:
-        why = "this computer has no such address; enter one of its own, or 0.0.0.0 for all"
+        reason = "this computer has no such address"
+        advice = "enter one of its own, or 0.0.0.0 for all"
     else:
-        why = f"{error.strerror}; choose another address or port"
-    return f"cannot listen on {host}:{port}: {why}"
+        reason, advice = f"{error.strerror}", "choose another address or port"
+    return LinkError(f"cannot listen on {address[0]}:{address[1]}: {reason}", advice)
 
 
 def local_address(server: Address) -> Address:

@@ -14,8 +14,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QWidget
 
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings, export_session
-from handcal.export.many import Exported, export_sessions
+from handcal.export.export import Exported, ExportSettings, export_session, export_sessions
 from handcal.link.server import HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import SessionRecord

@@ -10,7 +10,7 @@ from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget
 
 from handcal.core.types import Float64
-from handcal.link.rates import LinkRates
+from handcal.link.statistics import LinkRates
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.layouts import hbox

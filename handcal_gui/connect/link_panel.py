@@ -7,8 +7,7 @@ from collections import deque
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QWidget
 
-from handcal.link.rates import link_rates
-from handcal.link.statistics import LinkStatistics
+from handcal.link.statistics import LinkStatistics, link_rates
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon
 from handcal_gui.app.translation import tr

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from handcal.link.rates import LinkRates
-from handcal.link.statistics import LinkStatistics
+from handcal.link.statistics import LinkRates, LinkStatistics
 from handcal.link.wire import Rejection
 from handcal.report.cells import signed
 from handcal_gui.app.theme import SPACING_PX

@@ -10,8 +10,7 @@ from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QDialog, QStackedWidget, QWidget
 
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings
-from handcal.export.many import Exported
+from handcal.export.export import Exported, ExportSettings
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.engine.jobs import Job

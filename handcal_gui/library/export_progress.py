@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from handcal.export.many import Exported
+from handcal.export.export import Exported
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX, icon
 from handcal_gui.app.translation import tr

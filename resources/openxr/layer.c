@@ -4,6 +4,7 @@
  * into openxr-status.json what became of it: a frame waits for no file, only for copies under one
  * lock. */
 #define _GNU_SOURCE
+#include "loader.h"
 #include "views.h"
 
 #include <stdio.h>
@@ -45,58 +46,6 @@ typedef char Char;
 #define NAME "XR_APILAYER_HANDCAL_calibrated_views"
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
-/* ---- the loader's interface; openxr_loader_negotiation.h has it only since 1.0.33 ---- */
-
-struct CreateInfo;
-
-typedef struct NextInfo {
-    int type;
-    uint32_t version;
-    size_t size;
-    char layer_name[XR_MAX_API_LAYER_NAME_SIZE];
-    PFN_xrGetInstanceProcAddr get;
-    XrResult(XRAPI_PTR *create)(const XrInstanceCreateInfo *, const struct CreateInfo *,
-                                XrInstance *);
-    struct NextInfo *next;
-} NextInfo;
-
-typedef struct CreateInfo {
-    int type;
-    uint32_t version;
-    size_t size;
-    void *loader_instance;
-    char settings_file[512];
-    NextInfo *next_info;
-} CreateInfo;
-
-typedef struct {
-    int type;
-    uint32_t version;
-    size_t size;
-    uint32_t min_interface, max_interface;
-    XrVersion min_api, max_api;
-} LoaderInfo;
-
-typedef struct {
-    int type;
-    uint32_t version;
-    size_t size;
-    uint32_t interface_version;
-    XrVersion api;
-    PFN_xrGetInstanceProcAddr get;
-    XrResult(XRAPI_PTR *create)(const XrInstanceCreateInfo *, const CreateInfo *, XrInstance *);
-} LayerRequest;
-
-enum { LOADER_INFO = 1, LAYER_REQUEST = 2, INTERFACE_VERSION = 1 };
-
-/* XR_ML_frame_end_info; newer than Debian 12's header. */
-typedef struct {
-    XrStructureType type;
-    const void *next;
-    float focus_distance;
-    XrFlags64 flags;
-} FrameEndInfoML;
-enum { TYPE_FRAME_END_INFO_ML = 1000135000 };
 static const char *const EXTENSIONS[] = {XR_MSFT_COMPOSITION_LAYER_REPROJECTION_EXTENSION_NAME,
                                          "XR_ML_frame_end_info"};
 

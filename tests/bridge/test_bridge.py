@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from handcal.bridge.bridge import Bridge
+from handcal.bridge.bridges import Bridge
 from handcal.station.snapshot import Snapshot
 from tests.helpers import eventually
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.bridge.bridge import Bridge
+from handcal.bridge.bridges import Bridge
 from handcal.bridge.lsl import LslOutput, events
 from handcal.calibration.states import State
 from handcal.core.types import Alignment

@@ -10,7 +10,7 @@ import pytest
 from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.session.session import Session
-from tests.calibration.stage import KEY, LINK, RIG, Stage, connect
+from tests.calibration.stage import KEY, RIG, Stage, connect
 
 
 @pytest.fixture
@@ -21,7 +21,9 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[HeadsetServer]:
     monkeypatch.setattr("handcal.calibration.sight.ASSUMED_LATENCY_S", 0.0)
     monkeypatch.setattr("handcal.calibration.delay.ASSUMED_SIGMA_S", 0.0)
     monkeypatch.setattr("handcal.calibration.aligning.MOVED_LIMIT_M", 0.01)
-    with HeadsetServer(KEY, settings=LINK) as server:
+    monkeypatch.setattr("handcal.link.server._PING_PERIOD_S", 0.01)
+    monkeypatch.setattr("handcal.link.client._HELLO_PERIOD_S", 0.01)
+    with HeadsetServer(KEY) as server:
         yield server
 
 

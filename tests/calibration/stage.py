@@ -19,7 +19,6 @@ from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, Float64, Frame, HeadsetIdentity, Intrinsics, UInt16
 from handcal.link.client import HeadsetClient, HeadsetState
 from handcal.link.server import HeadsetServer
-from handcal.link.settings import LinkSettings
 from handcal.rig.example import example_rig
 from handcal.session.session import Session
 from handcal.sim.hand import HandSettings, make_hand
@@ -33,7 +32,6 @@ IDENTITY = HeadsetIdentity("00000000000000aa", "Headset of the tests")
 CAMERA = Intrinsics(640, 360, 502.5, 502.5, 319.5, 179.5)
 RIG = replace(example_rig(), depth_intrinsics=CAMERA)
 SENSOR = SensorSettings()
-LINK = LinkSettings(ping_period_s=0.01, hello_period_s=0.01)
 SETTINGS = CalibrationSettings()
 PERIOD_NS = 80_000_000
 HEADSET_AHEAD_NS = 5_000_000_000
@@ -184,7 +182,7 @@ class Stage:
 
 def connect(server: HeadsetServer) -> HeadsetClient:
     client = HeadsetClient(
-        server.address, KEY, IDENTITY, lambda: time.monotonic_ns() + HEADSET_AHEAD_NS, LINK
+        server.address, KEY, IDENTITY, lambda: time.monotonic_ns() + HEADSET_AHEAD_NS
     )
     client.wait_connected(5.0)
     return client

@@ -136,7 +136,7 @@ def test_misuse_is_one_line_and_exit_code_2(
         ("demo --rig nowhere.yaml --output out", "cannot read nowhere.yaml"),
         ("demo --rig text.txt --output out", "text.txt"),
         ("demo --output text.txt", "cannot create the folder text.txt: File exists"),
-        ("headset --port 5000", "no pairing key: set HANDCAL_PAIRING_KEY"),
+        ("headset --port 5000", "no pairing key; set HANDCAL_PAIRING_KEY"),
         ("headset --port 5000 --key-file none", "cannot read none"),
         ("support --output out.zip --sessions nowhere", "nowhere is not a folder, so that"),
         (f"solve {'n' * 300}", f"cannot read {'n' * 300}: File name too long"),

@@ -11,8 +11,8 @@ import pytest
 
 from handcal.core.types import HeadsetIdentity
 from handcal.link import inviting
-from handcal.link.ask_to_pair import pair_by_code
 from handcal.link.client import HeadsetClient
+from handcal.link.exchange import pair_by_code
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer

@@ -12,8 +12,8 @@ import pytest
 
 from handcal.core.conventions import opengl_projection, openxr_view, unity_camera
 from handcal.core.types import EYES, Eye, Rig
-from handcal.export.calibration_file import write_calibration_json, write_calibration_yaml
 from handcal.export.outcome import SessionOutcome, ShiftOrigin, load_outcome
+from handcal.export.tools import write_calibration_json, write_calibration_yaml
 from handcal.session.session import SessionRecord
 
 
@@ -86,22 +86,6 @@ def test_json_holds_every_origin_in_every_convention(
             assert each["openxr"]["position_m"] == pose.position_m.tolist()
             assert each["openxr"]["left_rad"] == fov.left_rad
             assert ("verdict" in each) == (origin == "solved")
-
-
-def test_a_point_lands_on_the_same_pixel_by_opencv_and_by_opengl(
-    tmp_path: Path, outcome: SessionOutcome
-) -> None:
-    write_calibration_json(tmp_path / "c.json", outcome, 0.1, 100.0)
-    found = json.loads((tmp_path / "c.json").read_text())["eyes"]["left"]
-    each = found["calibrations"]["fine_tuned"]
-    x, y, z = 0.03, -0.02, 0.5
-    u, v, depth = np.array(each["opencv"]["P"]) @ [x, y, z, 1.0]
-    clip_x, clip_y, _, clip_w = np.array(each["opengl"]["projection"]) @ [x, -y, -z, 1.0]
-    pixel = [
-        (clip_x / clip_w + 1.0) / 2.0 * found["width_px"] - 0.5,
-        (1.0 - clip_y / clip_w) / 2.0 * found["height_px"] - 0.5,
-    ]
-    np.testing.assert_allclose(pixel, [u / depth, v / depth], rtol=1e-9)
 
 
 def test_what_openxr_cannot_express_is_null_with_the_reason(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import zipfile
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,10 +19,10 @@ import pytest
 
 from handcal.core.errors import CancelledError, FileError
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings, export_session
+from handcal.export.export import ExportSettings, export_session, export_sessions, write_archive
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
-from handcal.io.settings import read_settings, settings_json
-from handcal.session.session import SessionRecord
+from handcal.io.resources import resource_path
+from handcal.session.session import Session, SessionRecord
 
 resource = pytest.importorskip("resource")
 
@@ -224,12 +226,6 @@ def test_the_session_itself_stays_as_it_is(tmp_path: Path, record: SessionRecord
     assert tree(record.path) == before
 
 
-def test_settings_come_back_from_json() -> None:
-    settings = ExportSettings(("csv", "json"), near_m=0.2, far_m=20.0)
-    stored = json.loads(json.dumps(settings_json(settings)))
-    assert read_settings(ExportSettings, stored) == settings
-
-
 @pytest.mark.parametrize(
     ("formats", "near_m", "far_m", "problem"),
     [
@@ -245,3 +241,101 @@ def test_bad_settings_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=problem):
         ExportSettings(formats, near_m, far_m)
+
+
+def test_extracted_it_is_the_session(tmp_path: Path, record: SessionRecord) -> None:
+    shares: list[float] = []
+    write_archive(
+        tmp_path / "s.zip", record, tmp_path, Progress(lambda _what, share: shares.append(share))
+    )
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    with zipfile.ZipFile(tmp_path / "s.zip") as file:
+        assert file.testzip() is None
+        assert {entry.compress_type for entry in file.infolist()} == {zipfile.ZIP_DEFLATED}
+        assert "one/lock" not in file.namelist()
+        file.extractall(tmp_path)
+    again = Session.open(tmp_path / "one")
+    assert (again.wearer, again.notes, again.results) == (
+        record.wearer,
+        record.notes,
+        record.results,
+    )
+    assert again.events == record.events
+    assert (list(again.alignments), set(again.deleted_alignments)) == ([1, 3], {2})
+    assert np.array_equal(again.alignments[3].hand_m, record.alignments[3].hand_m)
+    with Session(tmp_path / "one") as session:
+        session.finish()
+
+
+def test_only_what_belongs_to_the_session_goes_in(tmp_path: Path, empty: SessionRecord) -> None:
+    write_archive(tmp_path / "s.zip", empty, tmp_path)
+    with zipfile.ZipFile(tmp_path / "s.zip") as file:
+        file.extractall(tmp_path)
+    folder = tmp_path / empty.path.name
+    before = Session.open(folder)
+    with Session(folder) as session:
+        session.record("later")
+    (folder / "exports").mkdir()
+    (folder / "exports" / "report.pdf").touch()
+    (folder / ".results.json.0123").touch()
+    (folder / "passwords").symlink_to("/etc/passwd")
+    (folder / "alignments" / "elsewhere").symlink_to("/etc")
+    write_archive(tmp_path / "t.zip", before, folder / "exports")
+    assert (tmp_path / "t.zip").read_bytes() == (tmp_path / "s.zip").read_bytes()
+
+
+def test_too_much_is_refused(
+    tmp_path: Path, record: SessionRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal.export.export.MAX_ARCHIVE_BYTES", 1000)
+    with pytest.raises(FileError, match="more than the 1,000 that fit"):
+        write_archive(tmp_path / "s.zip", record, tmp_path)
+    assert not (tmp_path / "s.zip").exists()
+
+
+def test_a_session_that_has_gone_is_reported(tmp_path: Path, record: SessionRecord) -> None:
+    with pytest.raises(FileError, match="cannot write"):
+        write_archive(tmp_path / "s.zip", replace(record, path=tmp_path / "x"), tmp_path)
+
+
+SETTINGS = ExportSettings(("csv", "yaml"))
+
+
+@pytest.fixture
+def paths(tmp_path: Path) -> list[Path]:
+    example = resource_path("example_session")
+    return [Path(shutil.copytree(example, tmp_path / "in" / name)) for name in ("a", "b", "c")]
+
+
+def test_one_that_fails_is_named_and_spares_the_others(paths: list[Path], tmp_path: Path) -> None:
+    (paths[1] / "journal.jsonl").write_text("nonsense\n")
+    shown: list[tuple[str, float]] = []
+    progress = Progress(lambda what, share: shown.append((what, share)))
+    made = export_sessions(paths, tmp_path / "out", SETTINGS, progress)
+    names = ("calibration.yaml", "parameters.csv", "trials.csv")
+    assert {file.relative_to(tmp_path / "out").as_posix() for file in made.files} >= {
+        f"{session}/{name}" for session in ("a", "c") for name in names
+    }
+    [missing] = made.missing
+    assert missing.startswith("b: ")
+    assert "does not begin as the journal" in missing
+    assert not (tmp_path / "out" / "b").exists()
+    whats, shares = zip(*shown, strict=True)
+    assert all(what.startswith(("1 of 3: ", "2 of 3: ", "3 of 3: ")) for what in whats)
+    solving = "3 of 3: Simulated wearer, exporting 1 of 2, Parameters and trials (CSV): solving"
+    assert any(what.startswith(solving) for what in whats)
+    assert list(shares) == sorted(shares)
+
+
+def test_cancelling_within_a_session_keeps_those_before(paths: list[Path], tmp_path: Path) -> None:
+    shown: list[str] = []
+    progress = Progress(
+        lambda what, _: shown.append(what), lambda: bool(shown and "2 of 3: Simulated" in shown[-1])
+    )
+    made = export_sessions(paths, tmp_path / "out", SETTINGS, progress)
+    assert made.missing == ("b: cancelled", "c: cancelled")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["a"]
+    with pytest.raises(CancelledError):
+        export_sessions(paths, tmp_path / "other", SETTINGS, Progress(is_cancelled=lambda: True))
+    assert not (tmp_path / "other").exists()

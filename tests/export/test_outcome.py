@@ -7,9 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handcal.core.display import projection_matrix
-from handcal.core.errors import FileError
-from handcal.core.progress import Progress
 from handcal.core.types import EYES, Verdict
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.register.results import results_json
@@ -61,28 +58,8 @@ def test_the_offline_calibration_is_final_where_it_is_kept(
     assert not again.final_shift_m("right").any()
 
 
-def test_projections_are_those_of_each_shift(outcome: SessionOutcome) -> None:
-    display = outcome.record.rig.eyes["left"]
-    for origin, shift_m in outcome.shifts_m["left"].items():
-        projection = outcome.projection("left", origin)
-        assert np.array_equal(projection.P, projection_matrix(display, shift_m))
-        assert projection.width_px == display.width_px
-
-
 def test_without_alignments_there_is_only_the_offline_calibration(empty: SessionRecord) -> None:
     outcome = load_outcome(empty)
     assert outcome.results is None
     assert outcome.final("left") == "offline"
     assert outcome.is_applied("left", "offline")
-
-
-def test_it_tells_how_far_it_is(record: SessionRecord) -> None:
-    shares: list[float] = []
-    load_outcome(record, Progress(lambda _what, share: shares.append(share)))
-    assert shares == [0.0, 0.5]
-
-
-def test_what_cannot_be_solved_is_refused_in_one_line(record: SessionRecord) -> None:
-    few = replace(record.alignments[1], hand_m=np.zeros((5, 3)), hand_is_cut=np.zeros(5, bool))
-    with pytest.raises(FileError, match=r"one cannot be solved: hand_m has 5 points"):
-        load_outcome(replace(record, alignments={1: few}))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from handcal.core.errors import FileError
-from handcal.export.staging import Staging
+from handcal.export.export import Staging
 
 
 def tree(folder: Path) -> dict[str, str]:
@@ -53,16 +53,6 @@ def test_an_existing_folder_keeps_what_is_not_replaced(tmp_path: Path) -> None:
     }
 
 
-def test_what_is_not_published_leaves_no_trace(tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "x").write_text("old")
-    for name in ("out", "new"):
-        with Staging(tmp_path / name) as staging:
-            write(staging, x="new")
-    assert tree(tmp_path) == {"out/x": "old"}
-    assert [path.name for path in tmp_path.iterdir()] == ["out"]
-
-
 def test_if_one_file_cannot_be_replaced_none_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -89,16 +79,6 @@ def test_two_at_once_are_refused(tmp_path: Path) -> None:
             Staging(tmp_path / "out")
         write(first, x="1")
         first.publish([])
-    assert tree(tmp_path) == {"out/x": "1"}
-
-
-def test_what_a_killed_program_left_is_removed(tmp_path: Path) -> None:
-    leftover = tmp_path / ".out.handcal-export" / "new"
-    leftover.mkdir(parents=True)
-    (leftover / "half").write_text("half")
-    with Staging(tmp_path / "out") as staging:
-        write(staging, x="1")
-        staging.publish([])
     assert tree(tmp_path) == {"out/x": "1"}
 
 
@@ -155,7 +135,7 @@ def test_a_link_in_place_of_a_file_is_replaced_and_put_back_as_a_link(
     mine.write_text("mine")
     out.mkdir()
     (out / "x").symlink_to(mine)
-    monkeypatch.setattr("handcal.export.staging.sync_folder", Path.rmdir)
+    monkeypatch.setattr("handcal.export.export.sync_folder", Path.rmdir)
     with Staging(out) as staging:
         write(staging, x="new")
         with pytest.raises(FileError, match="cannot write"):

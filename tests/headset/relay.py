@@ -10,7 +10,6 @@ from handcal.link.impair import ImpairedTransport, Impairment
 from handcal.link.transport import Address, UdpTransport
 
 _WAIT_S = 0.0005
-_BUFFER_BYTES = 4 * 2**20
 
 
 class Relay(Closable):
@@ -33,8 +32,8 @@ class Relay(Closable):
     ) -> None:
         self._pc = pc
         self._change = change
-        self._inner = UdpTransport(("127.0.0.1", 0), _BUFFER_BYTES)
-        outer = UdpTransport(("127.0.0.1", 0), _BUFFER_BYTES)
+        self._inner = UdpTransport(("127.0.0.1", 0))
+        outer = UdpTransport(("127.0.0.1", 0))
         self._outer = ImpairedTransport(outer, impairment)
         self.address = self._inner.address
         self._closing = threading.Event()

@@ -11,8 +11,8 @@ import pytest
 
 from handcal.core.display import target_corners_m
 from handcal.core.types import Float64, HeadsetIdentity, Projection
-from handcal.link import greetings, wire
 from handcal.link import handcal_pb2 as pb
+from handcal.link import handshake, wire
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer
 from handcal.link.shapes import Target
@@ -46,7 +46,7 @@ class RawPeer:
         self._session = self._pair(wire.session_keys(self._key, self.device, welcome))
 
     def greeting(self, envelope: pb.Envelope) -> bytes:
-        return greetings.seal(self._handshake[0], self.device, envelope)
+        return handshake.seal(self._handshake[0], self.device, envelope)
 
     def seal(self, envelope: pb.Envelope, session: int, sequence: int) -> bytes:
         return self.seal_payload(envelope.SerializeToString(), session, sequence)
@@ -90,7 +90,7 @@ class RawHeadset(RawPeer):
 
     def hello(self, cookie: bytes = b"", nonce: bytes = NONCE) -> bytes:
         self.time_ns += 1
-        return self.greeting(greetings.hello(nonce, self.time_ns, cookie, f"Headset {self.device}"))
+        return self.greeting(handshake.hello(nonce, self.time_ns, cookie, f"Headset {self.device}"))
 
     def cookie(self) -> bytes:
         """Say hello and return the cookie of the answer."""
@@ -103,17 +103,17 @@ class RawHeadset(RawPeer):
         """Do the handshake and return the session."""
         self.send(self.hello(self.cookie(), nonce))
         envelope = self.receive_greeting()
-        welcome = greetings.read_welcome(envelope.welcome)
+        welcome = handshake.read_welcome(envelope.welcome)
         assert welcome.headset_nonce == nonce
         self.use_session(welcome)
         return welcome.session
 
-    def refusal(self) -> greetings.Refusal:
+    def refusal(self) -> handshake.Refusal:
         """Do the handshake and return the refusal."""
         self.send(self.hello(self.cookie()))
         envelope = self.receive_greeting()
         assert envelope.WhichOneof("body") == "refused"
-        return greetings.read_refused(envelope.refused)
+        return handshake.read_refused(envelope.refused)
 
 
 class RawServer(RawPeer):

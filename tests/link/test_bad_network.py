@@ -19,7 +19,6 @@ from handcal.link.client import HeadsetClient
 from handcal.link.impair import Impairment
 from handcal.link.reliable import Delivery, Inbox
 from handcal.link.server import HeadsetServer
-from handcal.link.settings import LinkSettings
 from handcal.link.transport import Address
 from handcal.link.wire import Packet
 from tests.helpers import eventually
@@ -42,8 +41,11 @@ def test_half_of_all_datagrams_lost_and_others_reordered(seed: int) -> None:
             assert all(np.array_equal(drawn[eye].P, P + seed) for eye in EYES)
 
 
-def test_a_projection_that_cannot_arrive_is_clearly_refused() -> None:
-    with HeadsetServer(KEY, settings=LinkSettings(give_up_s=0.5)) as server:
+def test_a_projection_that_cannot_arrive_is_clearly_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("handcal.link.reliable.GIVE_UP_S", 0.5)
+    with HeadsetServer(KEY) as server:
         with HeadsetClient(server.address, KEY, IDENTITY):
             server.wait_connected(5.0)
         eventually(lambda: not server.connected)
@@ -59,8 +61,9 @@ def test_a_projection_that_cannot_arrive_is_clearly_refused() -> None:
 def test_what_a_connected_headset_lacks_is_reported_until_it_has_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("handcal.link.reliable.GIVE_UP_S", 0.3)
     with (
-        HeadsetServer(KEY, settings=LinkSettings(give_up_s=0.3)) as server,
+        HeadsetServer(KEY) as server,
         HeadsetClient(server.address, KEY, IDENTITY),
     ):
         server.wait_connected(5.0)

@@ -12,12 +12,11 @@ import pytest
 
 from handcal.core.errors import LinkError
 from handcal.core.types import EYES, HeadsetIdentity
-from handcal.link import greetings, messages, wire
+from handcal.link import handshake, messages, wire
 from handcal.link.client import MAX_WEARERS, HeadsetClient
 from handcal.link.pairing import Pairings
 from handcal.link.reliable import Receipt
 from handcal.link.server import HeadsetServer
-from handcal.link.settings import LinkSettings
 from handcal.link.shapes import Shape
 from handcal.link.wire import Rejection
 from tests.helpers import eventually
@@ -53,18 +52,20 @@ def test_a_pc_that_starts_again_is_found_again(pairing_key: bytes) -> None:
         assert client.state().projections["left"].P[0, 0] == 1.0
 
 
-def test_silence_is_noticed(pairing_key: bytes, raw_server: Any) -> None:
-    settings = LinkSettings(silence_s=0.3)
-    with HeadsetClient(raw_server.address, pairing_key, IDENTITY, settings=settings) as client:
+def test_silence_is_noticed(
+    pairing_key: bytes, raw_server: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("handcal.link.endpoint.SILENCE_S", 0.3)
+    with HeadsetClient(raw_server.address, pairing_key, IDENTITY) as client:
         hello, address = raw_server.wait_for("hello")
-        retry = raw_server.greeting(greetings.retry(hello.hello.nonce, b"cookie"))
+        retry = raw_server.greeting(handshake.retry(hello.hello.nonce, b"cookie"))
         raw_server.socket.sendto(retry, address)
         second, _ = raw_server.wait_for("hello")
         assert second.hello.cookie == b"cookie"
         assert second.hello.nonce == hello.hello.nonce
         assert second.hello.time_ns > hello.hello.time_ns
         welcome = wire.Welcome(9, hello.hello.nonce, bytes(16))
-        greeting = raw_server.greeting(greetings.welcome(welcome))
+        greeting = raw_server.greeting(handshake.welcome(welcome))
         raw_server.socket.sendto(greeting, address)
         raw_server.use_session(welcome)
         raw_server.wait_for("ack")
@@ -95,7 +96,7 @@ def test_a_pc_gone_mad_stops_nothing(pairing_key: bytes, raw_server: Any) -> Non
     with HeadsetClient(raw_server.address, pairing_key, IDENTITY) as client:
         hello, address = raw_server.wait_for("hello")
         welcome = wire.Welcome(9, hello.hello.nonce, bytes(16))
-        raw_server.socket.sendto(raw_server.greeting(greetings.welcome(welcome)), address)
+        raw_server.socket.sendto(raw_server.greeting(handshake.welcome(welcome)), address)
         raw_server.use_session(welcome)
         client.wait_connected(3.0)
         for sequence in range(1, 3000):

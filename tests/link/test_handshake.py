@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handcal.link import greetings, messages, wire
 from handcal.link import handcal_pb2 as pb
-from handcal.link.cookies import PERIOD_S
+from handcal.link import handshake, messages, wire
 from handcal.link.fields import MalformedError
-from handcal.link.handshake import MAX_ANSWERS, Caller, Limiter, Reception
+from handcal.link.handshake import MAX_ANSWERS, PERIOD_S, Caller, Limiter, Reception
 from handcal.link.pairing import MAX_DEVICES, Pairing, Pairings
 from handcal.link.transport import Address
 from handcal.link.wire import Packet, Rejection
@@ -30,8 +29,8 @@ class Desk:
         self.device = device
 
     def hello(self, time_ns: int, cookie: bytes = b"", name: str = "Lab") -> bytes:
-        made = greetings.hello(bytes(16), time_ns, cookie, name)
-        return greetings.seal(self.keys.to_pc, self.device, made)
+        made = handshake.hello(bytes(16), time_ns, cookie, name)
+        return handshake.seal(self.keys.to_pc, self.device, made)
 
     def hear(
         self, datagram: bytes, address: Address = HERE, now_s: float = 0.0
@@ -157,11 +156,11 @@ def test_strangers_cannot_have_every_key_tried_for_long() -> None:
 
 
 @pytest.mark.parametrize(
-    "envelope", [pb.Envelope(), pb.Envelope(bye=pb.Bye()), greetings.hello(b"short", 1, b"", "")]
+    "envelope", [pb.Envelope(), pb.Envelope(bye=pb.Bye()), handshake.hello(b"short", 1, b"", "")]
 )
 def test_what_is_no_hello_is_malformed(desk: Desk, envelope: pb.Envelope) -> None:
     with pytest.raises(MalformedError):
-        desk.hear(greetings.seal(desk.keys.to_pc, DEVICE, envelope))
+        desk.hear(handshake.seal(desk.keys.to_pc, DEVICE, envelope))
 
 
 @pytest.fixture

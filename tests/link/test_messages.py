@@ -1,4 +1,7 @@
+from __future__ import annotations
+
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -7,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import handcal.link
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Float64, HeadsetIdentity, HeadsetView, Projection
-from handcal.link import greetings, messages
 from handcal.link import handcal_pb2 as pb
+from handcal.link import handshake, messages
 from handcal.link.fields import MalformedError
 from handcal.link.reliable import Receipt
 from handcal.link.shapes import Shape, Target
@@ -77,17 +81,6 @@ def test_projection_prompt_poses_and_confirmation_survive_exactly() -> None:
     assert (confirm.t_headset_ns, confirm.cursor_id, confirm.drawn) == (9, 4, bytes(16))
 
 
-def test_a_target_survives_exactly_and_can_be_taken_away() -> None:
-    corners_m = np.random.default_rng(0).normal(size=(4, 3))
-    read = messages.read_target(sent(messages.target(Target("right", corners_m))).target)
-    assert read is not None
-    assert read.eye == "right"
-    np.testing.assert_array_equal(read.corners_V_m, corners_m)
-    taken_away = sent(messages.target(None))
-    assert taken_away.WhichOneof("body") == "target"
-    assert messages.read_target(taken_away.target) is None
-
-
 @given(
     st.lists(st.builds(Receipt, st.integers(1, 6), st.integers(0, 99), st.integers(0, 2**256 - 1)))
 )
@@ -143,10 +136,10 @@ def read_device(message: pb.Device) -> object:
         (read_device, pb.Device(eye_distance_m=np.nan)),
         (read_device, pb.Device(views=[pb.View()] * 3)),
         (read_device, pb.Device(views=[pb.View(eye=pb.EYE_LEFT, T_V_H=rotated(1.0))])),
-        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(15)))),
-        (greetings.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(16), cookie=bytes(33)))),
-        (greetings.read_hello, pb.Envelope(bye=pb.Bye())),
-        (greetings.read_welcome, pb.Welcome(nonce=bytes(16), session=1)),
+        (handshake.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(15)))),
+        (handshake.read_hello, pb.Envelope(hello=pb.Hello(nonce=bytes(16), cookie=bytes(33)))),
+        (handshake.read_hello, pb.Envelope(bye=pb.Bye())),
+        (handshake.read_welcome, pb.Welcome(nonce=bytes(16), session=1)),
     ],
 )
 def test_nonsense_is_malformed(read: Callable[[Any], object], message: object) -> None:
@@ -198,3 +191,14 @@ def test_any_bytes_are_an_envelope_or_malformed(data: bytes) -> None:
         assert isinstance(messages.parse(data), pb.Envelope)
     except MalformedError:
         return
+
+
+FOLDER = Path(handcal.link.__file__).parent
+
+
+def test_the_generated_code_is_that_of_the_schema(tmp_path: Path) -> None:
+    protoc = pytest.importorskip("grpc_tools.protoc")
+    arguments = [f"-I{FOLDER}", f"--python_out={tmp_path}", f"--pyi_out={tmp_path}"]
+    assert protoc.main(["protoc", *arguments, str(FOLDER / "handcal.proto")]) == 0
+    for name in ("handcal_pb2.py", "handcal_pb2.pyi"):
+        assert (tmp_path / name).read_text() == (FOLDER / name).read_text(), f"regenerate {name}"

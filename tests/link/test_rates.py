@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from handcal.link.rates import LinkRates, link_rates
-from handcal.link.statistics import LinkStatistics
+from handcal.link.statistics import LinkRates, LinkStatistics, link_rates
 
 START = LinkStatistics(
     connected=True,

@@ -10,10 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handcal.link.reliable import Delivery, Inbox, Outbox
-from handcal.link.settings import LinkSettings
 from handcal.link.wire import MAX_PAYLOAD_BYTES, Slot
 
-SETTINGS = LinkSettings(resend_s=0.04, resend_max_s=0.64, give_up_s=5.0)
 STEP_S = 0.005
 
 
@@ -48,7 +46,7 @@ def exchange(
 
 @given(seed=st.integers(0, 10**6), fragments=st.integers(1, 44))
 def test_a_message_gets_through_30_percent_loss_exactly_once(seed: int, fragments: int) -> None:
-    outbox, inbox = Outbox(SETTINGS), Inbox()
+    outbox, inbox = Outbox(), Inbox()
     sent = outbox.send(Slot.CURSOR, message_of(fragments), 0.0)
     delivered = exchange(outbox, inbox, random.Random(seed), loss=0.3, duration_s=5.0)
     assert delivered == [message_of(fragments)]
@@ -59,7 +57,7 @@ def test_a_message_gets_through_30_percent_loss_exactly_once(seed: int, fragment
 def test_a_44_fragment_cursor_is_quick_at_30_percent_loss() -> None:
     arrived = 0
     for seed in range(50):
-        outbox, inbox = Outbox(SETTINGS), Inbox()
+        outbox, inbox = Outbox(), Inbox()
         sent = outbox.send(Slot.CURSOR, message_of(44), 0.0)
         exchange(outbox, inbox, random.Random(seed), loss=0.3, duration_s=0.5)
         arrived += sent.state is Delivery.ACKED
@@ -67,7 +65,7 @@ def test_a_44_fragment_cursor_is_quick_at_30_percent_loss() -> None:
 
 
 def test_only_missing_fragments_are_sent_again() -> None:
-    outbox, inbox = Outbox(SETTINGS), Inbox()
+    outbox, inbox = Outbox(), Inbox()
     outbox.send(Slot.CURSOR, message_of(10), 0.0)
     for packet in outbox.due(0.0, 16):
         if packet.fragment not in (2, 7):
@@ -80,7 +78,7 @@ def test_only_missing_fragments_are_sent_again() -> None:
 
 
 def test_the_wait_doubles_to_its_limit() -> None:
-    outbox = Outbox(SETTINGS)
+    outbox = Outbox()
     outbox.send(Slot.PROMPT, b"hello", 0.0)
     times = [t for t in (i / 1000 for i in range(4000)) if outbox.due(t, 16)]
     waits = [round(b - a, 2) for a, b in itertools.pairwise(times)]
@@ -88,14 +86,14 @@ def test_the_wait_doubles_to_its_limit() -> None:
 
 
 def test_a_burst_is_bounded() -> None:
-    outbox = Outbox(SETTINGS)
+    outbox = Outbox()
     outbox.send(Slot.CURSOR, message_of(20), 0.0)
     outbox.send(Slot.PROMPT, b"hello", 0.0)
     assert [len(outbox.due(0.001 * i, 16)) for i in range(3)] == [16, 5, 0]
 
 
 def test_a_newer_message_replaces_an_older_of_its_slot_only() -> None:
-    outbox = Outbox(SETTINGS)
+    outbox = Outbox()
     older = outbox.send(Slot.PROJECTION_LEFT, b"old", 0.0)
     other = outbox.send(Slot.PROJECTION_RIGHT, b"right", 0.0)
     newer = outbox.send(Slot.PROJECTION_LEFT, b"new", 0.0)
@@ -105,7 +103,7 @@ def test_a_newer_message_replaces_an_older_of_its_slot_only() -> None:
 
 
 def test_a_late_older_projection_never_overwrites_a_newer_one() -> None:
-    outbox, inbox = Outbox(SETTINGS), Inbox()
+    outbox, inbox = Outbox(), Inbox()
     outbox.send(Slot.PROJECTION_LEFT, b"old", 0.0)
     late = outbox.due(0.0, 16)
     outbox.send(Slot.PROJECTION_LEFT, b"new", 0.0)
@@ -117,7 +115,7 @@ def test_a_late_older_projection_never_overwrites_a_newer_one() -> None:
 def test_whatever_order_fragments_of_two_messages_come_in_the_newer_one_stays(
     order: list[int],
 ) -> None:
-    outbox, inbox = Outbox(SETTINGS), Inbox()
+    outbox, inbox = Outbox(), Inbox()
     outbox.send(Slot.CURSOR, message_of(3, b"a"), 0.0)
     packets = outbox.due(0.0, 16)
     outbox.send(Slot.CURSOR, message_of(3, b"b"), 0.0)
@@ -127,7 +125,7 @@ def test_whatever_order_fragments_of_two_messages_come_in_the_newer_one_stays(
 
 
 def test_nothing_acknowledged_is_given_up_and_counted() -> None:
-    outbox = Outbox(SETTINGS)
+    outbox = Outbox()
     sent = outbox.send(Slot.CURSOR, b"hand", 0.0)
     assert outbox.expire(4.99) == []
     assert outbox.expire(5.0) == [sent]
@@ -136,7 +134,7 @@ def test_nothing_acknowledged_is_given_up_and_counted() -> None:
 
 
 def test_a_new_receiver_is_sent_the_newest_of_every_slot() -> None:
-    outbox = Outbox(SETTINGS)
+    outbox = Outbox()
     outbox.send(Slot.PROMPT, b"old prompt", 0.0)
     outbox.send(Slot.PROMPT, b"prompt", 0.0)
     outbox.send(Slot.CURSOR, message_of(3), 0.0)
@@ -150,7 +148,7 @@ def test_a_new_receiver_is_sent_the_newest_of_every_slot() -> None:
 
 @pytest.mark.parametrize("change", [{"fragment_count": 5}, {"message_id": 0}])
 def test_a_fragment_that_contradicts_the_others_is_ignored(change: dict[str, Any]) -> None:
-    outbox, inbox = Outbox(SETTINGS), Inbox()
+    outbox, inbox = Outbox(), Inbox()
     outbox.send(Slot.CURSOR, message_of(2), 0.0)
     first, second = outbox.due(0.0, 16)
     inbox.receive(first)

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from handcal.core.geometry import rigid
 from handcal.core.types import Eye, HeadsetIdentity, HeadsetView, Projection
-from handcal.link import exchange, greetings, messages, nudges, wire
+from handcal.link import exchange, handshake, messages, nudges, wire
 from handcal.link import handcal_pb2 as pb
 from handcal.link.drawn import drawn_digest, drawn_projections
-from handcal.link.greetings import Refusal
+from handcal.link.handshake import Refusal
 from handcal.link.invitation import Invitation
 from handcal.link.messages import Owner
 from handcal.link.nudges import NudgeSum, VerifyRequest
@@ -87,7 +87,7 @@ def build() -> dict[str, Any]:
         (Slot.UNRELIABLE, messages.ack([Receipt(Slot.CURSOR, 2, 1)])),
         (Slot.UNRELIABLE, pb.Envelope(bye=pb.Bye())),
     ]
-    busy = greetings.refused(NONCE, Refusal(is_key_taken=False, other="Lab 1"))
+    busy = handshake.refused(NONCE, Refusal(is_key_taken=False, other="Lab 1"))
     offline = drawn_digest(drawn_projections(projections, is_offline=True), cursor.cursor)
     return {
         "protocol": wire.VERSION,
@@ -100,10 +100,10 @@ def build() -> dict[str, Any]:
         "pairing_by_digits": _pairing_by_digits(),
         "keys": {"handshake": _hex(greeting), "session": _hex(session)},
         "handshake": [
-            _greeting(greeting.to_pc, greetings.hello(NONCE, T_NS, b"", "Lab 2")),
-            _greeting(greeting.to_headset, greetings.retry(NONCE, COOKIE)),
-            _greeting(greeting.to_pc, greetings.hello(NONCE, T_NS + 1, COOKIE, "Lab 2")),
-            _greeting(greeting.to_headset, greetings.welcome(WELCOME)),
+            _greeting(greeting.to_pc, handshake.hello(NONCE, T_NS, b"", "Lab 2")),
+            _greeting(greeting.to_headset, handshake.retry(NONCE, COOKIE)),
+            _greeting(greeting.to_pc, handshake.hello(NONCE, T_NS + 1, COOKIE, "Lab 2")),
+            _greeting(greeting.to_headset, handshake.welcome(WELCOME)),
         ],
         "refused": _greeting(greeting.to_headset, busy),
         "fragments": _fragments(session.to_headset),
@@ -136,10 +136,10 @@ def _pairing_by_digits() -> dict[str, str]:
         "headset_secret": f"{SECRET:064x}",
         "pc_secret": f"{PC_SECRET:064x}",
         "first_pair": first["datagram"],
-        "retry": _greeting(keys.to_headset, greetings.retry(NONCE, COOKIE))["datagram"],
+        "retry": _greeting(keys.to_headset, handshake.retry(NONCE, COOKIE))["datagram"],
         "pair": request["datagram"],
         "pair_by_code": _greeting(keys.to_pc, scanned)["datagram"],
-        "refused": _greeting(keys.to_headset, greetings.refused_code(NONCE))["datagram"],
+        "refused": _greeting(keys.to_headset, handshake.refused_code(NONCE))["datagram"],
         "paired": answer["datagram"],
         "proof": agreed.proof.hex(),
         "pairing_key": agreed.key,
@@ -171,7 +171,7 @@ def _hex(keys: Keys) -> dict[str, str]:
 
 def _greeting(key: bytes, envelope: pb.Envelope) -> dict[str, str]:
     body = str(envelope.WhichOneof("body"))
-    return {"message": body, "datagram": greetings.seal(key, DEVICE, envelope).hex()}
+    return {"message": body, "datagram": handshake.seal(key, DEVICE, envelope).hex()}
 
 
 def _messages(key: bytes, envelopes: list[tuple[Slot, pb.Envelope]]) -> list[dict[str, str]]:

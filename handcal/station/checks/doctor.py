@@ -26,7 +26,6 @@ from handcal.io.resources import resource_path
 from handcal.io.x_display import x_server_answers
 from handcal.link.pairing import KEY_VARIABLE, read_pairing_key
 from handcal.link.server import HeadsetServer
-from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import UdpTransport
 from handcal.rig.compare import compare_camera
 from handcal.rig.rig_file import read_rig
@@ -188,7 +187,7 @@ def _hand_detector() -> Finding:
 
 def _network() -> Finding:
     def bind() -> str:
-        transport = UdpTransport(("127.0.0.1", 0), DEFAULT_SETTINGS.receive_buffer_bytes)
+        transport = UdpTransport(("127.0.0.1", 0))
         port = transport.address[1]
         transport.close()
         return f"UDP works on the loopback interface (port {port})"

@@ -20,7 +20,6 @@ from handcal.core.progress import Progress
 from handcal.hand.settings import REACH_M
 from handcal.io.files import require_writable
 from handcal.link.server import LOOPBACK
-from handcal.link.settings import DEFAULT_SETTINGS
 from handcal.link.transport import Address, UdpTransport, reachable_address
 from handcal.link.wire import MIN_PAIRING_KEY_BYTES
 from handcal.rig.rig_file import read_rig
@@ -213,7 +212,7 @@ def _network_headset(settings: StationSettings, pairing_key: str) -> Finding:
 
 def _require_free(address: Address) -> None:
     """Raise LinkError if the address cannot be bound."""
-    UdpTransport(address, DEFAULT_SETTINGS.receive_buffer_bytes).close()
+    UdpTransport(address).close()
 
 
 def _rig(settings: StationSettings) -> Finding:

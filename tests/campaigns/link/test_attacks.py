@@ -18,7 +18,7 @@ import pytest
 from handcal.core.errors import LinkError, PoseError
 from handcal.core.geometry import rigid
 from handcal.core.types import HeadsetIdentity
-from handcal.link import greetings, messages, wire
+from handcal.link import handshake, messages, wire
 from handcal.link.client import HeadsetClient
 from handcal.link.pairing import Pairing, Pairings
 from handcal.link.server import HeadsetServer
@@ -143,7 +143,7 @@ def test_hostile_messages_with_the_key_crash_nothing(server: HeadsetServer) -> N
     def greet(cookie: bytes) -> None:
         now[0] += 1
         keys = wire.handshake_keys(key, device)
-        take(greetings.seal(keys.to_pc, device, greetings.hello(bytes(16), now[0], cookie, "x")))
+        take(handshake.seal(keys.to_pc, device, handshake.hello(bytes(16), now[0], cookie, "x")))
 
     def payload() -> bytes:
         made = [

@@ -20,8 +20,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import HeadsetIdentity, Rig
-from handcal.link.ask_to_pair import pair_by_code
 from handcal.link.client import HeadsetClient
+from handcal.link.exchange import pair_by_code
 from handcal.link.invitation import read_invitation
 from handcal.link.pairing import Pairings
 from handcal.link.server import HeadsetServer, PairingAttempts

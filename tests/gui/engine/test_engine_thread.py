@@ -17,8 +17,7 @@ import pytest
 from PySide6.QtCore import QCoreApplication
 from pytestqt.qtbot import QtBot
 
-from handcal.bridge.bridge import Bridge
-from handcal.bridge.bridges import BridgeSettings
+from handcal.bridge.bridges import Bridge, BridgeSettings
 from handcal.calibration.states import ProcedureError
 from handcal.core.errors import FileError
 from handcal.io.closable import Closable

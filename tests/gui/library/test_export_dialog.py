@@ -21,8 +21,7 @@ from pytestqt.qtbot import QtBot
 
 from handcal.core.errors import FileError
 from handcal.core.progress import Progress
-from handcal.export.export import ExportSettings, export_session
-from handcal.export.many import Exported
+from handcal.export.export import Exported, ExportSettings, export_session
 from handcal.session.session import SessionRecord
 from handcal_gui.library.export_dialog import ExportDialog
 from handcal_gui.widgets.path_field import PathField
