@@ -18,10 +18,19 @@ from handcal.core.types import EYES, Float64
 from handcal.link.client import HeadsetClient
 from handcal.register.guard import RotationGuard
 from handcal.session.session import Session
-from tests.calibration.stage import PERIOD_NS, RIG, T_D_HAND, T_D_NEAR, T_W_H, Stage, events
-from tests.calibration.test_delay import CAMERA_AHEAD_NS, world
-from tests.calibration.test_lab_prior import SETTINGS
-from tests.gui.conftest import T_D_TURNED
+from tests.calibration.stage import (
+    CAMERA_AHEAD_NS,
+    PERIOD_NS,
+    RIG,
+    SETTINGS,
+    T_D_HAND,
+    T_D_NEAR,
+    T_D_TURNED,
+    T_W_H,
+    Stage,
+    events,
+    world,
+)
 from tests.helpers import eventually
 
 

@@ -17,8 +17,7 @@ from handcal.link.client import HeadsetClient
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
-from tests.calibration.stage import RIG, T_D_HAND, Stage, shows, shows_offline_projections
-from tests.calibration.test_evidence import IDENTITY
+from tests.calibration.stage import IDENTITY, RIG, T_D_HAND, Stage, shows, shows_offline_projections
 from tests.helpers import eventually
 
 

@@ -14,8 +14,7 @@ from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError
 from handcal.core.types import EYES, Eye, Float64
 from handcal.session.session import Session
-from tests.calibration.stage import RIG, Stage, events
-from tests.calibration.test_lab_prior import SETTINGS
+from tests.calibration.stage import RIG, SETTINGS, Stage, events
 from tests.helpers import eventually
 
 

@@ -25,6 +25,9 @@ from handcal.register.results import results_json
 from handcal.session.session import Session
 from handcal.session.state import facts_json
 from tests.calibration.stage import (
+    CAMERA,
+    CAMERA_AHEAD_NS,
+    IDENTITY,
     PERIOD_NS,
     RIG,
     SENSOR,
@@ -35,8 +38,6 @@ from tests.calibration.stage import (
     depth_of,
     events,
 )
-from tests.calibration.test_delay import CAMERA, CAMERA_AHEAD_NS
-from tests.calibration.test_evidence import IDENTITY
 from tests.helpers import eventually
 
 TANGENTS = np.array([-0.3, 0.3, 0.2, -0.2])

@@ -17,8 +17,7 @@ from handcal.core.types import Alignment
 from handcal.link.server import HeadsetServer
 from handcal.register.results import SolveSettings, results_json, solve_session
 from handcal.session.session import Session
-from tests.calibration.stage import RIG, Stage, shows, shows_offline_projections
-from tests.calibration.test_lab_prior import SETTINGS
+from tests.calibration.stage import RIG, SETTINGS, Stage, shows, shows_offline_projections
 from tests.helpers import eventually
 
 # Opens a session with the alignment of another, and dies with it open.

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handcal.cli.main import parse
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.geometry import rigid
-from handcal.link.messages import parse
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
 from handcal.sim.photographs import write_acceptance

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from handcal.camera.folder import record_folder
+from handcal.cli.main import parse
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
 from handcal.core.types import Frame, Intrinsics
-from handcal.link.messages import parse
 from handcal.rig.cube import Cube
 from handcal.rig.example import example_rig
 from handcal.sim.boards import PictureSettings

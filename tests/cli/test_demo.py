@@ -14,13 +14,12 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from handcal.cli.main import main
+from handcal.cli.main import main, parse
 from handcal.cli.simulate import meanings
 from handcal.core.display import reprojection_arcmin
 from handcal.core.geometry import rigid
 from handcal.core.types import EYES, Eye, EyeDistance, VerdictName
 from handcal.lab.demo import DemoSettings, measure_eye_distance
-from handcal.link.messages import parse
 from handcal.register.benefit import DISTANCES_M
 from handcal.register.prior import eye_position_m
 from handcal.register.results import USED

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.cli.main import parse
 from handcal.core.display import eye_projection, view_of_eye
 from handcal.core.errors import FileError, HandcalError
 from handcal.core.geometry import invert, rigid
 from handcal.core.types import Intrinsics
-from handcal.link.messages import parse
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import ViewsError
 from handcal.rig.compare import compare_rigs

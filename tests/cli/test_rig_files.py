@@ -12,10 +12,10 @@ import pytest
 
 from handcal.camera.folder import record_folder
 from handcal.camera.hl2ss import STREAMS
+from handcal.cli.main import parse
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import rigid
 from handcal.core.types import CameraIdentity, Frame, Intrinsics
-from handcal.link.messages import parse
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import read_rig, write_rig
 from handcal.sim.ahat import ahat_rays

@@ -13,8 +13,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from handcal.cli.main import main
-from handcal.link.messages import parse
+from handcal.cli.main import main, parse
 from tests.helpers import ROOT, slow_simulator, write_small_rig
 
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text("utf-8")

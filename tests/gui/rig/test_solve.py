@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 import pytest
 
+from handcal.cli.main import parse
 from handcal.core.display import view_of_eye
 from handcal.core.errors import HandcalError
 from handcal.core.geometry import invert, rigid
 from handcal.io.files import write_json
-from handcal.link.messages import parse
 from handcal.rig.assemble import screen_of
 from handcal.rig.boards.views import ViewsError, WorstView
 from handcal.rig.displays.grid import grid_on
