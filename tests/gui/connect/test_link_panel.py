@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from typing import Any
 
@@ -20,8 +19,6 @@ from pytestqt.qtbot import QtBot
 
 from handcal.link.wire import Rejection
 from handcal.station.snapshot import Snapshot
-from handcal_gui.app import translation
-from handcal_gui.connect import link_table
 from handcal_gui.connect.link_panel import LinkPanel
 from handcal_gui.connect.link_table import REJECTIONS
 from handcal_gui.widgets.elided_label import ElidedLabel
@@ -81,20 +78,6 @@ def test_it_tells_how_the_link_does(panel: LinkPanel, snapshot: Maker) -> None:
     assert text(panel, "failed-1") == "1"
     assert text(panel, "resent-1") == "7"
     assert text(panel, "lost-1") == text(panel, "data-1") == "–", "one reading gives no rate"
-
-
-def test_names_of_numbers_are_the_same_in_every_language(
-    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(translation, "_translate", [lambda text: f"à {text}"])
-        importlib.reload(link_table)  # its texts are translated when it is imported
-        table = link_table.LinkTable()
-    qtbot.addWidget(table)
-    importlib.reload(link_table)
-    assert "à Latency" in [label.text() for label in table.findChildren(QLabel)]
-    for name in ("latency-2", "in-flight-1", "clock-drift-3", "wrong-session-2"):
-        child(table, NumberLabel, f"link-{name}")
 
 
 def test_a_low_panel_shows_everything_without_scrolling(panel: LinkPanel, snapshot: Maker) -> None:
