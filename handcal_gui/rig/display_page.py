@@ -14,7 +14,7 @@ from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.boards.choose import ALIKE
 from handcal.rig.displays.grid import Grid, draw_grid, grid_on
-from handcal.rig.steps import view_in
+from handcal.rig.steps import ASKED_BOARDS, ASKED_GRIDS, view_in
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.file_dialogs import ask_save
@@ -33,13 +33,13 @@ _DISTANCES: dict[Distance, str] = {
 }
 _GRID_HINT = tr(
     "Save the grid and show it on this display unscaled. With the viewpoint camera at the eye "
-    "position, focused on the display, take 3 or more images in the dark."
-)
+    "position, focused on the display, take {} or more images in the dark."
+).format(ASKED_GRIDS)
 _BOARD_HINT = tr(
-    "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
+    "Leave the camera in its place and switch the display off. Take {} or more images of the board "
     "through it while the headset tracks the board. Save one JSON file with the name of each "
     'image and the pose of its board in the headset rig: <a href="{}">its contents</a>.'
-).format("docs/rig-guide.md#left-and-right-display")
+).format(ASKED_BOARDS, "docs/rig-guide.md#left-and-right-display")
 
 
 class DisplayPage(StepPage):
@@ -261,7 +261,7 @@ class DisplayPage(StepPage):
             self._grid,
             lambda: self.form.enter(grid_images=str(folder)),
             ALIKE,
-            asked=3,
+            asked=ASKED_GRIDS,
         )
 
     def _take_board(self) -> None:
@@ -271,5 +271,5 @@ class DisplayPage(StepPage):
             self.project.inputs.board,
             self._board,
             lambda: self.form.enter(board_images=str(folder)),
-            asked=8,
+            asked=ASKED_BOARDS,
         )
