@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from handcal.core.errors import FileError, HandcalError
@@ -49,16 +49,17 @@ class DisplayPage(StepPage):
     ----------
     project : RigProject
     eye : {"left", "right"}
-
-    Attributes
-    ----------
-    manual_wanted : Signal(str)
-        The user wants to read a page of the manual.
+    read : callable
+        Shows a page of the manual.
     """
 
-    manual_wanted = Signal(str)
-
-    def __init__(self, project: RigProject, eye: Eye, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        project: RigProject,
+        eye: Eye,
+        read: Callable[[str], object],
+        parent: QWidget | None = None,
+    ) -> None:
         distance = choice(
             "distance",
             tr("Distance of the virtual screen"),
@@ -143,12 +144,12 @@ class DisplayPage(StepPage):
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
         keys = tr("&Take images…"), tr("Find the grid &again")
-        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
+        grid = ImagesPanel(project, (tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
         keys = tr("Ta&ke images…"), tr("Find t&he board again")
-        board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
+        board = ImagesPanel(project, (tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
         panels = {tr("Grid on the displa&y"): grid, tr("Ca&mera pose"): board}
         super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
-        make_linked(board.hint).linkActivated.connect(self.manual_wanted)
+        make_linked(board.hint).linkActivated.connect(read)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
@@ -157,8 +158,8 @@ class DisplayPage(StepPage):
         )
         grid.add_button(self._save)
         self._save.clicked.connect(self._save_grid)
-        self._grid.take_requested.connect(self._take_grid)
-        self._board.take_requested.connect(self._take_board)
+        self._grid.take.clicked.connect(self._take_grid)
+        self._board.take.clicked.connect(self._take_board)
         self.show_known()
 
     @property
