@@ -28,7 +28,6 @@ from handcal.rig.lens.camera import CameraSettings, LensChoice
 from handcal.rig.lens.stereo import StereoCalibration, StereoSettings, calibrate_stereo
 from handcal.rig.lens.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
 
-
 ASKED_GRIDS, ASKED_BOARDS = 3, 8
 """Images of the grid and of the tracked board that a display asks for; fewer are not *good*."""
 

@@ -12,24 +12,23 @@ from PySide6.QtWidgets import QMessageBox
 from handcal.core.errors import FileError
 from handcal.io.resources import resource_path
 from handcal_gui.app.keys_dialog import KeysDialog
+from handcal_gui.app.manual import show_manual
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.window import MainWindow
-from handcal_gui.manual.window import Manual
 from handcal_gui.widgets.opening import open_path
 from handcal_gui.widgets.placement import keep_on_screen
 
 
-def add_help_menu(window: MainWindow, manual: Manual, support: Callable[[], object]) -> None:
+def add_help_menu(window: MainWindow, support: Callable[[], object]) -> None:
     """Fill the Help menu of a window.
 
     Parameters
     ----------
     window : MainWindow
-    manual : Manual
     support : callable
         Opens the dialog that writes a support bundle.
     """
-    add, read = window.add_action, partial(read_manual, window, manual)
+    add, read = window.add_action, partial(read_manual, window)
     add("Help", tr("&Guide"), "Shift+F1", lambda: read("docs/guide.md"))
     add("Help", tr("&Manual"), "", lambda: read("docs/index.md"))
     add("Help", tr("Headset &protocol"), "", lambda: read("docs/protocol.md"))
@@ -50,10 +49,10 @@ def _show_keys(window: MainWindow) -> None:
     keep_on_screen(dialog)
 
 
-def read_manual(window: MainWindow, manual: Manual, page: str) -> None:
+def read_manual(window: MainWindow, page: str) -> None:
     """Show a page of the manual, or the reason why it cannot be shown."""
     try:
-        manual.open(page)
+        show_manual(window, page)
     except FileError as error:
         window.banner.show_message(str(error))
 
