@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QTableWidget,
-    QTreeWidget,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -34,6 +33,7 @@ from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import letters
+from tests.gui.rig.wizard_steps import findings
 
 Kind = TypeVar("Kind", bound=QWidget)
 
@@ -182,12 +182,9 @@ def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: Rig
     project.use_rig(replace(project.rig, eyes={**project.rig.eyes, "left": wrong}))
     page = ResultPage(project)
     qtbot.addWidget(page)
-    findings = part(page, QTreeWidget, "rigFindings")
 
     def acceptance() -> str:
-        rows = [findings.topLevelItem(row) for row in range(findings.topLevelItemCount())]
-        (found,) = (row.text(1) for row in rows if row and row.text(0) == "Acceptance")
-        return found
+        return findings(page)["Acceptance"][0]
 
     assert acceptance().startswith("Not yet")
     part(page, QPushButton, "acceptRig").click()

@@ -48,6 +48,7 @@ from tests.gui.rig.wizard_steps import (
     STEREO,
     VIEWPOINT,
     child,
+    findings,
     marks,
     show_tab,
     solve,
@@ -184,9 +185,7 @@ def test_nothing_is_ticked_before_it_is_done(wizard: RigWizard) -> None:
     found = child(wizard, QLabel, "savedRigFound").text()
     parts = "left display, right display, depth camera's pose"
     assert found.startswith(f"3 not calibrated by handcal: {parts}; 6 not known or not made; ")
-    signs = child(wizard, QTreeWidget, "rigFindings")
-    rows = [signs.topLevelItem(row) for row in range(signs.topLevelItemCount())]
-    told = {one.text(0): one.data(0, Qt.ItemDataRole.AccessibleDescriptionRole) for one in rows}
+    told = {item: sign for item, (_, sign) in findings(wizard).items()}
     assert told["Depth camera"] == "Not known"
     assert told["Left: display"] == ""
     assert "Good" not in told.values()
@@ -297,7 +296,7 @@ def test_a_grid_that_has_no_room_is_reported(qtbot: QtBot, wizard: RigWizard) ->
     assert wizard.findChild(TakeDialog) is None
     square.setValue(80)
     wait(qtbot, wizard)
-    show_tab(wizard, "Grid on the display (2 of 2 used)")
+    show_tab(wizard, "Grid on the display (3 of 3 used)")
     assert "2 of 2 used" in child(wizard, QLabel, "count").text()
 
 

@@ -157,7 +157,7 @@ def test_earlier_images_count(qtbot: QtBot, wizard: RigWizard, photographs: Any)
     }
     page.form.enter(**folders)
     wait(qtbot, wizard)
-    page.panels[0].take_requested.emit()
+    page.panels[0].take.click()
     taking = child(wizard, TakeDialog)
     assert child(taking, QLabel, "takenCount").text() == "8 of 20 usable pairs of images"
     assert "–" not in taking.findChildren(CoverageMap)[1].caption
