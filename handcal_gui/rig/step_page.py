@@ -28,8 +28,6 @@ from handcal_gui.widgets.path_field import PathField
 
 _FIRST_PANEL = 2
 """Place of the first panel of images among the tabs."""
-_NARROW_PX = 112 * SPACING_PX
-"""Width below which two columns of inputs are too narrow for paths."""
 
 
 class StepPage(QWidget):
@@ -192,7 +190,6 @@ class StepPage(QWidget):
             grid.setColumnStretch(column, 1)
             for row, part in enumerate((panel.hint, panel.drawing, panel.buttons)):
                 grid.addWidget(part, row, column)
-        self.form.narrow_px = _NARROW_PX
         vbox(self.form, 1, on=inputs, margins=SPACING_PX)
         self._tabs.addTab(setup, tr("Set-&up"))
         self._tabs.addTab(inputs, tr("&Inputs"))

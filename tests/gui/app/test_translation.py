@@ -91,20 +91,3 @@ def test_no_visible_text_lacks_its_mark() -> None:
         for line, text in untranslated(ast.parse(path.read_text("utf-8")))
     ]
     assert "\n".join(found) == ""
-
-
-def test_the_test_finds_texts_without_the_mark() -> None:
-    source = """
-label.setText("one")
-box = QLabel("Two words"), with_name(box, "three", "Four")
-_HELP = "Five is a sentence."
-name = f"{eye}, measured", f"color: {shade}", f"{kind}-number", f"{share:.1f} px"
-fine = tr("Six is translated"), with_name(box, "seven", tr("Eight")), label.setText("")
-"""
-    found = [text.strip("'") for _, text in untranslated(ast.parse(source))]
-    assert found == ["one", "Two words", "Four", ", measured", "Five is a sentence."]
-
-
-def test_no_object_name_is_made_of_a_shown_text() -> None:
-    made = re.compile(r"setObjectName\(.*\.lower\(\)")
-    assert [path.name for path in SOURCES if made.search(path.read_text("utf-8"))] == []

@@ -32,7 +32,6 @@ from handcal_gui.rig.result_page import ResultPage
 from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.path_field import PathField
-from tests.gui.helpers import letters
 from tests.gui.rig.wizard_steps import findings
 
 Kind = TypeVar("Kind", bound=QWidget)
@@ -60,19 +59,6 @@ def part(dialog: QWidget, kind: type[Kind], name: str) -> Kind:
     found = dialog.findChild(kind, name)
     assert isinstance(found, kind)
     return found
-
-
-def test_every_button_has_a_letter_of_its_own(dialog: AcceptDialog) -> None:
-    found = letters(dialog)
-    assert len(set(found)) == len(found) >= 6
-
-
-def test_on_a_small_screen_the_drawing_hides_no_button(dialog: AcceptDialog) -> None:
-    dialog.resize(dialog.width(), 360)
-    QApplication.processEvents()
-    drawing = part(dialog, Drawing, "drawing").geometry()
-    assert not drawing.intersects(part(dialog, QPushButton, "left-grid").geometry())
-    assert part(dialog, QTableWidget, "drawn-against-seen").isHidden(), "there are no numbers yet"
 
 
 def test_the_images_of_each_eye_are_counted_towards_what_is_needed(

@@ -214,16 +214,6 @@ def test_what_was_left_out_of_other_images_is_forgotten(
     assert full.dropped_of(before) == ()
 
 
-def test_the_set_up_shows_a_drawing(qtbot: QtBot, panel: ImagesPanel) -> None:
-    drawing = panel.drawing
-    qtbot.addWidget(drawing)
-    drawing.resize(700, 300)
-    drawing.show()
-    image = drawing.grab().toImage()
-    shades = {image.pixel(x, y) for x in range(0, image.width(), 3) for y in range(0, 200, 3)}
-    assert len(shades) > 3
-
-
 @pytest.mark.parametrize("page", sorted(PAGES))
 def test_every_step_has_a_drawing(qtbot: QtBot, page: str) -> None:
     drawing = Drawing(f"docs/pictures/{page}.svg")

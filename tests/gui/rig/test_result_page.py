@@ -62,16 +62,6 @@ def test_it_says_how_to_go_on_and_why_a_rig_cannot_be_used_yet(
     assert "ours.yaml; " in said.text(), "what is doubtful or not known stays in sight"
 
 
-def test_each_text_begins_with_a_capital_and_no_file_is_named_before_there_is_one(
-    qtbot: QtBot, project: RigProject
-) -> None:
-    page = ResultPage(project)
-    qtbot.addWidget(page)
-    texts = [text for what, (found, _) in findings(page).items() for text in (what, found)]
-    assert not [text for text in texts if text[0].islower()]
-    assert findings(page)["Headset"] == ("Not known until a headset reports it", "Not known")
-
-
 def test_a_failed_acceptance_is_shown_as_a_failure(
     qtbot: QtBot, project: RigProject, tmp_path: Path
 ) -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.rig.boards.views import WorstView
 from handcal.rig.verdict import CalibrationVerdict
 from handcal_gui.rig.solve import SolvedPart
 from handcal_gui.rig.solve_box import SolveBox
-from handcal_gui.widgets.number_table import NumberTable, Row
 from tests.gui.helpers import child, show
 
 
@@ -29,22 +26,3 @@ def test_a_step_not_solved_has_a_clock_and_its_worst_image_no_sign(qtbot: QtBot)
     assert not [one for one in box.findChildren(QLabel) if one.isVisible() and one.pixmap()][1:]
     box.show_origin(None, "solved with other inputs")
     assert sign.accessibleName() == "Note"
-
-
-def test_the_lenses_compared_are_whole_beside_the_numbers(qtbot: QtBot) -> None:
-    box = SolveBox()
-    qtbot.addWidget(box)
-    numbers = show(qtbot, box.numbers, 700, 300)
-    found = (Row("Focal length fx", ("900.45 px", "0.86 px")),)
-    fits = tuple(
-        Row(f"Headset: {name}", ("0.075", "± 0.28"))
-        for name in ("No distortion", "k1, k2 ✓", "k1, k2, p1, p2, k3", "Fisheye")
-    )
-    solved = SolvedPart(CalibrationVerdict("good", "as told"), found, {}, lenses=fits)
-    box.show_solved(solved, "it is used")
-    QApplication.processEvents()
-    for table in (box.table, child(numbers, NumberTable, "lenses")):
-        assert table.isVisible()
-        assert table.horizontalScrollBar().maximum() == table.verticalScrollBar().maximum() == 0
-    box.show_solved(replace(solved, lenses=()), "it is used")
-    assert not child(numbers, NumberTable, "lenses").isVisible()
