@@ -16,9 +16,7 @@ from handcal.session.session import Session
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui import FIRST_SIZE_PX
-from handcal_gui.app.edit_menu import add_edit_menu
-from handcal_gui.app.help_menu import add_help_menu
-from handcal_gui.app.keys import NoAltLetters
+from handcal_gui.app.menus import add_edit_menu, add_help_menu
 from handcal_gui.app.preferences import CurrentPreferences, Preferences, PreferencesFile
 from handcal_gui.app.separate_windows import SeparateWindows
 from handcal_gui.app.theme import use_theme
@@ -87,7 +85,6 @@ class Program(QObject):
         self.wizard_panel = WizardPanel()
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
-        NoAltLetters(self.window)
         comparison = Comparison(panels.results)
         self.live = CalibrationController(self.window, self.wizard_panel, comparison)
         self.review = ReviewController(self.window, review_page, comparison)

@@ -20,7 +20,7 @@ from handcal.link.server import HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import SessionRecord
 from handcal.station.checks.support import SupportSettings
-from handcal_gui.app.help_menu import read_manual
+from handcal_gui.app.menus import read_manual
 from handcal_gui.app.preferences import CurrentPreferences
 from handcal_gui.app.preferences_dialog import PreferencesDialog
 from handcal_gui.app.support_dialog import SupportDialog
