@@ -224,8 +224,8 @@ class Program(QObject):
         panels = self.window.panels
         panels.session.export_requested.connect(lambda: self.windows.export())
         panels.session.inspect_requested.connect(self.windows.inspect)
-        panels.link.new_key_requested.connect(self._renew_key)
-        panels.link.connect_requested.connect(self.windows.connect_headset)
+        panels.link.new_key.clicked.connect(self._renew_key)
+        panels.link.connect_headset.clicked.connect(self.windows.connect_headset)
         self._current.not_saved.connect(self.window.banner.show_message)
         self.window.closing.connect(self.close)
         self.window.may_close = self._may_leave
