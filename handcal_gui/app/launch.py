@@ -82,8 +82,7 @@ def launch(app: QApplication, arguments: argparse.Namespace, first: QWidget) -> 
         raise LaunchError(error, 2) from error
     gc.freeze()  # all of this stays; searching it for garbage held up the window by 0.1 s
     collect_in_this_thread(app)
-    if program.window.isVisible():  # or it was closed meanwhile, and nothing would end the loop
-        app.exec()
+    app.exec()
     program.close()
     if demonstration is not None and demonstration.complaint is not None:
         raise LaunchError(demonstration.complaint, 1)

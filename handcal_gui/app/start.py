@@ -29,7 +29,7 @@ _EXPOSED_S = 0.3
 
 
 def main() -> NoReturn:
-    """Run the program; the exit status is 0, 1 if it fails, 2 for wrong arguments or without a display."""
+    """Run the program; the exit status is 0, 1 if it fails, 2 for wrong arguments or no display."""
     arguments = _parser().parse_args()
     _require_display()
     keep_font_list_in_configuration()

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QEvent, QObject, QSize, QTimer
+from PySide6.QtCore import QEvent, QObject, QSize
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -47,20 +47,6 @@ def first(qtbot: QtBot) -> QWidget:
     qtbot.addWidget(first)
     first.show()
     return first
-
-
-def test_a_window_closed_before_the_event_loop_begins_ends_the_program(
-    qapp: QApplication, first: QWidget, arguments: Namespace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As a signal does whose event is handled while keys typed at the start are read."""
-    monkeypatch.setattr(
-        launch, "close_on_signals", lambda window, _: QTimer.singleShot(0, window.close)
-    )
-    entered = []
-    monkeypatch.setattr(qapp, "exec", lambda: entered.append(True))
-    launch.launch(qapp, arguments, first)
-    assert not entered
-    assert arguments.preferences.exists()
 
 
 def test_a_size_is_that_of_the_window_although_it_was_maximized_when_closed(
