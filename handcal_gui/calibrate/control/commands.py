@@ -41,7 +41,7 @@ def connect_panels(
     `on_doubted` is called with a command's name and the reason why its trial may be wrong, or an
     empty one once it may not.
     """
-    panels.link.restart_headset_requested.connect(
+    panels.link.restart_headset.clicked.connect(
         lambda: submit(tr("restart the headset"), Station.restart_headset)
     )
     _connect_fine_tuning(panels, submit)
