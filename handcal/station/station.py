@@ -232,6 +232,7 @@ class Station(Closable):
             views={} if self.trials.comparing.shown else dict(self._views.shown),
             comparing=self.trials.comparing.shown,
             has_compared_both=self.trials.comparing.has_seen_both,
+            trial_eye=next(iter(self.trials.target_E_m), None),
         )
 
     def watch(self, watcher: Callable[[Snapshot], object]) -> None:
