@@ -11,6 +11,7 @@ from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMessageBox
 
+from handcal.calibration.former import may_still_be_worn
 from handcal.calibration.plan import with_eyes
 from handcal.core.errors import FileError
 from handcal.session.session import Session
@@ -37,7 +38,7 @@ from handcal_gui.calibrate.review_page import ReviewPage
 from handcal_gui.calibrate.rotation.panel import RotationPanel
 from handcal_gui.calibrate.session.panel import SessionPanel
 from handcal_gui.calibrate.start.example import copy_example
-from handcal_gui.calibrate.start.start_page import StartPage
+from handcal_gui.calibrate.start.start_page import StartPage, ask_whether_worn
 from handcal_gui.calibrate.trials.panel import TrialsPanel
 from handcal_gui.calibrate.wearer_view.panel import WearerViewPanel
 from handcal_gui.calibrate.window import MainWindow, Page
@@ -122,7 +123,20 @@ class Program(QObject):
         self._run(lambda: Station(followed, wearer, pairings=self._current.pairings))
 
     def resume_session(self, path: Path) -> None:
-        """Resume a session, at the station that was used last or chosen since."""
+        """Resume a session with the headset still on, or begin another one from its result."""
+        try:
+            record = Session.open(path)
+        except FileError as error:
+            self.window.banner.show_message(str(error))
+            return
+        stayed_on: bool | None = True
+        if record.is_solvable:  # or nothing in it depends on how the headset sits
+            stayed_on = may_still_be_worn(record) and ask_whether_worn(self.window, record)
+        if stayed_on is None:
+            return
+        if not stayed_on:
+            self.begin_from(path)
+            return
         if not self._may_leave():
             return
         self.start.keep_entries(self._current)

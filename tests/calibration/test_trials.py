@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -47,8 +48,8 @@ def test_a_trial_does_not_move_the_calibration(
         adjust(stage, trials, eye)
         trials.save(eye, 0.5)
     trials.hide_target()
+    eventually(lambda: all(shows(stage, eye, before_m[eye]) for eye in EYES))
     for eye in EYES:
-        eventually(lambda eye=eye: shows(stage, eye, before_m[eye]))
         np.testing.assert_array_equal(session.contents.applied_shift_m[eye], before_m[eye])
     kept = {eye: one.kind for eye, one in drawn_shifts(session.contents).items()}
     assert set(kept.values()) == {"solved"}
@@ -91,7 +92,7 @@ def test_each_trial_may_start_moved_aside_at_random(stage: Stage, trials: Trials
     for _ in range(3):
         starts.append(stage.calibration.applied_shift_m["left"] - solved_m)
         trials.save("left", 0.5)
-    apart = [np.linalg.norm(one - other) for one, other in zip(starts, starts[1:], strict=False)]
+    apart = [np.linalg.norm(one - other) for one, other in pairwise(starts)]
     assert min(apart) > 1e-4
     assert all(0.0005 < np.linalg.norm(start) < 0.006 for start in starts)
     trials.hide_target()
