@@ -7,8 +7,9 @@ from functools import partial
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QApplication, QDockWidget, QMenu, QWidget
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
+from handcal_gui.app.keys import panel_title
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.window import MainWindow
 
@@ -67,8 +68,7 @@ def _show_target(window: MainWindow, entry: QAction, name: str) -> None:
     entry.setEnabled(action is not None)
     text = _TITLES[name]
     if action is not None:
-        dock = _dock_of(action)
-        text = f"{text}: {dock.windowTitle() if dock is not None else action.text()}"
+        text = f"{text}: {panel_title(action) or action.text()}"
         if has_focus:  # after a tab, so that it is shown only
             native = QKeySequence.SequenceFormat.NativeText
             text = f"{text}\t{action.shortcut().toString(native)}"
@@ -85,9 +85,8 @@ def _target(window: MainWindow, name: str) -> tuple[QAction | None, bool]:
         own = owner.findChild(QAction, name, _OWN) if owner is not None else None
         if own is None or not own.isEnabled():
             continue
-        dock = _dock_of(own)
         # The guide alone hides every panel, not what was deleted by one of its buttons.
-        if window.page == "live" or (dock is not None and dock.toggleViewAction().isEnabled()):
+        if window.page != "start":
             return own, False
     return None, False
 
@@ -102,10 +101,3 @@ def _actions_around(widget: QWidget | None) -> Iterator[QAction]:
     while widget is not None:
         yield from widget.actions()
         widget = widget.parentWidget()
-
-
-def _dock_of(action: QAction) -> QDockWidget | None:
-    owner = action.parent()
-    while owner is not None and not isinstance(owner, QDockWidget):
-        owner = owner.parent()
-    return owner

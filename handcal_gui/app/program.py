@@ -27,21 +27,21 @@ from handcal_gui.app.theme import use_theme
 from handcal_gui.app.translation import tr
 from handcal_gui.calibrate.camera.panel import CameraPanel
 from handcal_gui.calibrate.cloud.panel import CloudPanel
-from handcal_gui.calibrate.control.compare import Comparison
 from handcal_gui.calibrate.control.live import CalibrationController
 from handcal_gui.calibrate.control.review import ReviewController
-from handcal_gui.calibrate.docks import Panels
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
+from handcal_gui.calibrate.guide.view import Action
 from handcal_gui.calibrate.guide.wizard import WizardPanel
 from handcal_gui.calibrate.results.panel import ResultsPanel
 from handcal_gui.calibrate.review_page import ReviewPage
 from handcal_gui.calibrate.rotation.panel import RotationPanel
+from handcal_gui.calibrate.sections import Panels
 from handcal_gui.calibrate.session.panel import SessionPanel
 from handcal_gui.calibrate.start.example import copy_example
 from handcal_gui.calibrate.start.start_page import StartPage, ask_whether_worn
 from handcal_gui.calibrate.trials.panel import TrialsPanel
 from handcal_gui.calibrate.wearer_view.panel import WearerViewPanel
-from handcal_gui.calibrate.window import MainWindow, Page
+from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.connect.link_panel import LinkPanel
 from handcal_gui.manual.window import Manual
 from handcal_gui.widgets.fields import plain_message
@@ -93,9 +93,8 @@ class Program(QObject):
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
         self.manual = Manual(self.window)
         NoAltLetters(self.window)
-        comparison = Comparison(panels.results)
-        self.live = CalibrationController(self.window, self.wizard_panel, comparison)
-        self.review = ReviewController(self.window, review_page, comparison)
+        self.live = CalibrationController(self.window, self.wizard_panel)
+        self.review = ReviewController(self.window, review_page)
         self.windows = SeparateWindows(
             self.window, self.start, self.live, self.review, self._current
         )
@@ -197,12 +196,10 @@ class Program(QObject):
 
     def close(self) -> None:
         """Save the window's layout and end all running work; safe to call twice."""
-        layouts = self.window.layouts()
         self.start.keep_entries(self._current)
         self._current.change(
             geometry=self.window.saveGeometry().toBase64().toStdString(),
-            live_layout=layouts.get("live", ""),
-            review_layout=layouts.get("review", ""),
+            layout=self.window.layout_text(),
             fine_tune_step_m=self.window.panels.fine_tune.step_m,
             hidden_layers=self.window.panels.cloud.hidden_layers,
         )
@@ -226,15 +223,17 @@ class Program(QObject):
         self.windows.manual_wanted.connect(partial(read_manual, self.window, self.manual))
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
-        self.live.export_requested.connect(lambda: self.windows.export())
-        self.live.next_wearer_requested.connect(self._show_next_wearer)
+        self.live.on = {
+            Action.EXPORT: self.windows.export,
+            Action.NEXT_WEARER: self._show_next_wearer,
+            Action.SLIPPED: self._begin_from_shown,
+        }
         self.review.opened.connect(self._current.add_session)
         self.review.failed.connect(self._on_ended)
         review_page.export_requested.connect(lambda: self.windows.export())
         review_page.openxr_requested.connect(lambda: self.windows.use_in_openxr())
         review_page.resume_requested.connect(self._resume_reviewed)
         review_page.again_requested.connect(self._begin_from_shown)
-        self.live.slipped.connect(self._begin_from_shown)
         review_page.close_requested.connect(self.show_start)
         self.wizard_panel.eyes_chosen.connect(lambda eyes: self._current.change(plan=eyes))
         self.wizard_panel.hold_changed.connect(
@@ -244,8 +243,8 @@ class Program(QObject):
             lambda chosen: self._current.change(arrangement=chosen)
         )
         panels = self.window.panels
-        panels.session.export_requested.connect(lambda: self.windows.export())
-        panels.session.inspect_requested.connect(self.windows.inspect)
+        panels.session.export_button.clicked.connect(lambda: self.windows.export())
+        panels.session.inspect_button.clicked.connect(lambda: self.windows.inspect())
         panels.link.new_key_requested.connect(self._renew_key)
         panels.link.connect_requested.connect(self.windows.connect_headset)
         self._current.not_saved.connect(self.window.banner.show_message)
@@ -273,11 +272,7 @@ class Program(QObject):
         add_help_menu(self.window, self.manual, self.windows.make_support_bundle)
 
     def _restore(self) -> Qt.WindowState:
-        """Restore the window as it was left, and return its state, which is set when all is done.
-
-        Of a hidden window that is maximized, Qt keeps each layout of docks that is restored, to
-        apply it later: with tab bars that are deleted meanwhile, which crashed.
-        """
+        """Restore the window as it was left, and return its state, to be set in the end."""
         preferences = self.preferences
         self.window.panels.fine_tune.set_step_m(preferences.fine_tune_step_m)
         self.window.panels.cloud.hide_layers(preferences.hidden_layers)
@@ -287,11 +282,7 @@ class Program(QObject):
             self.window.resize(screen.boundedTo(QSize(*FIRST_SIZE_PX)))
         state = self.window.windowState()
         self.window.setWindowState(Qt.WindowState.WindowNoState)
-        layouts: dict[Page, str] = {
-            "live": preferences.live_layout,
-            "review": preferences.review_layout,
-        }
-        self.window.restore_layouts({page: text for page, text in layouts.items() if text})
+        self.window.restore_layout(preferences.layout)
         self.window.use_arrangement(preferences.arrangement)
         return state
 

@@ -53,7 +53,8 @@ def ask_whether_worn(parent: QWidget, record: SessionRecord) -> bool | None:
     box.addButton(QMessageBox.StandardButton.Cancel)
     box.setDefaultButton(moved)  # which is right in either case
     box.exec()
-    return {worn: True, moved: False}.get(box.clickedButton())
+    clicked = box.clickedButton()
+    return None if clicked not in (worn, moved) else clicked is worn
 
 
 class StartPage(QWidget):
