@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractButton,
-    QAbstractSpinBox,
-    QApplication,
     QComboBox,
-    QLineEdit,
     QMainWindow,
     QMenu,
-    QPlainTextEdit,
-    QTextEdit,
     QWidget,
 )
 
@@ -105,34 +99,6 @@ def keep_focus_off_clicked_buttons(window: QWidget) -> None:
     for button in window.findChildren(QAbstractButton):
         if button.focusPolicy() == Qt.FocusPolicy.StrongFocus:
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-
-
-class NoAltLetters(QObject):
-    """Keeps Alt with a letter that leads nowhere from being typed into the field with the focus.
-
-    On macOS, that key types other characters.
-    """
-
-    def __init__(self, window: QWidget) -> None:
-        super().__init__(window)
-        app = QApplication.instance()
-        if isinstance(app, QApplication) and sys.platform != "darwin":
-            app.focusChanged.connect(self._guard)
-
-    def _guard(self, _old: QWidget | None, new: QWidget | None) -> None:
-        if isinstance(new, QLineEdit | QComboBox | QAbstractSpinBox | QTextEdit | QPlainTextEdit):
-            new.installEventFilter(self)
-
-    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        """Take such a key away, once no shortcut has."""
-        return (
-            isinstance(event, QKeyEvent)
-            and event.type() == QEvent.Type.KeyPress
-            and event.modifiers() & ~Qt.KeyboardModifier.ShiftModifier
-            == Qt.KeyboardModifier.AltModifier
-            and event.text().isprintable()
-            and event.text() != ""
-        )
 
 
 def keys_by_group(window: QMainWindow) -> dict[str, KeyGroup]:

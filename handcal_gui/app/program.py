@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, Qt, QTimer
@@ -18,9 +17,7 @@ from handcal.session.session import Session
 from handcal.station.settings import StationSettings
 from handcal.station.station import Station
 from handcal_gui import FIRST_SIZE_PX
-from handcal_gui.app.edit_menu import add_edit_menu
-from handcal_gui.app.help_menu import add_help_menu, read_manual
-from handcal_gui.app.keys import NoAltLetters
+from handcal_gui.app.menus import add_edit_menu, add_help_menu
 from handcal_gui.app.preferences import CurrentPreferences, Preferences, PreferencesFile
 from handcal_gui.app.separate_windows import SeparateWindows
 from handcal_gui.app.theme import use_theme
@@ -43,7 +40,6 @@ from handcal_gui.calibrate.trials.panel import TrialsPanel
 from handcal_gui.calibrate.wearer_view.panel import WearerViewPanel
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.connect.link_panel import LinkPanel
-from handcal_gui.manual.window import Manual
 from handcal_gui.widgets.fields import plain_message
 from handcal_gui.widgets.sentence import sentence
 
@@ -68,7 +64,6 @@ class Program(QObject):
     review : ReviewController
     start : StartPage
     windows : SeparateWindows
-    manual : Manual
     """
 
     def __init__(self, file: PreferencesFile, remembers: bool = True) -> None:
@@ -91,8 +86,6 @@ class Program(QObject):
         self.wizard_panel = WizardPanel()
         review_page = ReviewPage()
         self.window = MainWindow(self.start, self.wizard_panel, review_page, panels)
-        self.manual = Manual(self.window)
-        NoAltLetters(self.window)
         self.live = CalibrationController(self.window, self.wizard_panel)
         self.review = ReviewController(self.window, review_page)
         self.windows = SeparateWindows(
@@ -220,7 +213,6 @@ class Program(QObject):
         self.start.evaluation_wanted.connect(self.windows.evaluate)
         self.windows.open_requested.connect(self.open_session)
         self.windows.resume_requested.connect(self.resume_session)
-        self.windows.manual_wanted.connect(partial(read_manual, self.window, self.manual))
         self.live.ended.connect(self._on_ended)
         self.live.opened.connect(self._current.add_session)
         self.live.on = {
@@ -245,8 +237,8 @@ class Program(QObject):
         panels = self.window.panels
         panels.session.export_button.clicked.connect(lambda: self.windows.export())
         panels.session.inspect_button.clicked.connect(lambda: self.windows.inspect())
-        panels.link.new_key_requested.connect(self._renew_key)
-        panels.link.connect_requested.connect(self.windows.connect_headset)
+        panels.link.new_key.clicked.connect(self._renew_key)
+        panels.link.connect_headset.clicked.connect(self.windows.connect_headset)
         self._current.not_saved.connect(self.window.banner.show_message)
         self.window.closing.connect(self.close)
         self.window.may_close = self._may_leave
@@ -269,7 +261,7 @@ class Program(QObject):
         add("File", tr("&Quit"), "Ctrl+Q", self.window.close)
         add("View", tr("&Reset layout"), "", self.window.reset_layout)
         add_edit_menu(self.window, self.windows.show_library)
-        add_help_menu(self.window, self.manual, self.windows.make_support_bundle)
+        add_help_menu(self.window, self.windows.make_support_bundle)
 
     def _restore(self) -> Qt.WindowState:
         """Restore the window as it was left, and return its state, to be set in the end."""

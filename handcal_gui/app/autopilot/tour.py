@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QPushButton, Q
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.errors import FileError
 from handcal_gui.app.autopilot.screenshots import Screenshots
-from handcal_gui.app.keys_dialog import KeysDialog
+from handcal_gui.app.manual import show_manual
+from handcal_gui.app.menus import show_keys
 from handcal_gui.app.preferences_dialog import PreferencesDialog
 from handcal_gui.app.program import Program
 from handcal_gui.calibrate.camera.panel import Mode
@@ -119,7 +120,7 @@ class Tour(QObject):
         preferences = PreferencesDialog(program.preferences, program.window)
         shown: dict[str, QDialog] = {
             "preferences": preferences,
-            "keys": KeysDialog(program.window),
+            "keys": show_keys(program.window),
             "camera-settings": CameraSettingsDialog(RealSenseSettings(), program.window),
         }
         for name, one in shown.items():
@@ -158,11 +159,11 @@ class Tour(QObject):
                         self._save(f"{name}-{row + 1}", dialog)
                     yield from self._opened_by_buttons(name, dialog)
             dialog.close()
-        program.manual.open("docs/guide.md")
-        program.manual.search.setText("target")
+        manual = show_manual(program.window, "docs/guide.md")
+        manual.search.setText("target")
         yield _LOOK_MS
-        self._save("manual", program.manual)
-        program.manual.close()
+        self._save("manual", manual)
+        manual.close()
 
     def _opened_by_buttons(self, name: str, dialog: QWidget) -> Walk:
         """Save the dialogs that a page of a window opens, each once."""

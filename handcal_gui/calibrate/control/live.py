@@ -205,7 +205,7 @@ class CalibrationController(QObject):
         panels.session.notes.save = self._save_notes
         panels.trials.fine_tune = panels.fine_tune
         panels.trials.doubted.connect(self._on_doubted)
-        panels.link.restart_headset_requested.connect(
+        panels.link.restart_headset.clicked.connect(
             lambda: self._submit(tr("restart the headset"), Station.restart_headset)
         )
 

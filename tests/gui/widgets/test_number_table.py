@@ -1,12 +1,9 @@
 from __future__ import annotations
 
-from typing import Literal
-
 import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.app.theme import use_theme
 from handcal_gui.widgets.number_table import NumberTable, Row
 
 ROWS = (
@@ -49,28 +46,6 @@ def test_columns_share_the_room_and_cut_no_number_short(qtbot: QtBot) -> None:
         for column, column_px in enumerate(widths_px):
             assert column_px >= table.sizeHintForColumn(column)
     assert sum(widths_px) == pytest.approx(table.viewport().width(), abs=1)
-
-
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_a_stripe_leads_from_a_label_to_its_numbers(
-    qtbot: QtBot, theme: Literal["light", "dark"]
-) -> None:
-    use_theme(theme)
-    try:
-        table = NumberTable("some-numbers", "Some numbers")
-        qtbot.addWidget(table)
-        table.show_rows(("a",), [Row("row", ("1",)) for _ in range(3)])
-        table.resize(900, 200)
-        table.show()
-        image = table.grab().toImage()
-        top_px = table.viewport().y()
-        ys = [top_px + table.rowViewportPosition(row) + 2 for row in range(3)]
-        xs = (table.verticalHeader().x() + 2, table.viewport().x() + 60, table.viewport().x() + 400)
-        shades = [{image.pixelColor(x, y).name() for x in xs} for y in ys]
-        assert all(len(shade) == 1 for shade in shades), "labels and cells are alike"
-        assert shades[0] == shades[2] != shades[1]
-    finally:
-        use_theme("light")
 
 
 def test_last_columns_that_do_not_fit_may_be_in_the_tooltips(qtbot: QtBot) -> None:

@@ -2,12 +2,10 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
-from handcal_gui.app.theme import SPACING_PX, number_font
 from handcal_gui.calibrate.parts.record_tabs import RecordTabs
 from handcal_gui.widgets.record_table import RecordColumn, RecordTable
 from tests.gui.helpers import show
@@ -34,15 +32,6 @@ def test_numbers_stand_on_the_right(table: RecordTable) -> None:
     assert number.data(role) & Qt.AlignmentFlag.AlignRight
     assert what.data(role) & Qt.AlignmentFlag.AlignLeft
     assert number.data(Qt.ItemDataRole.ToolTipRole) == "Number"
-
-
-def test_columns_of_wide_cells_are_apart(qtbot: QtBot) -> None:
-    columns = (RecordColumn("Error", "In arcminutes"), RecordColumn("Time", "Of the recording"))
-    table = show(qtbot, RecordTable("things", "Things", columns, "None"), 300, 200)
-    table.show_rows({1: ("20.7", "08:19:27"), 2: ("1234.7", "08:19:29")})
-    for column, widest in enumerate(("1234.7", "08:19:27")):
-        text_px = QFontMetrics(number_font()).horizontalAdvance(widest)
-        assert table.columnWidth(column) >= text_px + 1.5 * SPACING_PX
 
 
 def test_del_asks_for_the_chosen_thing_by_its_number(qtbot: QtBot, table: RecordTable) -> None:
@@ -118,13 +107,6 @@ def test_columns_that_do_not_fit_are_in_the_tooltip_of_the_row(qtbot: QtBot) -> 
     table.resize(no + name + 10, 200)
     tooltip = table.model().index(0, 0).data(Qt.ItemDataRole.ToolTipRole)
     assert tooltip == "Number\n\nSize mm: 1.25"
-
-
-def test_a_row_with_two_lines_is_higher(table: RecordTable) -> None:
-    table.show_rows({1: ("1", "left\nright"), 2: ("2", "left")})
-    assert table.rowHeight(0) >= table.rowHeight(1) + table.fontMetrics().height()
-    table.show_rows({1: ("1", "left"), 2: ("2", "left")})
-    assert table.rowHeight(0) == table.rowHeight(1)
 
 
 def test_delete_in_the_corner_of_tabs_deletes_in_the_table_shown_and_has_no_menu(

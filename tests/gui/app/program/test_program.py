@@ -368,7 +368,7 @@ def test_a_new_pairing_key_is_made_only_after_a_question(
     key = file.pairings().open_key()
     button = getattr(QMessageBox.StandardButton, answer)
     monkeypatch.setattr(QMessageBox, "question", lambda *_: button)
-    technician.program.window.panels.link.new_key_requested.emit()
+    technician.program.window.panels.link.new_key.click()
     assert (file.pairings().open_key() == key) == (answer == "No")
     assert ("new pairing key" in technician.banner) == (answer == "Yes")
 
