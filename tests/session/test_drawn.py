@@ -13,7 +13,10 @@ from handcal.session.drawn import drawn_shifts
 from handcal.session.session import Session, SessionRecord
 from handcal.session.state import WENT_BACK
 
-SOLVED_M = {"left": np.array([0.001, 0.002, -0.003]), "right": np.array([-0.001, 0.0, 0.004])}
+SOLVED_M: dict[Eye, Float64] = {
+    "left": np.array([0.001, 0.002, -0.003]),
+    "right": np.array([-0.001, 0.0, 0.004]),
+}
 OFFLINE_M = np.zeros(3)
 
 
