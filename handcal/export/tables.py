@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -79,21 +79,47 @@ _COMPARISONS = (
 )
 
 
-def write_parameters(path: Path, outcome: SessionOutcome) -> None:
-    """Write each eye's φ: a row for every alignment, and one for every known φ of all of them.
+_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "parameters.csv": _PARAMETERS,
+    "trials.csv": _TRIALS,
+    "comparisons.csv": _COMPARISONS,
+}
+TableRow: TypeAlias = Mapping[str, Any]
 
-    Exactly one row of each eye is final. Columns: docs/export.md.
+
+def table_rows(outcome: SessionOutcome) -> dict[str, list[TableRow]]:
+    """Return the rows of each table of a session, by its file; columns: docs/export.md."""
+    record = outcome.record
+    whose = {
+        "session": outcome.name,
+        "wearer": record.wearer,
+        "begun_utc": outcome.started,
+        "simulated": record.simulated,
+    }
+    tables = {
+        "parameters.csv": parameter_rows(outcome),
+        "trials.csv": corner_rows(record.trials),
+        "comparisons.csv": _comparison_rows(read_comparisons(record.events)),
+    }
+    return {name: [{**whose, **row} for row in rows] for name, rows in tables.items()}
+
+
+def write_tables(folder: Path, tables: Mapping[str, Iterable[TableRow]]) -> None:
+    """Write the tables of one session or several, as `table_rows` gives them.
+
+    Blinded comparisons are written only if there are any. FileError if a file cannot be written.
     """
-    _write(path, _PARAMETERS, outcome, parameter_rows(outcome))
-
-
-def write_trials(path: Path, outcome: SessionOutcome) -> None:
-    """Write the user test: a row for every corner of every trial; columns: docs/export.md."""
-    _write(path, _TRIALS, outcome, corner_rows(outcome.record.trials))
+    for name, columns in _COLUMNS.items():
+        rows = list(tables[name])
+        if rows or name != "comparisons.csv":
+            write_atomic(folder / name, rows_csv(rows, columns))
 
 
 def parameter_rows(outcome: SessionOutcome) -> Iterator[dict[str, Any]]:
-    """Yield a row for every φ of each eye."""
+    """Yield a row for each eye of each alignment, and one for each known φ of each eye.
+
+    Exactly one row of each eye is final.
+    """
     record, results = outcome.record, outcome.results
     if results is not None:
         for number, shifts in results.alignments.items():
@@ -170,13 +196,6 @@ def _registered(shift: EyeShift) -> dict[str, Any]:
     }
 
 
-def write_comparisons(path: Path, outcome: SessionOutcome) -> None:
-    """Write the blinded comparisons, if there are any; FileError if they cannot be written."""
-    comparisons = read_comparisons(outcome.record.events)
-    if comparisons:
-        _write(path, _COMPARISONS, outcome, _comparison_rows(comparisons))
-
-
 def _comparison_rows(comparisons: Sequence[Comparison]) -> Iterator[dict[str, Any]]:
     for number, one in enumerate(comparisons, 1):
         yield {
@@ -224,20 +243,3 @@ def _triple(name: str, values: Float64) -> dict[str, float]:
 
 def _yes(truth: bool) -> str:
     return "yes" if truth else "no"
-
-
-def _write(
-    path: Path, columns: tuple[str, ...], outcome: SessionOutcome, rows: Iterable[Mapping[str, Any]]
-) -> None:
-    write_atomic(path, rows_csv(({**whose(outcome), **row} for row in rows), columns))
-
-
-def whose(outcome: SessionOutcome) -> dict[str, str]:
-    """Return the first cells of every row of a session."""
-    record = outcome.record
-    return {
-        "session": outcome.name,
-        "wearer": record.wearer,
-        "begun_utc": outcome.started,
-        "simulated": record.simulated,
-    }

@@ -25,7 +25,7 @@ from handcal.export.calibration_file import write_calibration_json, write_calibr
 from handcal.export.definitions import DEFINITIONS
 from handcal.export.outcome import SessionOutcome, load_outcome
 from handcal.export.report import session_report
-from handcal.export.tables import write_parameters
+from handcal.export.tables import table_rows, write_tables
 from handcal.export.tools import write_openxr, write_unity
 from handcal.register.benefit import expected_error_arcmin
 from handcal.register.verdict_words import VERDICT_WORDS
@@ -128,8 +128,8 @@ def test_the_answer_comes_first_and_agrees_with_the_files(
     report = session_report(outcome)
     answer = report.sections[0].items[0]
     assert isinstance(answer, Table)
-    write_parameters(tmp_path / "p.csv", outcome)
-    with (tmp_path / "p.csv").open(encoding="utf-8", newline="") as file:
+    write_tables(tmp_path, table_rows(outcome))
+    with (tmp_path / "parameters.csv").open(encoding="utf-8", newline="") as file:
         finals = [row for row in csv.DictReader(file) if row["final"] == "yes"]
     for cells, row in zip(answer.rows, finals, strict=True):
         assert cells[0] == row["eye"]
@@ -195,9 +195,9 @@ def test_everything_says_what_was_simulated(tmp_path: Path, empty: SessionRecord
         write_unity(tmp_path / "u.json", outcome, 0.1, 10.0)
         write_openxr(tmp_path / "x.json", outcome)
         write_calibration_yaml(tmp_path / "c.yaml", outcome)
-        write_parameters(tmp_path / "p.csv", outcome)
+        write_tables(tmp_path, table_rows(outcome))
         storage = cv2.FileStorage(str(tmp_path / "c.yaml"), cv2.FILE_STORAGE_READ)
-        with (tmp_path / "p.csv").open(encoding="utf-8", newline="") as file:
+        with (tmp_path / "parameters.csv").open(encoding="utf-8", newline="") as file:
             told = {row["simulated"] for row in csv.DictReader(file)}
         told.add(storage.getNode("simulated").string())
         for name in "cux":

@@ -13,7 +13,7 @@ import pytest
 from handcal.core.types import EYES
 from handcal.export.calibration_file import write_calibration_json
 from handcal.export.outcome import SessionOutcome, load_outcome
-from handcal.export.tables import write_comparisons, write_parameters, write_trials
+from handcal.export.tables import table_rows, write_tables
 from handcal.session.comparison import COMPARED, Comparison, comparison_json
 from handcal.session.drawn import DrawnShift
 from handcal.session.journal import Event
@@ -38,8 +38,8 @@ def triple(row: dict[str, str], name: str) -> list[float]:
 
 
 def parameters(path: Path, outcome: SessionOutcome) -> list[dict[str, str]]:
-    write_parameters(path / "p.csv", outcome)
-    return read(path / "p.csv")
+    write_tables(path, table_rows(outcome))
+    return read(path / "parameters.csv")
 
 
 def test_parameters_hold_each_eye_of_each_alignment_and_every_known_shift(
@@ -134,8 +134,8 @@ def test_verifications_alone_have_no_numbers_of_a_registration(
 
 
 def test_trials_hold_every_corner(tmp_path: Path, outcome: SessionOutcome) -> None:
-    write_trials(tmp_path / "t.csv", outcome)
-    rows = read(tmp_path / "t.csv")
+    write_tables(tmp_path, table_rows(outcome))
+    rows = read(tmp_path / "trials.csv")
     trials = outcome.record.trials
     assert len(rows) == 4 * len(trials)
     row, trial = rows[4 * 2 + 3], trials[3]
@@ -150,22 +150,19 @@ def test_rows_end_as_the_standard_says_and_hostile_texts_stay_texts(
     tmp_path: Path, outcome: SessionOutcome
 ) -> None:
     wearer = 'a,"b"\r\n=1+1 φ'
-    write_trials(
-        tmp_path / "t.csv", replace(outcome, record=replace(outcome.record, wearer=wearer))
-    )
-    content = (tmp_path / "t.csv").read_bytes()
+    named = replace(outcome, record=replace(outcome.record, wearer=wearer))
+    write_tables(tmp_path, table_rows(named))
+    content = (tmp_path / "trials.csv").read_bytes()
     assert not content.startswith(b"\xef\xbb\xbf")
     assert content.endswith(b"\r\n")
-    assert {row["wearer"] for row in read(tmp_path / "t.csv")} == {wearer}
+    assert {row["wearer"] for row in read(tmp_path / "trials.csv")} == {wearer}
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
 def test_no_text_becomes_a_formula(tmp_path: Path, outcome: SessionOutcome, start: str) -> None:
     wearer = f'{start}HYPERLINK("x")'
-    write_parameters(
-        tmp_path / "p.csv", replace(outcome, record=replace(outcome.record, wearer=wearer))
-    )
-    assert {row["wearer"] for row in read(tmp_path / "p.csv")} == {f"'{wearer}"}
+    named = replace(outcome, record=replace(outcome.record, wearer=wearer))
+    assert {row["wearer"] for row in parameters(tmp_path, named)} == {f"'{wearer}"}
 
 
 def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: SessionOutcome) -> None:
@@ -177,10 +174,10 @@ def test_a_negative_number_stays_a_number(tmp_path: Path, outcome: SessionOutcom
 def test_comparisons_tell_the_order_and_are_only_written_if_there_are_any(
     tmp_path: Path, outcome: SessionOutcome
 ) -> None:
-    write_comparisons(tmp_path / "none.csv", outcome)
-    assert not (tmp_path / "none.csv").exists()
-    write_comparisons(tmp_path / "c.csv", compared(outcome))
-    (row,) = read(tmp_path / "c.csv")
+    write_tables(tmp_path, table_rows(outcome))
+    assert not (tmp_path / "comparisons.csv").exists()
+    write_tables(tmp_path, table_rows(compared(outcome)))
+    (row,) = read(tmp_path / "comparisons.csv")
     assert (row["first"], row["answer"], row["better"]) == ("applied", "second", "offline")
     assert triple(row, "left_phi{}_mm") == [1.0, 2.0, 3.0]
     assert row["right_phi1_mm"] == ""
