@@ -37,8 +37,8 @@ from handcal_gui.widgets.action_strip import action_strip
 from handcal_gui.widgets.fields import button, label_for, main_button, paragraph, with_name
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
 _RIG_FILES = tr("Rig files (*.yaml *.yml)")
@@ -65,9 +65,9 @@ class ResultPage(QWidget):
             "rigNameProblem", tr("Enter a name of printable characters, to save the rig.")
         )
         self._findings = FindingList(tr("Check of the rig"))
-        self._numbers = NumberTable("numbers-of-the-rig", tr("Numbers of the rig"))
+        self._numbers = Table("numbers-of-the-rig", tr("Numbers of the rig"))
         self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
-        self._differences = NumberTable("differences", tr("Differences"))
+        self._differences = Table("differences", tr("Differences"))
         self._compared = FindingLine("compared")
         self._end = FindingLine("savedRig")
         self.main = main_button("saveRig", tr("&Save rig file…"))

@@ -21,8 +21,8 @@ from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import with_name
 from handcal_gui.widgets.job_bar import show_share
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
-from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.result_rows import comparison_rows
+from handcal_gui.widgets.table import Table
 
 _MEANINGS: Mapping[Method, str] = {
     "paper": tr("as published by Hu et al. 2021; slow."),
@@ -38,7 +38,7 @@ class CompareTab(QWidget):
 
     Attributes
     ----------
-    table : NumberTable
+    table : Table
     requested : Signal(str)
         The method to solve the same alignments with.
     cancelled : Signal()
@@ -52,7 +52,7 @@ class CompareTab(QWidget):
         super().__init__(parent)
         self.setObjectName("comparison")
         self._results: Results | None = None
-        self.table = NumberTable("comparison-of-methods", tr("Comparison of methods"), wraps=True)
+        self.table = Table("comparison-of-methods", tr("Comparison of methods"))
         keep_space(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")

@@ -11,9 +11,9 @@ from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import vbox
-from handcal_gui.widgets.number_table import NumberTable, Row
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import EYE_NAMES
+from handcal_gui.widgets.table import Row, Table
 
 _MEANING = tr(
     "Expected error in arcminutes; bars and brackets hold 95 %. Dashed: without the calibration. "
@@ -39,7 +39,7 @@ class DistanceTab(QWidget):
         self.plot.show_legend()
         ticks = [(float(np.log10(one)), f"{one:g}") for one in DISTANCES_M if one not in (0.4, 0.6)]
         self.plot.item.getAxis("bottom").setTicks([ticks])
-        self.table = NumberTable("error-by-distance-table", tr("Error against distance"))
+        self.table = Table("error-by-distance-table", tr("Error against distance"))
         meaning = paragraph("", _MEANING)
         meaning.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
         vbox((self.plot, 1), (self.table, 1), meaning, on=self, margins=0, spacing=0)

@@ -26,7 +26,6 @@ from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.fields import paragraph
 from handcal_gui.widgets.layouts import fit_soon, hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable, rows_as_text
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
     PHI,
@@ -36,6 +35,7 @@ from handcal_gui.widgets.result_rows import (
     trial_row,
     verdict_rows,
 )
+from handcal_gui.widgets.table import Table, rows_as_text
 
 _EMPTY = tr(
     "Nothing is solved yet.\n\nEach eye's position, its uncertainty and the verdict appear here "
@@ -72,12 +72,10 @@ class ResultsPanel(QWidget):
         self._trials: Mapping[int, Trial] = {}
         self._judged: Mapping[Eye, EyeTrials] = {}
         self._cards = {eye: VerdictCard(eye) for eye in EYES}
-        self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
+        self._numbers = Table("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = ConvergencePlot()
         self._residuals = ResidualsTab()
-        self._alignments = NumberTable(
-            "each-alignment-alone", tr("Each alignment alone"), wraps=True
-        )
+        self._alignments = Table("each-alignment-alone", tr("Each alignment alone"))
         self._another = QLabel()
         self._another.setWordWrap(True)
         self._distances = DistanceTab()
@@ -175,7 +173,7 @@ class ResultsPanel(QWidget):
         rows = verdict_rows(self._results, self._judged)
         verdicts = rows_as_text((tr("Verdict"), tr("Reason")), rows)
         tables = self._numbers, self._alignments, self._distances.table, self._compare.table
-        return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
+        return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.keys)])
 
     def _fit(self) -> None:
         """Show the reasons of the verdicts only where the numbers fit below them."""

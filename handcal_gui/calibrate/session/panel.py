@@ -28,7 +28,6 @@ from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.opening import open_path
-from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
     TRIAL_COLUMNS,
@@ -37,6 +36,7 @@ from handcal_gui.widgets.session_rows import (
     trial_rows,
     trials_id,
 )
+from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
 _EYE_DISTANCE_HELP = tr(
@@ -80,20 +80,20 @@ class SessionPanel(QWidget):
         )
         self._eye_distance.editingFinished.connect(self._take_eye_distance)
         self._eye_distance_problem = paragraph("eyeDistanceProblem")
-        self._alignments = RecordTable(
+        self._alignments = Table(
             "alignments",
             tr("Alignments"),
-            ALIGNMENT_COLUMNS,
             tr("Confirmed alignments appear here once they are written"),
+            "one",
         )
-        self._alignments.delete_requested.connect(partial(self.delete_requested.emit, "alignment"))
-        self._trials = RecordTable(
+        self._alignments.offer_delete(partial(self.delete_requested.emit, "alignment"))
+        self._trials = Table(
             "trials-of-the-session",
             tr("Trials of the session"),
-            TRIAL_COLUMNS,
             tr("Recorded trials appear here"),
+            "one",
         )
-        self._trials.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
+        self._trials.offer_delete(partial(self.delete_requested.emit, "trial"))
         self._notes = NotesEditor()
         self._notes.changed.connect(self.notes_changed)
         self._unwritten = paragraph("unwritten")
@@ -133,9 +133,9 @@ class SessionPanel(QWidget):
         before, self._record, self._results = self._record, record, results
         if before is None or before.path != record.path:
             self._eye_distance.setModified(False)
-        self._alignments.show_rows(alignment_rows(record, results))
+        self._alignments.show_rows(ALIGNMENT_COLUMNS, alignment_rows(record, results))
         if before is None or trials_id(before) != trials_id(record):
-            self._trials.show_rows(trial_rows(record))
+            self._trials.show_rows(TRIAL_COLUMNS, trial_rows(record))
         self._notes.show_saved(record.path, record.notes)
         self._unwritten.hide()
         self._refresh()

@@ -31,8 +31,6 @@ from handcal_gui.calibrate.trials.trial_plot import TrialPlot
 from handcal_gui.widgets.fields import let_keys_choose, paragraph
 from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable
-from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.widgets.session_rows import (
     STATISTICS_COLUMNS,
@@ -43,6 +41,7 @@ from handcal_gui.widgets.session_rows import (
     trial_rows,
     trials_id,
 )
+from handcal_gui.widgets.table import Table
 
 _WHAT = tr(
     "A trial is the error of the calibrated φ relative to the φ with which the drawn target covers "
@@ -122,13 +121,11 @@ class TrialsPanel(QWidget):
         self._hint = paragraph("trialsHint", _WHAT)
         self._message = paragraph("message")
         self._summary = paragraph("summary")
-        self._table = RecordTable(
-            "trials", tr("Trials"), TRIAL_COLUMNS, tr("Trials appear here as they are recorded")
+        self._table = Table(
+            "trials", tr("Trials"), tr("Trials appear here as they are recorded"), "one"
         )
-        self._table.delete_requested.connect(partial(self.delete_requested.emit, "trial"))
-        self._statistics = NumberTable(
-            "statistics-of-trials", tr("Statistics of trials"), hides=True
-        )
+        self._table.offer_delete(partial(self.delete_requested.emit, "trial"))
+        self._statistics = Table("statistics-of-trials", tr("Statistics of trials"))
         self._plot = TrialPlot()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
@@ -150,7 +147,7 @@ class TrialsPanel(QWidget):
         before, self._record = self._record, record
         self._compared = len(read_comparisons(record.events))
         if before is None or trials_id(before) != trials_id(record):
-            self._table.show_rows(trial_rows(record))
+            self._table.show_rows(TRIAL_COLUMNS, trial_rows(record))
             self._summary.setText(statistics_text(record.trials))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
             self._plot.show_trials(record.trials)

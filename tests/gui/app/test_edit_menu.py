@@ -19,7 +19,7 @@ from handcal_gui.app.program import Program
 from handcal_gui.calibrate.guide.wizard import WizardPanel
 from handcal_gui.calibrate.window import MainWindow
 from handcal_gui.library.window import LibraryWindow
-from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child
 from tests.gui.views import NUDGED, begun
 
@@ -59,7 +59,7 @@ def test_a_deletion_is_chosen_in_the_table_and_undone_from_anywhere(
     session = window.panels.session
     session.show_record(record, results)
     window.go_to("session")
-    table = child(session, RecordTable, "alignments")
+    table = child(session, Table, "alignments")
     table.selectRow(1)
     assert "edit-delete" not in offered(window), "the selection is not what the focus is on"
     table.setFocus()

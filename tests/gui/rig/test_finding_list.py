@@ -13,7 +13,7 @@ from handcal.rig.verdict import CalibrationVerdict
 from handcal_gui.rig.finding_list import FindingList
 from handcal_gui.rig.solve import SolvedPart
 from handcal_gui.rig.solve_box import SolveBox
-from handcal_gui.widgets.number_table import NumberTable, Row
+from handcal_gui.widgets.table import Row, Table
 from handcal_gui.widgets.times import local_time
 from tests.gui.helpers import child, height_px, show
 
@@ -90,8 +90,8 @@ def test_the_lenses_compared_are_whole_beside_the_numbers(qtbot: QtBot) -> None:
     solved = SolvedPart(CalibrationVerdict("good", "as told"), found, {}, lenses=fits)
     box.show_solved(solved, "it is used")
     QApplication.processEvents()
-    for table in (box.table, child(numbers, NumberTable, "lenses")):
+    for table in (box.table, child(numbers, Table, "lenses")):
         assert table.isVisible()
         assert table.horizontalScrollBar().maximum() == table.verticalScrollBar().maximum() == 0
     box.show_solved(replace(solved, lenses=()), "it is used")
-    assert not child(numbers, NumberTable, "lenses").isVisible()
+    assert not child(numbers, Table, "lenses").isVisible()
