@@ -1,4 +1,4 @@
-"""Which φ the headset draws with, and the export calls final: one answer for whoever asks."""
+"""The φ of each eye that the headset draws with, and that the export calls final."""
 
 from __future__ import annotations
 

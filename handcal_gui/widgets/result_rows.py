@@ -16,9 +16,9 @@ from handcal.session.judged_trials import EyeTrials, is_doubted
 from handcal.session.record import SessionRecord
 from handcal.session.trial import SAME_SHIFT_M, Trial
 from handcal_gui.app.translation import tr
-from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Row
 
 EYE_NAMES: Mapping[Eye, str] = {"left": tr("Left eye"), "right": tr("Right eye")}
 _SYMBOLS: Mapping[VerdictName, str] = {

@@ -1,4 +1,4 @@
-"""Which φ is final: by what the headset was told, in one word."""
+"""The final φ, by what the headset was told, in one word."""
 
 from __future__ import annotations
 

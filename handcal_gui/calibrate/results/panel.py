@@ -37,7 +37,6 @@ from handcal_gui.widgets.brief import copy_text
 from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.job_bar import show_share
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
-from handcal_gui.widgets.number_table import NumberTable, Row, rows_as_text
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import (
     EYE_NAMES,
@@ -49,6 +48,7 @@ from handcal_gui.widgets.result_rows import (
     trial_row,
     verdict_rows,
 )
+from handcal_gui.widgets.table import Row, Table, rows_as_text
 
 _EMPTY = tr(
     "Nothing is solved yet.\n\nEach eye's position, its uncertainty and the verdict appear here "
@@ -108,12 +108,10 @@ class ResultsPanel(QWidget):
         self._record: SessionRecord | None = None
         self._target_arcmin = 0.0
         self._card = ResultCard()
-        self._numbers = NumberTable("numbers-of-both-eyes", tr("Numbers of both eyes"))
+        self._numbers = Table("numbers-of-both-eyes", tr("Numbers of both eyes"))
         self._convergence = _ConvergencePlot()
         self._residuals = ResidualsTab()
-        self._alignments = NumberTable(
-            "each-alignment-alone", tr("Each alignment alone"), wraps=True
-        )
+        self._alignments = Table("each-alignment-alone", tr("Each alignment alone"))
         self._another = QLabel()
         self._another.setWordWrap(True)
         self._distances = _DistanceTab()
@@ -174,7 +172,7 @@ class ResultsPanel(QWidget):
         rows = verdict_rows(self._results, judged)
         verdicts = rows_as_text((tr("Verdict"), tr("Reason")), rows)
         tables = self._numbers, self._alignments, self._distances.table, self.comparison.table
-        return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.rowCount())])
+        return "\n\n".join([verdicts, *(table.as_text() for table in tables if table.keys)])
 
     def _add_copy(self) -> None:
         self._copy = add_action(
@@ -255,7 +253,7 @@ class _DistanceTab(QWidget):
         self.plot.show_legend()
         ticks = [(float(np.log10(one)), f"{one:g}") for one in DISTANCES_M if one not in (0.4, 0.6)]
         self.plot.item.getAxis("bottom").setTicks([ticks])
-        self.table = NumberTable("error-by-distance-table", tr("Error against distance"))
+        self.table = Table("error-by-distance-table", tr("Error against distance"))
         meaning = paragraph("", _DISTANCES)
         meaning.setContentsMargins(SPACING_PX, 0, SPACING_PX, SPACING_PX // 2)
         vbox((self.plot, 1), (self.table, 1), meaning, on=self, margins=0, spacing=0)
@@ -361,7 +359,7 @@ class _CompareTab(QWidget):
 
     Attributes
     ----------
-    table : NumberTable
+    table : Table
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -371,7 +369,7 @@ class _CompareTab(QWidget):
         self._record: SessionRecord | None = None
         self._settings = SolveSettings()
         self._job: Job | None = None
-        self.table = NumberTable("comparison-of-methods", tr("Comparison of methods"), wraps=True)
+        self.table = Table("comparison-of-methods", tr("Comparison of methods"))
         keep_space(self.table)
         self._methods = QComboBox()
         self._methods.setObjectName("comparison-method")

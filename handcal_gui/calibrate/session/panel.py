@@ -31,12 +31,12 @@ from handcal_gui.widgets.fields import paragraph, with_name
 from handcal_gui.widgets.layouts import hbox, keep_space, vbox
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.opening import open_path
-from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.session_rows import (
     ALIGNMENT_COLUMNS,
     alignment_rows,
     deletions,
 )
+from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
 _EYE_DISTANCE_HELP = tr(
@@ -75,13 +75,13 @@ class SessionPanel(QWidget):
         )
         self._eye_distance.editingFinished.connect(self._take_eye_distance)
         self._eye_distance_problem = paragraph("eyeDistanceProblem")
-        self._alignments = RecordTable(
+        self._alignments = Table(
             "alignments",
             tr("Alignments"),
-            ALIGNMENT_COLUMNS,
             tr("Confirmed alignments appear here once they are written"),
+            "one",
         )
-        self._alignments.delete_requested.connect(
+        self._alignments.offer_delete(
             lambda number: self.submit(
                 tr("delete the alignment"), lambda s: s.delete("alignment", number)
             )
@@ -126,7 +126,7 @@ class SessionPanel(QWidget):
         before, self._record, self._results = self._record, record, results
         if before is None or before.path != record.path:
             self._eye_distance.setModified(False)
-        self._alignments.show_rows(alignment_rows(record, results))
+        self._alignments.show_rows(ALIGNMENT_COLUMNS, alignment_rows(record, results))
         self.notes.show_saved(record.path, record.notes)
         self._unwritten.hide()
         self._refresh()

@@ -29,8 +29,6 @@ from handcal_gui.engine.engine_thread import Submit, no_engine
 from handcal_gui.widgets.fields import let_keys_choose, paragraph, whole_number
 from handcal_gui.widgets.key_cap import KeyCap
 from handcal_gui.widgets.layouts import hbox, vbox
-from handcal_gui.widgets.number_table import NumberTable
-from handcal_gui.widgets.record_table import RecordTable
 from handcal_gui.widgets.result_rows import EYE_NAMES
 from handcal_gui.widgets.session_rows import (
     STATISTICS_COLUMNS,
@@ -41,6 +39,7 @@ from handcal_gui.widgets.session_rows import (
     trial_rows,
     trials_id,
 )
+from handcal_gui.widgets.table import Table
 
 if TYPE_CHECKING:
     from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
@@ -124,15 +123,13 @@ class TrialsPanel(QWidget):
         self._hint = paragraph("trialsHint", _MEANING)
         self._message = paragraph("message")
         self._summary = paragraph("summary")
-        self._table = RecordTable(
-            "trials", tr("Trials"), TRIAL_COLUMNS, tr("Trials appear here as they are recorded")
+        self._table = Table(
+            "trials", tr("Trials"), tr("Trials appear here as they are recorded"), "one"
         )
-        self._table.delete_requested.connect(
+        self._table.offer_delete(
             lambda number: self.submit(tr("delete the trial"), lambda s: s.delete("trial", number))
         )
-        self._statistics = NumberTable(
-            "statistics-of-trials", tr("Statistics of trials"), hides=True
-        )
+        self._statistics = Table("statistics-of-trials", tr("Statistics of trials"))
         self._plot = TrialPlot()
         self._strip = UndoStrip(self)
         self._strip.restore_requested.connect(
@@ -160,7 +157,7 @@ class TrialsPanel(QWidget):
         """Show the trials of a session."""
         before, self._record = self._record, record
         if before is None or trials_id(before) != trials_id(record):
-            self._table.show_rows(trial_rows(record))
+            self._table.show_rows(TRIAL_COLUMNS, trial_rows(record))
             self._statistics.show_rows(STATISTICS_COLUMNS, statistics_rows(record.trials))
             self._plot.show_trials(record.trials)
         found = statistics_text(record.trials), comparisons_text(record)

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
+from handcal_gui.calibrate.fine_tune.history import Shifts
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
 from handcal.core.types import Rig
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.history import Shifts
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
 from tests.gui.calibrate.fine_tune.controls import Show
 

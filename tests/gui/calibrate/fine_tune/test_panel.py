@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from handcal_gui.calibrate.fine_tune.history import Shifts
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
@@ -30,7 +31,6 @@ from handcal.register.results import Results, results_json
 from handcal.session.record import SessionRecord
 from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.history import Shifts
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
 from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS
 from handcal_gui.calibrate.trials.panel import TrialsPanel

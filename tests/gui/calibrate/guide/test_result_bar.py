@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from handcal_gui.calibrate.guide.result_bar import ResultBar
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtPrintSupport import QPrinter
@@ -19,7 +20,6 @@ from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.calibrate.guide.picture import GuidePicture
-from handcal_gui.calibrate.guide.result_bar import ResultBar
 from handcal_gui.calibrate.guide.view import Step
 from handcal_gui.calibrate.parts.legend import LegendEntry
 from handcal_gui.calibrate.wearer_view.eye_canvas import EyeCanvas

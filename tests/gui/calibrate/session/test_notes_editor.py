@@ -3,12 +3,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from handcal_gui.calibrate.session.notes_editor import SAVE_MS, NotesEditor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPlainTextEdit
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import MAX_NOTES_CHARACTERS
-from handcal_gui.calibrate.session.notes_editor import SAVE_MS, NotesEditor
 
 ONE, OTHER = Path("one"), Path("other")
 
