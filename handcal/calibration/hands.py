@@ -9,7 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from handcal.core.errors import HandError, OutOfViewError, PoseError, PosePendingError
+from handcal.core.errors import (
+    HandError,
+    NoFrameError,
+    OutOfViewError,
+    PoseError,
+    PosePendingError,
+)
 from handcal.core.geometry import invert, rotation_vector, transform
 from handcal.core.types import Float64, HandCloud
 from handcal.register.rigid import RigidSettings, motion_covariance, register_rigid
@@ -72,6 +78,7 @@ class RecentHands:
         self._unplaced: deque[tuple[HandCloud, int, Float64 | None]] = deque()
         self._missed: deque[tuple[int, HandError]] = deque()
         self._seen_ns = 0
+        self._frames_ns: deque[int] = deque()
 
     def add(
         self,
@@ -91,6 +98,7 @@ class RecentHands:
             The newest hand placed now, and the reason if none was.
         """
         self._seen_ns = t_host_ns
+        self._frames_ns.append(t_host_ns)
         if cloud is not None:
             self._unplaced.append((cloud, t_host_ns, T_W_D))
         elif missed_for is not None:
@@ -152,13 +160,16 @@ class RecentHands:
     def nearest(self, t_host_ns: int) -> PlacedHand:
         """Return the hand nearest in time; HandError if none is within `MATCH_NS`.
 
-        OutOfViewError if the camera saw only a part of it then.
+        NoFrameError if there is no frame of that time either, and OutOfViewError if the camera saw
+        only a part of the hand then.
         """
         near = [hand for hand in self._placed if abs(hand.t_host_ns - t_host_ns) <= MATCH_NS]
         if not near:
             missed = min(self._missed, key=lambda one: abs(one[0] - t_host_ns), default=(0, None))
             if isinstance(missed[1], OutOfViewError):
                 raise OutOfViewError(*missed[1].args)  # the stored one must hold no traceback
+            if all(abs(frame_ns - t_host_ns) > MATCH_NS for frame_ns in self._frames_ns):
+                raise NoFrameError("No camera image is of that moment: too few arrive")
             raise HandError("The camera did not see your hand")
         return min(near, key=lambda hand: abs(hand.t_host_ns - t_host_ns))
 
@@ -198,6 +209,8 @@ class RecentHands:
             self._unplaced.popleft()
         while self._missed and self._missed[0][0] < oldest_ns:
             self._missed.popleft()
+        while self._frames_ns and self._frames_ns[0] < oldest_ns:
+            self._frames_ns.popleft()
 
 
 # More frames take longer than the time between two frames, and lower the noise little.

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import sys
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 
@@ -18,7 +20,11 @@ from handcal.export.clouds import write_clouds
 from handcal.export.formats import FORMATS, TOOL_FORMATS, Format
 from handcal.export.north_star import write_northstar
 from handcal.export.outcome import SessionOutcome, load_outcome
-from handcal.export.tables import write_comparisons, write_parameters, write_trials
+from handcal.export.tables import (
+    TableRow,
+    table_rows,
+    write_tables,
+)
 from handcal.export.tools import (
     write_calibration_json,
     write_calibration_yaml,
@@ -26,13 +32,16 @@ from handcal.export.tools import (
     write_slicer,
     write_unity,
 )
+from handcal.export.wearers import summarise_wearers, summary_rows, wearers_report
 from handcal.io.closable import Closable
-from handcal.io.files import make_folder, open_no_link, refuse_links, sync_folder
+from handcal.io.files import make_folder, open_no_link, refuse_links, sync_folder, write_atomic
 from handcal.io.lock import FileLock
+from handcal.report.cells import rows_csv
 from handcal.session.journal import JOURNAL_END
 from handcal.session.session import Session, SessionRecord
 
 _ALL = {**FORMATS, **TOOL_FORMATS}
+_NAME_CHARACTERS = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +71,7 @@ def export_session(
     folder: Path,
     settings: ExportSettings,
     progress: Progress = Progress(),
+    collect: Callable[[SessionOutcome], object] = lambda _: None,
 ) -> tuple[Path, ...]:
     """Export a session into a folder, and return the files.
 
@@ -76,6 +86,8 @@ def export_session(
     settings : ExportSettings
     progress : Progress
         Reported to many times a second; while solving, before each alignment.
+    collect : callable, optional
+        Called with the session's outcome once its files are in place.
 
     Raises
     ------
@@ -92,7 +104,19 @@ def export_session(
             part.at(0.0)
             _write(name, outcome, staging.path, folder, settings, part)
         progress.at(1.0, "Moving the files in place")
-        return staging.publish([pattern for name in formats for pattern in _ALL[name].patterns])
+        files = staging.publish([pattern for name in formats for pattern in _ALL[name].patterns])
+    collect(outcome)
+    return files
+
+
+def export_name(record: SessionRecord) -> str:
+    """Return the name of the folder for a session's files: begun, local time, and the wearer."""
+    try:
+        begun = datetime.fromisoformat(record.events[0].time).astimezone()
+    except (ValueError, OverflowError):  # of a damaged journal
+        return record.path.absolute().name
+    wearer = re.sub(r"[^\w.-]+", "_", record.wearer)[:_NAME_CHARACTERS].strip("._")
+    return f"{begun:%Y-%m-%d-%H%M}-{wearer or 'not-named'}"
 
 
 def _part(progress: Progress, done: int, formats: Sequence[Format]) -> Progress:
@@ -120,7 +144,7 @@ def _write(
     """Write the files of one format, destined for `folder`, into `place`."""
     match name:
         case "report" | "html":
-            _import_drawing(progress)
+            import_drawing(progress)
             from handcal.export.report import session_report
             from handcal.report.html import write_html
             from handcal.report.pdf import write_pdf
@@ -131,9 +155,7 @@ def _write(
             else:
                 write_html(place / "report.html", report, progress)
         case "csv":
-            write_parameters(place / "parameters.csv", outcome)
-            write_trials(place / "trials.csv", outcome)
-            write_comparisons(place / "comparisons.csv", outcome)
+            write_tables(place, table_rows(outcome))
         case "yaml":
             write_calibration_yaml(place / "calibration.yaml", outcome)
         case "json":
@@ -154,7 +176,7 @@ def _write(
             write_slicer(place / "slicer", outcome, progress)
 
 
-def _import_drawing(progress: Progress) -> None:
+def import_drawing(progress: Progress) -> None:
     """Import what draws reports; where matplotlib first lists all fonts, that takes up to 20 s."""
     from matplotlib import get_cachedir
 
@@ -373,15 +395,19 @@ class Exported:
     files: tuple[Path, ...]
     missing: tuple[str, ...] = ()
     """Sessions that were not exported, each with the reason."""
+    sentence: str = ""
+    """The results over wearers in words; empty for a single session."""
 
 
 def export_sessions(
     paths: Sequence[Path], folder: Path, settings: ExportSettings, progress: Progress = Progress()
 ) -> Exported:
-    """Export sessions, each into a folder of its name.
+    """Export sessions, each into a folder named by its date and wearer, and all together.
 
-    A session that cannot be exported does not keep the others from it. If it is cancelled, the
-    sessions exported before stay.
+    Beside these folders are parameters.csv, trials.csv and summary.csv over all sessions, and a
+    report over wearers, as far as tables and reports are among the formats. A session that cannot
+    be exported does not keep the others from it. If it is cancelled, the sessions exported before
+    stay, and the files over all are those of these sessions.
 
     Parameters
     ----------
@@ -397,34 +423,93 @@ def export_sessions(
     ------
     CancelledError
         If it was cancelled before the first session was exported.
+    FileError
+        If the files over all sessions cannot be written.
     """
     files: list[Path] = []
     missing: list[str] = []
+    together: dict[str, Mapping[str, Sequence[TableRow]]] = {}
     for done, path in enumerate(paths):
+        part = progress.part(done / (len(paths) + 1), (done + 1) / (len(paths) + 1))
+        number = f"{done + 1} of {len(paths)}"
         try:
-            files += _export(path, folder, settings, progress, done, len(paths))
+            files += _export(path, folder, settings, part, number, together)
         except FileError as error:
             missing.append(f"{path.name}: {error}")
         except CancelledError:
             if not files:
                 raise
             missing += (f"{one.name}: cancelled" for one in paths[done:])
+            progress = Progress()
             break
-    return Exported(tuple(files), tuple(missing))
+    if not together:
+        return Exported((), tuple(missing))
+    tables: dict[str, list[TableRow]] = {}
+    for each in together.values():
+        for name, rows in each.items():
+            tables.setdefault(name, []).extend(rows)
+    last = progress.part(len(paths) / (len(paths) + 1), 1.0)
+    files += _export_together(tables, missing, folder, settings, last)
+    return Exported(tuple(files), tuple(missing), summarise_wearers(tables).sentence)
+
+
+def _export_together(
+    tables: Mapping[str, Sequence[TableRow]],
+    missing: Sequence[str],
+    folder: Path,
+    settings: ExportSettings,
+    progress: Progress,
+) -> tuple[Path, ...]:
+    """Write the files over all sessions, and return them."""
+    formats = [name for name in ("csv", "report", "html") if name in settings.formats]
+    if not formats:
+        return ()
+    patterns = []
+    with Staging(folder) as staging:
+        if "csv" in formats:
+            write_tables(staging.path, tables)
+            rows = summary_rows(summarise_wearers(tables))
+            write_atomic(staging.path / "summary.csv", rows_csv(rows))
+            patterns += [*FORMATS["csv"].patterns, "summary.csv"]
+        if formats != ["csv"]:
+            import_drawing(progress)
+            from handcal.report.html import write_html
+            from handcal.report.pdf import write_pdf
+
+            report = wearers_report(tables, missing)
+            if "report" in formats:
+                write_pdf(staging.path / "report.pdf", report, progress.part(0.0, 0.5))
+                patterns += FORMATS["report"].patterns
+            if "html" in formats:
+                write_html(staging.path / "report.html", report, progress.part(0.5, 1.0))
+                patterns += FORMATS["html"].patterns
+        return staging.publish(patterns)
 
 
 def _export(
-    path: Path, folder: Path, settings: ExportSettings, progress: Progress, done: int, count: int
+    path: Path,
+    folder: Path,
+    settings: ExportSettings,
+    progress: Progress,
+    number: str,
+    together: dict[str, Mapping[str, Sequence[TableRow]]],
 ) -> tuple[Path, ...]:
-    name = f"{done + 1} of {count}: {path.name}"
-    progress.at(done / count, name)
+    """Export one session, and add its tables to `together`, by the name of its folder."""
+    progress.at(0.0, f"{number}: {path.name}")
     record = Session.open(path)
     if not record.is_solvable:
-        raise FileError("it has no alignments")
-    name = f"{done + 1} of {count}: {record.wearer or path.name}"
+        raise FileError("it has no alignments", "calibrate this wearer, or delete the session")
+    called = f"{number}: {record.wearer or path.name}"
 
-    def report(what: str, share: float) -> None:
-        progress.report(f"{name}, {what[:1].lower()}{what[1:]}", share)
+    def report(doing: str, share: float) -> None:
+        progress.report(f"{called}, {doing[:1].lower()}{doing[1:]}", share)
 
-    part = replace(progress, report=report).part(done / count, (done + 1) / count)
-    return export_session(record, folder / path.name, settings, part)
+    def collect(outcome: SessionOutcome) -> None:
+        together[name] = table_rows(outcome)
+
+    name = export_name(record)
+    if name in together:  # begun within the same minute
+        name = f"{name}-{record.path.absolute().name}"
+    return export_session(
+        record, folder / name, settings, replace(progress, report=report), collect
+    )

@@ -97,11 +97,7 @@ class SessionRecord:
     @property
     def simulated(self) -> str:
         """Parts of the session that were simulated, in words; empty if all was real."""
-        station = self.settings.get("station")
-        if not isinstance(station, dict):
-            return ""
-        parts = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
-        return ", ".join(what for name, value, what in parts if station.get(name) == value)
+        return simulated_parts(self.settings)
 
     @property
     def refused(self) -> int:
@@ -134,6 +130,15 @@ def eye_trials(
     trials = (one for one in record.trials.values() if one.eye in results.eyes)
     errors = trial_errors_arcmin(trials, results.rendered_shift_m, stored_m)
     return judge_trials(errors, target_arcmin)
+
+
+def simulated_parts(settings: Mapping[str, Any]) -> str:
+    """Return the parts that a session's settings simulate, in words; empty if all was real."""
+    station = settings.get("station")
+    if not isinstance(station, dict):
+        return ""
+    parts = (("source", "simulator", "camera"), ("headset", "virtual", "headset and wearer"))
+    return ", ".join(what for name, value, what in parts if station.get(name) == value)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,7 +17,7 @@ from handcal.calibration.lab_prior import run_learn_prior
 from handcal.calibration.plan import Plan, PlanSettings, StepName
 from handcal.calibration.procedure import Calibration
 from handcal.calibration.sight import Observation
-from handcal.calibration.solve_again import Former, read_former, stored_solve_settings
+from handcal.calibration.solve_again import Former, end_former, read_former, stored_solve_settings
 from handcal.calibration.states import ProcedureError, State
 from handcal.calibration.verifying import skipped_eyes
 from handcal.camera.camera import Camera
@@ -338,6 +338,8 @@ class Station(Closable):
             if former is not None and resume is None:
                 self.session.save_facts(former=former.name)
                 self.session.save_fine_tuned(begun.shift_m)
+                with suppress(FileError):  # as on a read-only disk: it is only offered again
+                    end_former(former)
             self.calibration = Calibration(
                 self.session, self._link, settings.calibration, begun.shift_m
             )
@@ -431,6 +433,7 @@ class Station(Closable):
             views={} if self.trials.compared else dict(self._views.shown),
             comparing=self.trials.compared,
             has_compared_both=self.trials.has_compared_both,
+            trial_eye=next(iter(self.trials.target_E_m), None),
         )
 
     def watch(self, watcher: Callable[[Snapshot], object]) -> None:

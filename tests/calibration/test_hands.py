@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handcal.calibration.hands import PlacedHand, RecentHands, merge_hold
-from handcal.core.errors import HandError, PoseError, PosePendingError
+from handcal.core.errors import HandError, NoFrameError, PoseError, PosePendingError
 from handcal.core.geometry import rigid
 from handcal.core.types import Float64, HandCloud
 
@@ -104,7 +104,7 @@ def test_a_hand_is_steady_if_it_hardly_moved_for_a_while(
 def test_the_hand_nearest_in_time_is_returned_while_it_is_kept(hands: RecentHands) -> None:
     placed = [hands.add(cloud(), number * PERIOD_NS)[0] for number in range(1, 4)]
     assert hands.nearest(2 * PERIOD_NS + 40_000_000) is placed[1]
-    with pytest.raises(HandError, match="did not see your hand"):
+    with pytest.raises(HandError):
         hands.nearest(5 * PERIOD_NS)
     hands.add(None, 16 * PERIOD_NS)  # the first is older than 1.4 s now
     with pytest.raises(HandError):
@@ -196,3 +196,14 @@ def test_movement_is_reported(sheet: list[PlacedHand]) -> None:
     merged = merge_hold([moved, *sheet[1:]], sheet[-1])
     assert merged.movement_m == pytest.approx(0.003, abs=5e-4)
     assert merge_hold(sheet[-1:], sheet[-1]).points_W_m is sheet[-1].points_W_m
+
+
+def test_a_moment_without_a_frame_is_no_moment_without_a_hand(hands: RecentHands) -> None:
+    for i in range(3):
+        hands.add(cloud(), i * 10 * PERIOD_NS)
+    assert hands.nearest(10 * PERIOD_NS).t_host_ns == 10 * PERIOD_NS
+    with pytest.raises(NoFrameError):
+        hands.nearest(15 * PERIOD_NS)
+    hands.add(None, 15 * PERIOD_NS, missed_for=HandError("no hand"))
+    with pytest.raises(HandError, match="did not see your hand"):
+        hands.nearest(15 * PERIOD_NS)

@@ -11,7 +11,6 @@ from handcal.register.benefit import expected_error_arcmin
 from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.record import SessionRecord, eye_trials
 from handcal.session.trial import EyeTrials, Trial, make_trial
-from handcal_gui.widgets.number_table import Row
 from handcal_gui.widgets.result_rows import (
     NOTHING,
     PHI,
@@ -24,6 +23,7 @@ from handcal_gui.widgets.result_rows import (
     verdict_rows,
 )
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Row
 from tests.gui.views import VERIFIED
 
 

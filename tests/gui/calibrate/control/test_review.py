@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
@@ -34,13 +35,12 @@ from handcal_gui.app.program import Program
 from handcal_gui.calibrate.control import review
 from handcal_gui.calibrate.control.review import _Stored
 from handcal_gui.calibrate.parts.legend import LegendEntry
-from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from handcal_gui.calibrate.review_page import ReviewPage
 from handcal_gui.calibrate.start.example import copy_example
 from handcal_gui.connect.openxr_dialog import OpenxrDialog
 from handcal_gui.library.window import LibraryWindow
-from handcal_gui.widgets.number_table import NumberTable
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.table import Table
 from tests.gui.views import VERIFIED
 
 PATIENCE_MS = 20_000
@@ -146,7 +146,7 @@ def test_the_example_is_opened_from_the_start_page(
     program.start.example_requested.emit(tmp_path / "sessions")
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
     assert child(program, QLabel, "reviewContents").text().startswith("2 alignments, 6 trials")
-    numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
+    numbers = child(program, Table, "numbers-of-both-eyes").as_text()
     assert "Trials\t2.4′ n=3\t7.5′ n=3" in numbers
     assert program.window.findChild(QLabel, "reviewNote") is None
     program.show_start()
@@ -166,7 +166,7 @@ def test_other_results_than_those_of_solving_again_are_named(
         session.save_results(stored)
     program.open_session(path)
     qtbot.waitUntil(lambda: is_open(program), timeout=PATIENCE_MS)
-    numbers = child(program, NumberTable, "numbers-of-both-eyes").as_text()
+    numbers = child(program, Table, "numbers-of-both-eyes").as_text()
     assert "Trials\t2.4′ n=3\t7.5′ n=3" in numbers
     assert child(program, QLabel, "reviewNote").text() == (
         "Solved again by this version; when it was recorded, the verdict was left eye ↻ Repeat."

@@ -12,8 +12,8 @@ from pytestqt.qtbot import QtBot
 from handcal.calibration.states import State
 from handcal.core.types import Rig
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.history import Shifts
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
+from handcal_gui.calibrate.fine_tune.stream import Shifts
 from tests.gui.calibrate.fine_tune.controls import Show
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from handcal_gui.calibrate.fine_tune.history import same_shifts
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -13,9 +14,8 @@ from pytestqt.qtbot import QtBot
 from handcal.calibration.states import State
 from handcal.core.types import EYES, Rig, Verdict
 from handcal.register.results import Results
-from handcal_gui.calibrate.fine_tune.history import Shifts, same_shifts
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
-from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS, SETTLE_MS
+from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS, SETTLE_MS, Shifts
 from tests.gui.calibrate.fine_tune.controls import (
     Show,
     action,

@@ -30,9 +30,8 @@ from handcal.register.results import Results, results_json
 from handcal.session.record import SessionRecord
 from handcal.session.state import WENT_BACK, SessionEvent
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.history import Shifts
 from handcal_gui.calibrate.fine_tune.panel import FineTunePanel
-from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS
+from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS, Shifts
 from handcal_gui.calibrate.trials.panel import TrialsPanel
 from handcal_gui.widgets.result_rows import fine_tuned_texts
 from tests.gui.calibrate.fine_tune.controls import (

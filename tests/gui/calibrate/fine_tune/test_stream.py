@@ -5,13 +5,19 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from handcal_gui.calibrate.fine_tune.history import same_shifts
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
 from handcal.core.types import EYES
 from handcal.station.snapshot import Snapshot
-from handcal_gui.calibrate.fine_tune.history import Shifts, same_shifts
-from handcal_gui.calibrate.fine_tune.stream import PERIOD_MS, SETTLE_MS, Arrival, ShiftStream
+from handcal_gui.calibrate.fine_tune.stream import (
+    PERIOD_MS,
+    SETTLE_MS,
+    Arrival,
+    Shifts,
+    ShiftStream,
+)
 
 MakeSnapshot = Callable[..., Snapshot]
 

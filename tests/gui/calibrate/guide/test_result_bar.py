@@ -18,8 +18,7 @@ from handcal.core.types import EYES, Rig, Verdict
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX
-from handcal_gui.calibrate.guide.picture import GuidePicture
-from handcal_gui.calibrate.guide.result_bar import ResultBar
+from handcal_gui.calibrate.guide.picture import GuidePicture, ResultBar
 from handcal_gui.calibrate.guide.view import Step
 from handcal_gui.calibrate.parts.legend import LegendEntry
 from handcal_gui.calibrate.wearer_view.eye_canvas import EyeCanvas

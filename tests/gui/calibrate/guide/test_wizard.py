@@ -15,10 +15,9 @@ from handcal.core.types import EYES
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import use_theme
-from handcal_gui.calibrate.guide.progress_ring import ProgressRing
 from handcal_gui.calibrate.guide.steps import Wizard
 from handcal_gui.calibrate.guide.view import Action, Step
-from handcal_gui.calibrate.guide.wizard import WizardPanel
+from handcal_gui.calibrate.guide.wizard import ProgressRing, WizardPanel
 from handcal_gui.calibrate.wearer_view.eye_canvas import EyeCanvas
 from handcal_gui.widgets.image_view import ImageView
 from handcal_gui.widgets.result_rows import EYE_NAMES

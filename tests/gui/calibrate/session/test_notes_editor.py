@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel, QPlainTextEdit
 from pytestqt.qtbot import QtBot
 
 from handcal.session.session import MAX_NOTES_CHARACTERS
-from handcal_gui.calibrate.session.notes_editor import SAVE_MS, NotesEditor
+from handcal_gui.calibrate.session.panel import SAVE_MS, NotesEditor
 
 ONE, OTHER = Path("one"), Path("other")
 

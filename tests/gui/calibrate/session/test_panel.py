@@ -26,7 +26,7 @@ from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.calibrate.session.panel import SessionPanel
 from handcal_gui.widgets.elided_label import ElidedLabel
-from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import button, child, note_opened, show, text
 
 
@@ -35,7 +35,7 @@ def panel(qtbot: QtBot) -> SessionPanel:
     return show(qtbot, SessionPanel(), 430, 450)
 
 
-def cell(table: RecordTable, row: int, column: int) -> str:
+def cell(table: Table, row: int, column: int) -> str:
     return str(table.model().index(row, column).data())
 
 
@@ -54,7 +54,7 @@ def test_shows_the_session_of_a_snapshot(
 ) -> None:
     panel.show_snapshot(snapshot(State.SOLVED))
     assert str(record.path) in texts(panel)
-    alignments = child(panel, RecordTable, "alignments")
+    alignments = child(panel, Table, "alignments")
     assert alignments.model().rowCount() == 2
     assert "–" not in [cell(alignments, 0, column) for column in range(8)]
     panel.show_snapshot(snapshot(State.ALIGN))
@@ -109,7 +109,7 @@ def test_deletes_and_takes_back(
     qtbot: QtBot, panel: SessionPanel, record: SessionRecord, results: Results
 ) -> None:
     panel.show_record(record, results)
-    alignments = child(panel, RecordTable, "alignments")
+    alignments = child(panel, Table, "alignments")
     alignments.selectRow(1)
     with qtbot.waitSignal(panel.delete_requested) as asked:
         button(panel, QToolButton, "Delete").click()
@@ -142,7 +142,7 @@ def test_deletes_trials_and_takes_back(
     panel.show_record(Session.open(record.path), None)
     [tabs] = panel.findChildren(QTabWidget)
     tabs.setCurrentIndex(1)
-    child(panel, RecordTable, "trials-of-the-session").selectRow(0)
+    child(panel, Table, "trials-of-the-session").selectRow(0)
     with qtbot.waitSignal(panel.delete_requested) as asked:
         button(panel, QToolButton, "Delete").click()
     assert asked.args == ["trial", 1]
@@ -171,7 +171,7 @@ def test_a_finished_session_is_only_looked_at(
     panel.set_read_only(True)
     panel.show_record(Session.open(record.path), None)
     assert any(text.endswith(", finished") for text in texts(panel))
-    child(panel, RecordTable, "alignments").selectRow(0)
+    child(panel, Table, "alignments").selectRow(0)
     assert not button(panel, QToolButton, "Delete").isEnabled()
     assert text(panel, "undoText") == ""
     with qtbot.waitSignal(panel.export_requested):

@@ -27,8 +27,7 @@ from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.calibrate.trials.panel import TrialsPanel
 from handcal_gui.widgets.key_cap import KeyCap
-from handcal_gui.widgets.number_table import NumberTable
-from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import button, child, text
 
 
@@ -39,7 +38,7 @@ def test_a_low_panel_shows_four_trials(panel: TrialsPanel, record: SessionRecord
     panel.resize(384, 276)
     for _ in range(3):  # a layout may ask for another
         QApplication.processEvents()
-    table = child(panel, RecordTable)
+    table = child(panel, Table, "trials")
     assert table.viewport().height() >= 4 * table.rowHeight(0)
 
 
@@ -295,7 +294,7 @@ def test_a_trial_without_a_touch_since_the_last_is_doubted(
 
 def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -> None:
     panel.show_record(tried)
-    [table] = panel.findChildren(RecordTable)
+    table = child(panel, Table, "trials")
     numbers = [table.model().index(row, 0).data() for row in range(table.model().rowCount())]
     assert numbers == ["1", "3"]
     means = [trial.error_arcmin.mean() for trial in tried.trials.values()]
@@ -303,7 +302,7 @@ def test_shows_trials_and_statistics(panel: TrialsPanel, tried: SessionRecord) -
         f"2 trials of 1 calibration: mean {np.mean(means):.1f}′, SD between trials "
         f"{np.std(means, ddof=1):.1f}′. One calibration cannot tell how the next one turns out."
     )
-    [statistics] = panel.findChildren(NumberTable)
+    statistics = child(panel, Table, "statistics-of-trials")
     assert "0.4 m" in statistics.as_text()
     assert "0.5 m" not in statistics.as_text()
 
@@ -312,7 +311,7 @@ def test_deletes_and_takes_back(qtbot: QtBot, panel: TrialsPanel, tried: Session
     with Session(tried.path) as session:
         session.delete("alignment", 1)
     panel.show_record(Session.open(tried.path))
-    [table] = panel.findChildren(RecordTable)
+    table = child(panel, Table, "trials")
     table.selectRow(1)
     with qtbot.waitSignal(panel.delete_requested) as asked:
         button(panel, QToolButton, "Delete").click()

@@ -12,7 +12,7 @@ from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
 from handcal_gui.calibrate.trials.panel import TrialsPanel
 from handcal_gui.calibrate.trials.trial_plot import TrialPlot
-from handcal_gui.widgets.number_table import NumberTable
+from handcal_gui.widgets.table import Table
 from tests.gui.helpers import child
 
 
@@ -35,7 +35,13 @@ def test_plot_table_and_text_have_one_statistic(
     np.testing.assert_allclose(marks[0], np.mean(near))
     np.testing.assert_allclose(marks[1], [np.mean(near) - sd, np.mean(near) + sd])
     np.testing.assert_allclose(marks[2:], means[3])  # one trial has no spread
-    row = child(panel, NumberTable).as_text().split("0.4 m\t")[1].splitlines()[0].split("\t")
+    row = (
+        child(panel, Table, "statistics-of-trials")
+        .as_text()
+        .split("0.4 m\t")[1]
+        .splitlines()[0]
+        .split("\t")
+    )
     assert row[:3] == ["2", f"{np.mean(near):.1f}", f"{sd:.1f}"]
     [ticks] = plot.item.getAxis("bottom")._tickLevels
     assert [name for _, name in ticks] == ["0.4 (n = 2)", "0.5 (n = 0)", "0.6 (n = 1)"]

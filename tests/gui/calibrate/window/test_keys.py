@@ -32,7 +32,7 @@ from handcal_gui.app.program import Program
 from handcal_gui.calibrate.guide.action_bar import ActionBar
 from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Step, WizardView
 from handcal_gui.calibrate.window import MainWindow
-from handcal_gui.widgets.record_table import RecordTable
+from handcal_gui.widgets.table import Table
 from tests.gui.calibrate.window.conftest import Maker, main_button, offer_solve, press, say
 from tests.gui.views import begun
 
@@ -157,7 +157,7 @@ def show_buttons(program: Program, snapshot: Snapshot, *, is_enabled: bool) -> l
     say(program, snapshot, WizardView(Step.SOLVE, "", (), main, others))
     asked: list[object] = []
     program.wizard_panel.asked.connect(asked.append)
-    for table in window.findChildren(RecordTable):
+    for table in window.findChildren(Table):
         table.selectRow(0)
     return asked
 
@@ -239,7 +239,7 @@ def test_tab_leads_to_nothing_that_discards_or_deletes(
     for name, dock in window.docks.items():
         dock.raise_()
         if name == "session":
-            dock.findChildren(RecordTable)[0].setFocus()
+            dock.findChildren(Table)[0].setFocus()
         for _ in range(60):
             press(window, Qt.Key.Key_Tab)
             focused = window.focusWidget()
