@@ -125,7 +125,7 @@ def summarise_wearers(tables: Mapping[str, Sequence[TableRow]]) -> WearersSummar
         better_with=better.count("applied"),
         better_without=better.count("offline"),
         simulated=len({row["session"] for row in finals if row["simulated"]}),
-        spreads={name: _spread(name, pairs) for name, pairs in values.items() if pairs},
+        spreads={name: spread(name, pairs) for name, pairs in values.items() if pairs},
     )
 
 
@@ -135,7 +135,7 @@ def summary_rows(summary: WearersSummary) -> list[TableRow]:
     del counts["spreads"]
     return [
         *({"quantity": name, "values": count} for name, count in counts.items()),
-        *(asdict(spread) for spread in summary.spreads.values()),
+        *map(asdict, summary.spreads.values()),
     ]
 
 
@@ -173,15 +173,15 @@ def _spreads_table(summary: WearersSummary) -> Table:
         [
             [
                 _QUANTITIES[name],
-                str(spread.wearers),
-                str(spread.values),
-                f"{spread.mean:.2f}",
+                str(found.wearers),
+                str(found.values),
+                f"{found.mean:.2f}",
                 *(
                     NOTHING if sd is None else f"{sd:.2f}"
-                    for sd in (spread.sd_between, spread.sd_within)
+                    for sd in (found.sd_between, found.sd_within)
                 ),
             ]
-            for name, spread in summary.spreads.items()
+            for name, found in summary.spreads.items()
         ],
         "Each wearer counts once, with the mean of their eyes, sessions or trials. Between: "
         "standard deviation of these means; within: of the values about them. Expected errors are "
@@ -285,7 +285,8 @@ def _trial_errors(corners: Sequence[TableRow]) -> list[tuple[str, float]]:
     return [(wearers[key], sum(errors) / len(errors)) for key, errors in trials.items()]
 
 
-def _spread(quantity: str, pairs: Sequence[tuple[str, float]]) -> Spread:
+def spread(quantity: str, pairs: Sequence[tuple[str, float]]) -> Spread:
+    """Return the spread of values, each with its wearer; ValueError if there are none."""
     by_wearer: dict[str, list[float]] = {}
     for wearer, value in pairs:
         by_wearer.setdefault(wearer, []).append(value)
