@@ -30,10 +30,6 @@ docs:
 pictures:
     bash docs/pictures.sh && QT_QPA_PLATFORM=offscreen python docs/rig_pictures.py
 
-# the catalogue of the window's texts, from the code
-translations:
-    python docs/translations.py
-
 # the promises of docs/reliability.md attacked, in about an hour; --short: within a minute
 campaigns *arguments:
     nice python -m tests.campaigns {{arguments}}

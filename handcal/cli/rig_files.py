@@ -166,7 +166,8 @@ def check(arguments: argparse.Namespace) -> None:
         doubt = "" if one.is_fine else f"  → doubtful: {one.expected} is expected"
         judged = ("ok" if one.is_fine else "check") if one.is_judged else ""
         mark = judged if one.is_known else "–"
-        console.print(f"{mark:6} {one.what}: {one.found}{doubt}")
+        missing = f": run '{one.command}'" if one.command else ""
+        console.print(f"{mark:6} {one.what}: {one.found}{missing}{doubt}")
     save(arguments.json, {"findings": [asdict(one) for one in findings]})
     doubtful = sum(not one.is_fine for one in findings)
     if doubtful:

@@ -33,6 +33,8 @@ _FOCAL_SIDES = 0.1, 10.0
 _AXIS_SHARES = 1 / 7, 6 / 7
 """Range of the axis in the image, beyond which it is for a size entered the wrong way round."""
 _MOST_ASPECT = 1.5
+_ACROSS_DEG = 10.0, 120.0
+"""Field of view of a display."""
 _FARTHEST_VIEW_M = 0.3
 _MOST_TURNED_DEG = 90.0
 
@@ -158,6 +160,12 @@ def _check_display(eye: str, display: EyeDisplay) -> None:
     _check_size(eye, display.width_px, display.height_px)
     _check_optics(
         f"{eye}.K", display.width_px, display.height_px, K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    )
+    across_deg = float(np.degrees(2.0 * np.arctan(0.5 * display.width_px / K[0, 0])))
+    require(
+        _ACROSS_DEG[0] <= across_deg <= _ACROSS_DEG[1],
+        f"{eye}.K: the display is {across_deg:.0f}° across, but must be {_ACROSS_DEG[0]:g}° to "
+        f"{_ACROSS_DEG[1]:g}°: fx is {K[0, 0]:g} px for {display.width_px} px",
     )
     check_view(f"{eye}.T_V_H", display.T_V_H)
 

@@ -48,6 +48,8 @@ class RigFinding:
     """False if the file does not contain it: neither fine nor doubtful."""
     has_failed: bool = False
     """True if it is a test that failed, which is worse than doubtful."""
+    command: str = ""
+    """The command that makes what is missing; empty if there is none."""
     parts: tuple[RigPart, ...] = ()
     """Parts of the rig from which it was computed; empty if it is not about their values."""
 
@@ -169,7 +171,7 @@ def depth_finding(check: DepthCheck | None) -> RigFinding:
     """Return the largest bias of depth where hands are held; it is fine if certainly small."""
     what = "Depth check"
     if check is None:
-        return RigFinding(what, "not made yet: run 'handcal rig depth'", is_known=False)
+        return RigFinding(what, "not made yet", is_known=False, command="handcal rig depth")
     bias_m, sigma_m = np.transpose([check.bias_m(depth_m) for depth_m in _HAND_DEPTHS_M])
     worst = int(np.argmax(np.abs(bias_m) + 2.0 * sigma_m))
     return RigFinding(
@@ -188,15 +190,15 @@ def edges_finding(rig: Rig) -> RigFinding:
     far = f"{signed(edges.fatten_px, 1)} ± {edges.sigma_px:.1f} px"
     if edges.source == "measured":
         return RigFinding(what, f"{far} ({edges.views} views, {edges.made})")
-    found = f"not measured, {far} assumed: run 'handcal rig depth'"
-    return RigFinding(what, found, is_known=False)
+    found = f"not measured, {far} assumed"
+    return RigFinding(what, found, is_known=False, command="handcal rig depth")
 
 
 def display_finding(check: DisplayCheck | None) -> RigFinding:
     """Return what the check of the displays has found."""
     what, expected = "Display check", "what is drawn moves as the projections say"
     if check is None:
-        return RigFinding(what, "not made yet: run 'handcal rig display-check'", is_known=False)
+        return RigFinding(what, "not made yet", is_known=False, command="handcal rig display-check")
     found = "; ".join(
         f"{' and '.join(eye for eye in check.problems if check.problems[eye] == text)}: {text}"
         for text in dict.fromkeys(check.problems.values())

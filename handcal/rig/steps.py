@@ -28,6 +28,9 @@ from handcal.rig.lens.camera import CameraSettings, LensChoice
 from handcal.rig.lens.stereo import StereoCalibration, StereoSettings, calibrate_stereo
 from handcal.rig.lens.viewpoint import ViewpointPose, viewpoint_from_stereo, viewpoint_from_tracked
 
+ASKED_GRIDS, ASKED_BOARDS = 3, 8
+"""Images of the grid and of the tracked board that a display asks for; fewer are not *good*."""
+
 
 @dataclass(frozen=True, slots=True)
 class DisplayInputs:
@@ -102,7 +105,11 @@ def calibrate_viewpoint(
         return viewpoint_from_stereo(read_stereo(stereo))
     if tracked is None:
         raise HandcalError("tracked poses of the board are missing: choose their file")
-    return viewpoint_from_tracked(board_views, read_tracked(tracked), camera)
+    pose = viewpoint_from_tracked(board_views, read_tracked(tracked), camera)
+    views = len(pose.residuals_px)
+    return replace(
+        pose, verdict=pose.verdict.unless_few(views, ASKED_BOARDS, "images of the board")
+    )
 
 
 def calibrate_eye_display(
@@ -136,7 +143,9 @@ def calibrate_eye_display(
     screen = screen_of(rig, eye)
     grid = grid_on(screen.width_px, screen.height_px, inputs.square_px)
     seen = {name: on_display(found, grid) for name, found in used(grid_views, 1).items()}
-    return _calibrated(screen, seen, camera, viewpoint, inputs)
+    display = _calibrated(screen, seen, camera, viewpoint, inputs)
+    verdict = display.verdict.unless_few(len(seen), ASKED_GRIDS, "images of the grid")
+    return replace(display, verdict=verdict)
 
 
 def calibrate_by_gray_code(

@@ -14,3 +14,10 @@ class CalibrationVerdict:
 
     name: CalibrationVerdictName
     reason: str
+
+    def unless_few(self, views: int, asked: int, of: str) -> CalibrationVerdict:
+        """Return this verdict, or that more views are needed if a good one is of too few."""
+        if self.name != "good" or views >= asked:
+            return self
+        reason = f"{views} {of}, take {asked} or more; {self.reason}"
+        return CalibrationVerdict("needs more views", reason)

@@ -25,7 +25,7 @@ VIEWPOINT_CAMERA = Intrinsics(
     640, 360, 900.0, 898.5, 322.0, 177.5, (-0.08, 0.05, 0.0004, -0.0003, 0.0)
 )
 _TURN_RAD = 0.02
-_TRACKED, _GRIDS = 4, 2
+_TRACKED, _GRIDS = 8, 3
 
 
 def write_photographs(

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractButton,
-    QAbstractSpinBox,
-    QApplication,
     QComboBox,
-    QDockWidget,
-    QLineEdit,
     QMainWindow,
     QMenu,
-    QPlainTextEdit,
-    QTextEdit,
     QWidget,
 )
 
@@ -108,34 +101,6 @@ def keep_focus_off_clicked_buttons(window: QWidget) -> None:
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
 
 
-class NoAltLetters(QObject):
-    """Keeps Alt with a letter that leads nowhere from being typed into the field with the focus.
-
-    On macOS, that key types other characters.
-    """
-
-    def __init__(self, window: QWidget) -> None:
-        super().__init__(window)
-        app = QApplication.instance()
-        if isinstance(app, QApplication) and sys.platform != "darwin":
-            app.focusChanged.connect(self._guard)
-
-    def _guard(self, _old: QWidget | None, new: QWidget | None) -> None:
-        if isinstance(new, QLineEdit | QComboBox | QAbstractSpinBox | QTextEdit | QPlainTextEdit):
-            new.installEventFilter(self)
-
-    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        """Take such a key away, once no shortcut has."""
-        return (
-            isinstance(event, QKeyEvent)
-            and event.type() == QEvent.Type.KeyPress
-            and event.modifiers() & ~Qt.KeyboardModifier.ShiftModifier
-            == Qt.KeyboardModifier.AltModifier
-            and event.text().isprintable()
-            and event.text() != ""
-        )
-
-
 def keys_by_group(window: QMainWindow) -> dict[str, KeyGroup]:
     """Return the keys of the whole window, of the guide, of menus and of panels, by their names."""
     groups = {_WINDOW: KeyGroup(_EVERYWHERE, [])}
@@ -158,7 +123,7 @@ def _is_of_another_window(action: QAction, window: QMainWindow) -> bool:
     """Return whether an action belongs to a dialog or another window, such as the manual."""
     owner = action.parent()
     while isinstance(owner, QWidget) and owner is not window:
-        if owner.isWindow() and not isinstance(owner, QMenu | QDockWidget):
+        if owner.isWindow() and not (isinstance(owner, QMenu) or owner.property("panel")):
             return True
         owner = owner.parent()
     return False
@@ -169,16 +134,24 @@ def _group(action: QAction) -> tuple[str, str]:
     for owner in action.associatedObjects():
         if isinstance(owner, QMenu):
             return owner.title().replace("&", ""), _IN_MENU
+    if title := panel_title(action):
+        if action.shortcutContext() is Qt.ShortcutContext.WindowShortcut:
+            return tr("Guide"), _IN_CALIBRATION
+        return title, _IN_PANEL
     parent = action.parent()
     while isinstance(parent, QWidget):
-        if isinstance(parent, QDockWidget):
-            if action.shortcutContext() is Qt.ShortcutContext.WindowShortcut:
-                return tr("Guide"), _IN_CALIBRATION
-            return parent.windowTitle(), _IN_PANEL
         if parent.objectName() == "wizard":
             return tr("Guide"), _IN_CALIBRATION
         parent = parent.parent()
     return _WINDOW, _EVERYWHERE
+
+
+def panel_title(action: QAction) -> str:
+    """Return the title of the panel that an action belongs to; empty if it belongs to none."""
+    owner = action.parent()
+    while owner is not None and not owner.property("panel"):
+        owner = owner.parent()
+    return "" if owner is None else str(owner.property("panel"))
 
 
 def native(keys: str | QKeySequence) -> str:

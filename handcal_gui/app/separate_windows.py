@@ -21,7 +21,7 @@ from handcal.link.server import HeadsetServer
 from handcal.rig.rig_file import read_rig
 from handcal.session.session import SessionRecord
 from handcal.station.checks.support import SupportSettings
-from handcal_gui.app.help_menu import read_manual
+from handcal_gui.app.menus import read_manual
 from handcal_gui.app.preferences import CurrentPreferences
 from handcal_gui.app.preferences_dialog import PreferencesDialog
 from handcal_gui.app.support_dialog import SupportDialog
@@ -36,7 +36,6 @@ from handcal_gui.connect.connect_dialog import ConnectDialog
 from handcal_gui.connect.openxr_dialog import OpenxrDialog
 from handcal_gui.evaluate.entries import EvaluationEntries
 from handcal_gui.library.export_dialog import Export, ExportDialog
-from handcal_gui.manual.window import Manual
 from handcal_gui.widgets.numbers import pluralize
 from handcal_gui.widgets.placement import keep_on_screen
 
@@ -61,13 +60,10 @@ class SeparateWindows(QObject):
     ----------
     open_requested, resume_requested : Signal(Path)
         A session to open, or to resume.
-    manual_wanted : Signal(str)
-        A page of the manual to show.
     """
 
     open_requested = Signal(object)
     resume_requested = Signal(object)
-    manual_wanted = Signal(str)
     _ending = Signal()
 
     def __init__(
@@ -217,10 +213,9 @@ class SeparateWindows(QObject):
         except FileError as error:
             self._window.banner.show_message(str(error))
             return None
-        wizard = RigWizard(folder, self._window, self._start.new.settings.realsense)
+        read = partial(read_manual, self._window)
+        wizard = RigWizard(folder, self._window, self._start.new.settings.realsense, read)
         wizard.rig_saved.connect(self._use_rig)
-        manual = Manual(wizard)  # of its own: the wizard blocks the window's
-        wizard.manual_wanted.connect(partial(read_manual, self._window, manual))
         wizard.finished.connect(self._start.new.check)
         self._open(wizard, wizard.accept)
         return wizard
@@ -243,7 +238,7 @@ class SeparateWindows(QObject):
         window = EvaluationWindow(make_specs(), entries, self._window)
         window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.remembered.connect(partial(self._remember_evaluation, proposed))
-        window.manual_wanted.connect(self.manual_wanted)
+        window.manual_wanted.connect(partial(read_manual, self._window))
         self._ending.connect(window.stop)
         window.show()
         keep_on_screen(window)

@@ -16,15 +16,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from PySide6.QtCore import QCoreApplication, QLocale, QSize, QTranslator
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 
-from handcal.core.errors import FileError
 from handcal.io.configuration import keep_font_list_in_configuration
-from handcal.io.resources import resource_path
 from handcal.io.x_display import x_server_answers
 from handcal_gui import FIRST_SIZE_PX
-from handcal_gui.app.translation import tr, use_translator
+from handcal_gui.app.translation import tr
 
 _EXPOSED_S = 0.3
 """Longest wait for the first window to be on the screen."""
@@ -42,7 +40,6 @@ def main() -> NoReturn:
     app.setApplicationName("handcal")
     app.setDesktopFileName("handcal")
     app.setStyle("Fusion")
-    translate_texts(app)
     first = first_window(arguments.size)
     from handcal_gui.app.launch import LaunchError, launch
 
@@ -67,22 +64,6 @@ def use_english_capitals() -> None:
         with suppress(locale.Error):
             locale.setlocale(locale.LC_CTYPE, name)
             return
-
-
-def translate_texts(app: QApplication) -> None:
-    """Translate texts to the user's language, if there is a translation (docs/translating.md)."""
-    with suppress(FileError):
-        translator = translation_for(QLocale(), resource_path("translations"))
-        if translator is not None:
-            translator.setParent(app)
-            app.installTranslator(translator)
-            use_translator(lambda text: QCoreApplication.translate("", text))
-
-
-def translation_for(language: QLocale, folder: Path) -> QTranslator | None:
-    """Return the compiled translation of a folder for a language; None if there is none."""
-    translator = QTranslator()
-    return translator if translator.load(language, "handcal", "_", str(folder)) else None
 
 
 def first_window(size: QSize | None) -> QWidget:

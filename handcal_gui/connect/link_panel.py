@@ -4,25 +4,40 @@ from __future__ import annotations
 
 from collections import deque
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QWidget
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
-from handcal.link.rates import link_rates
+from handcal.link.rates import LinkRates, link_rates
 from handcal.link.statistics import LinkStatistics
+from handcal.link.wire import Rejection
+from handcal.report.cells import signed
 from handcal.station.snapshot import Snapshot
-from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon
+from handcal_gui.app.theme import SPACING_PX, colors, follow_theme, icon, number_font
 from handcal_gui.app.translation import tr
-from handcal_gui.connect.link_history import LinkHistory
-from handcal_gui.connect.link_table import RATES_S, LinkTable
-from handcal_gui.connect.pairing_box import PairingBox
-from handcal_gui.widgets.fields import button
-from handcal_gui.widgets.layouts import vbox
+from handcal_gui.connect.key_field import KeyField
+from handcal_gui.widgets.fields import button, label_for, with_name
+from handcal_gui.widgets.layouts import hbox, scrollable, vbox
+from handcal_gui.widgets.number_label import UNKNOWN
 from handcal_gui.widgets.sentence import sentence
+from handcal_gui.widgets.table import Row, Table
 
 _PERIOD_S = 0.25
 """Interval of updating the numbers; faster changes cannot be read."""
+_RATES_S = 2.0
+"""Interval of rates and losses."""
 _ICON_PX = 24
 _NO_SESSION = tr("Not connected. Open a session on the start page.")
+REJECTIONS = {
+    Rejection.UNPAIRED: tr("Signed with another pairing key: enter the key above in the headset"),
+    Rejection.CORRUPT: tr("Damaged in transit, or not meant for handcal"),
+    Rejection.REPLAYED: tr(
+        "Arrived twice or much too late; a few are normal in a wireless network"
+    ),
+    Rejection.OVERSIZED: tr("Longer than the protocol allows: check the headset's program"),
+    Rejection.WRONG_VERSION: tr("The headset's program uses another protocol version: update it"),
+    Rejection.WRONG_SESSION: tr("Sent before the headset reconnected; a few are normal"),
+}
+"""Explanation of each reason, and the remedy."""
 
 
 class LinkPanel(QWidget):
@@ -30,45 +45,57 @@ class LinkPanel(QWidget):
 
     Attributes
     ----------
-    new_key_requested : Signal()
-        The user requests another pairing key.
-    connect_requested : Signal()
-        The user wants to pair or try a headset.
-    restart_headset_requested : Signal()
-        The user requests a restart of the virtual headset.
+    connect_headset, new_key, restart_headset : QPushButton
+        To pair or try a headset, to make another pairing key, and to restart the virtual headset;
+        connected by the program.
     """
-
-    new_key_requested = Signal()
-    connect_requested = Signal()
-    restart_headset_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("link-panel")
         self._readings: deque[tuple[float, LinkStatistics]] = deque()
-        self._is_connected: bool | None = None
+        self._is_connected = False
         self._sign = QLabel()
-        self._state = QLabel(textFormat=Qt.TextFormat.PlainText)
-        self._state.setObjectName("link-state")
+        self._state = with_name(QLabel(textFormat=Qt.TextFormat.PlainText), "link-state")
         self._state.setWordWrap(True)
-        self._connect = button(
+        self.connect_headset = button(
             "connect", tr("&Connect…"), tr("Pair a headset by QR code, and try it")
         )
-        self._connect.hide()
-        self._connect.clicked.connect(self.connect_requested)
-        self._restart = button(
+        self.restart_headset = button(
             "restartHeadset",
             tr("Res&tart headset"),
             help_text=tr("Restart the virtual headset's program"),
         )
-        self._restart.clicked.connect(self.restart_headset_requested)
-        self._restart.hide()
-        self._table = LinkTable()
-        self._history = LinkHistory()
-        self._pairing = PairingBox()
-        self._pairing.new_key_requested.connect(self.new_key_requested)
-        self._pairing.hide()
-        self._lay_out()
+        self.new_key = button(
+            "newKey",
+            tr("&New key…"),
+            tr("Make a new pairing key"),
+            tr("The new key must then be entered in the headset."),
+        )
+        self._address = with_name(QLabel(), "pairing-address")
+        self._address.setFont(number_font())
+        self._address.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._address.setToolTip(tr("Host and port that the headset must connect to, by UDP"))
+        self._key = KeyField()
+        self._pairing = QWidget()
+        form = QFormLayout(self._pairing)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.addRow(tr("Address"), hbox((self._address, 1), self.new_key))
+        form.addRow(label_for(self._key, tr("Key")), self._key)
+        self._table = Table("link-table", tr("Numbers of the link"))
+        self._of_session = self._pairing, self.connect_headset, self.restart_headset
+        for part in self._of_session:
+            part.hide()
+        content = QWidget()
+        vbox(
+            hbox(self._sign, (self._state, 1), self.restart_headset, self.connect_headset),
+            self._pairing,
+            (self._table, 1),
+            on=content,
+            margins=SPACING_PX,
+            spacing=SPACING_PX,
+        )
+        vbox(scrollable(content), on=self, margins=0)
         self._show_state(is_connected=False, problem=_NO_SESSION)
         follow_theme(self, self._draw_sign)
 
@@ -80,16 +107,16 @@ class LinkPanel(QWidget):
         address : str
             Address to which the headset must connect, host:port.
         key : str
-            Pairing key.
+            Pairing key, hidden at first.
         is_virtual : bool
             True for the virtual headset, which can be restarted from here.
         """
         self._readings.clear()
-        self._history.clear()
-        self._pairing.show_pairing(address, key)
-        self._pairing.show()
-        self._connect.show()
-        self._restart.setVisible(is_virtual)
+        self._address.setText(address)
+        self._key.set_key(key)
+        for part in self._of_session:
+            part.show()
+        self.restart_headset.setVisible(is_virtual)
 
     def show_snapshot(self, snapshot: Snapshot) -> None:
         """Show the state of the link, with numbers at a readable rate."""
@@ -98,12 +125,11 @@ class LinkPanel(QWidget):
         if self._readings and 0.0 <= t_s - self._readings[-1][0] < _PERIOD_S:
             return
         self._readings.append((t_s, link))
-        while len(self._readings) > 2 and self._readings[1][0] <= t_s - RATES_S:
+        while len(self._readings) > 2 and self._readings[1][0] <= t_s - _RATES_S:
             self._readings.popleft()
         since_s, before = self._readings[0]
         rates = link_rates(before, link, t_s - since_s) if t_s > since_s else None
-        self._table.show_link(link, rates)
-        self._history.add(t_s, link.latency_ms, rates)
+        self._table.show_rows((tr("To headset"), tr("From headset")), link_rows(link, rates))
 
     def _show_state(self, *, is_connected: bool, problem: str) -> None:
         if is_connected is not self._is_connected:
@@ -116,33 +142,97 @@ class LinkPanel(QWidget):
         self._state.setText(both or sentence(problem) or word)
 
     def _draw_sign(self) -> None:
-        drawn = (
-            icon("link", colors().good)
-            if self._is_connected
-            else icon("link-off", colors().warning)
-        )
+        name, shade = ("link", "good") if self._is_connected else ("link-off", "warning")
+        drawn = icon(name, getattr(colors(), shade))
         self._sign.setPixmap(drawn.pixmap(QSize(_ICON_PX, _ICON_PX), self.devicePixelRatio()))
 
-    def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.setSpacing(SPACING_PX)
-        top.addWidget(self._sign, 0, Qt.AlignmentFlag.AlignTop)
-        top.addWidget(self._state, 1)
-        top.addWidget(self._restart, 0, Qt.AlignmentFlag.AlignTop)
-        top.addWidget(self._connect, 0, Qt.AlignmentFlag.AlignTop)
-        content = QWidget()
-        vbox(
-            top,
-            self._pairing,
-            self._table,
-            (self._history, 1),
-            0,
-            on=content,
-            margins=(SPACING_PX, SPACING_PX // 2, SPACING_PX, SPACING_PX // 2),
-            spacing=SPACING_PX // 2,
+
+def link_rows(link: LinkStatistics, rates: LinkRates | None) -> list[Row]:
+    """Return the numbers of a link to and from the headset; those of a lost headset are past.
+
+    Reasons of rejection are rows once they occur.
+    """
+    is_here = link.connected
+    sent, received, lost, lost_inbound = 4 * (UNKNOWN,)
+    if rates is not None:
+        sent, received = (
+            f"{one / 1e3:.1f} kB/s" for one in (rates.sent_bytes_s, rates.received_bytes_s)
         )
-        area = QScrollArea()
-        area.setWidget(content)
-        area.setWidgetResizable(True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        vbox(area, on=self, margins=0)
+        lost, lost_inbound = _text(rates.lost, "%", 100.0), _text(rates.lost_inbound, "%", 100.0)
+    rows = [
+        Row(tr("Data"), (sent, received), tr("Kilobytes per second, over {:g} s").format(_RATES_S)),
+        Row(
+            tr("Lost"),
+            (lost, lost_inbound),
+            tr("Share of the datagrams that did not arrive, over {:g} s").format(_RATES_S),
+        ),
+        Row(
+            tr("Latency"),
+            ("", _text(link.latency_ms if is_here else None, "ms")),
+            tr("Half the median time of a round trip to the headset, in milliseconds"),
+        ),
+        Row(
+            tr("Poses"),
+            ("", _text(link.pose_rate_hz if is_here else None, "Hz")),
+            tr("Poses received from the headset per second"),
+        ),
+        Row(
+            tr("Resent"),
+            (str(link.resent), ""),
+            tr("Fragments of messages retransmitted because they were not acknowledged in time"),
+        ),
+        Row(
+            tr("In flight"),
+            (str(link.unacked), ""),
+            tr("Messages that the headset has not acknowledged yet"),
+        ),
+        Row(
+            tr("Failed"),
+            (str(link.failed), ""),
+            tr("Messages that the headset did not acknowledge in time"),
+        ),
+        Row(
+            tr("Clock"),
+            (_clock(link) if is_here else UNKNOWN,),
+            tr(
+                "Headset's clock minus this computer's, in seconds, and its uncertainty, in "
+                "milliseconds"
+            ),
+        ),
+        Row(
+            tr("Clock drift"),
+            (_drift(link) if is_here else UNKNOWN,),
+            tr(
+                "Drift of the headset's clock over the last 30 seconds, in parts per million, and "
+                "its uncertainty; positive is fast"
+            ),
+        ),
+        Row(
+            tr("Rejected"),
+            ("", str(sum(link.rejected.values()))),
+            tr("Datagrams that were not accepted, for the reasons below"),
+        ),
+    ]
+    for reason, meaning in REJECTIONS.items():
+        if count := link.rejected.get(reason, 0):
+            label = tr("Rejected, {}").format(reason.replace("_", " "))
+            rows.append(Row(label, ("", str(count)), meaning))
+    return rows
+
+
+def _clock(link: LinkStatistics) -> str:
+    offset_ms, uncertainty_ms = link.clock_offset_ms, link.clock_uncertainty_ms
+    if offset_ms is None or uncertainty_ms is None:
+        return UNKNOWN
+    return f"{signed(offset_ms / 1e3, 3)} s ± {uncertainty_ms:.1f} ms"
+
+
+def _drift(link: LinkStatistics) -> str:
+    drift_ppm, uncertainty_ppm = link.clock_drift_ppm, link.clock_drift_uncertainty_ppm
+    if drift_ppm is None or uncertainty_ppm is None:
+        return UNKNOWN
+    return f"{signed(drift_ppm, 0)} ± {uncertainty_ppm:.0f} ppm"
+
+
+def _text(value: float | None, unit: str, units_per_value: float = 1.0) -> str:
+    return UNKNOWN if value is None else f"{units_per_value * value:.1f} {unit}"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from handcal.core.errors import FileError, HandcalError
@@ -14,7 +14,7 @@ from handcal.io.images import write_png
 from handcal.rig.assemble import screen_of
 from handcal.rig.boards.choose import ALIKE
 from handcal.rig.displays.grid import Grid, draw_grid, grid_on
-from handcal.rig.steps import view_in
+from handcal.rig.steps import ASKED_BOARDS, ASKED_GRIDS, view_in
 from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.file_dialogs import ask_save
@@ -33,13 +33,13 @@ _DISTANCES: dict[Distance, str] = {
 }
 _GRID_HINT = tr(
     "Save the grid and show it on this display unscaled. With the viewpoint camera at the eye "
-    "position, focused on the display, take 3 or more images in the dark."
-)
+    "position, focused on the display, take {} or more images in the dark."
+).format(ASKED_GRIDS)
 _BOARD_HINT = tr(
-    "Leave the camera in its place and switch the display off. Take 8 or more images of the board "
+    "Leave the camera in its place and switch the display off. Take {} or more images of the board "
     "through it while the headset tracks the board. Save one JSON file with the name of each "
     'image and the pose of its board in the headset rig: <a href="{}">its contents</a>.'
-).format("docs/rig-guide.md#left-and-right-display")
+).format(ASKED_BOARDS, "docs/rig-guide.md#left-and-right-display")
 
 
 class DisplayPage(StepPage):
@@ -49,16 +49,17 @@ class DisplayPage(StepPage):
     ----------
     project : RigProject
     eye : {"left", "right"}
-
-    Attributes
-    ----------
-    manual_wanted : Signal(str)
-        The user wants to read a page of the manual.
+    read : callable
+        Shows a page of the manual.
     """
 
-    manual_wanted = Signal(str)
-
-    def __init__(self, project: RigProject, eye: Eye, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        project: RigProject,
+        eye: Eye,
+        read: Callable[[str], object],
+        parent: QWidget | None = None,
+    ) -> None:
         distance = choice(
             "distance",
             tr("Distance of the virtual screen"),
@@ -143,12 +144,12 @@ class DisplayPage(StepPage):
         )
         form.show_entries(project.inputs.left if eye == "left" else project.inputs.right)
         keys = tr("&Take images…"), tr("Find the grid &again")
-        grid = ImagesPanel((tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
+        grid = ImagesPanel(project, (tr("Viewpoint camera"),), _GRID_HINT, "setup-display", *keys)
         keys = tr("Ta&ke images…"), tr("Find t&he board again")
-        board = ImagesPanel((tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
+        board = ImagesPanel(project, (tr("Viewpoint camera"),), _BOARD_HINT, "setup-board", *keys)
         panels = {tr("Grid on the displa&y"): grid, tr("Ca&mera pose"): board}
         super().__init__(f"{eye}DisplayPage", eye, project, form, panels, parent)
-        make_linked(board.hint).linkActivated.connect(self.manual_wanted)
+        make_linked(board.hint).linkActivated.connect(read)
         self._eye: Eye = eye
         self._grid, self._board = grid, board
         self._by_distance = {"measured": (distance_m,), "solved": (arcmin, nominal)}
@@ -157,8 +158,8 @@ class DisplayPage(StepPage):
         )
         grid.add_button(self._save)
         self._save.clicked.connect(self._save_grid)
-        self._grid.take_requested.connect(self._take_grid)
-        self._board.take_requested.connect(self._take_board)
+        self._grid.take.clicked.connect(self._take_grid)
+        self._board.take.clicked.connect(self._take_board)
         self.show_known()
 
     @property
@@ -261,7 +262,7 @@ class DisplayPage(StepPage):
             self._grid,
             lambda: self.form.enter(grid_images=str(folder)),
             ALIKE,
-            asked=3,
+            asked=ASKED_GRIDS,
         )
 
     def _take_board(self) -> None:
@@ -271,5 +272,5 @@ class DisplayPage(StepPage):
             self.project.inputs.board,
             self._board,
             lambda: self.form.enter(board_images=str(folder)),
-            asked=8,
+            asked=ASKED_BOARDS,
         )

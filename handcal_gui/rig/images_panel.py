@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLabel, QPushButton, QSplitter, QWidget
 
+from handcal.core.progress import Progress
 from handcal.io.files import user_path
 from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import coverage
@@ -16,9 +17,10 @@ from handcal.station.checks.doctor import Finding, Health
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.coverage_map import CoverageMap
+from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.shot_list import ShotList
 from handcal_gui.rig.shot_view import ShotView
-from handcal_gui.rig.shots import Shot, look
+from handcal_gui.rig.shots import Shot, look, other_board
 from handcal_gui.rig.solve import SolvedPart
 from handcal_gui.rig.uncertainty_map import UncertaintyMap
 from handcal_gui.widgets.drawing import Drawing
@@ -33,6 +35,8 @@ class ImagesPanel(QWidget):
 
     Parameters
     ----------
+    project : RigProject
+        Is told of the board if it is found, and takes another that the images show.
     titles : sequence of str
         Name of the camera, or names of the two cameras of pairs.
     hint : str
@@ -46,22 +50,18 @@ class ImagesPanel(QWidget):
     ----------
     hint, drawing, buttons, search : QWidget
         How to take the images, and how their search goes on; the page places them.
+    take, again : QPushButton
+        Connected by the page; once `again` is pressed, `look` reads the folders again.
     shots : tuple of Shot
     dropped_changed : Signal()
         The images or the set of excluded images have changed.
-    again_requested, take_requested : Signal()
-        The user requests to search the images again, or to take images.
-    board_found : Signal(Board)
-        The board searched for is in an image.
     """
 
     dropped_changed = Signal()
-    again_requested = Signal()
-    take_requested = Signal()
-    board_found = Signal(object)
 
     def __init__(
         self,
+        project: RigProject,
         titles: tuple[str, ...],
         hint: str,
         drawing: str,
@@ -70,6 +70,7 @@ class ImagesPanel(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
+        self._project = project
         self.buttons, self.search = QWidget(), QWidget()
         self.shots: tuple[Shot, ...] = ()
         self._question: tuple[tuple[Path, ...], Board] | None = None
@@ -94,11 +95,10 @@ class ImagesPanel(QWidget):
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)  # where another one is longer
         self._trouble = FindingLine("images")
         self._trouble.hide()
-        self._again = button("again", again, help_text=tr("Read the folders again"))
-        self._take = button("take", take, help_text=tr("Take images with cameras of this computer"))
-        self._again.setEnabled(False)
-        self._again.clicked.connect(self._search_again)
-        self._take.clicked.connect(self.take_requested)
+        self.again = button("again", again, help_text=tr("Read the folders again"))
+        self.take = button("take", take, help_text=tr("Take images with cameras of this computer"))
+        self.again.setEnabled(False)
+        self.again.clicked.connect(self.forget)
         self.bar = JobBar(tr("Cancel"))  # without a letter: two panels may search at once
         self.bar.failed.connect(self.show_trouble)
         self.bar.busy_changed.connect(self.bar.setVisible)
@@ -128,7 +128,7 @@ class ImagesPanel(QWidget):
     def add_button(self, added: QPushButton) -> None:
         """Add a button in front of the panel's own."""
         self._button_row.insertWidget(0, added)
-        QWidget.setTabOrder(added, self._take)
+        QWidget.setTabOrder(added, self.take)
 
     def look(self, folders: Sequence[str], board: Board, dropped: Sequence[str]) -> None:
         """Search folders for the board, unless just done; do nothing if a folder is missing."""
@@ -140,12 +140,13 @@ class ImagesPanel(QWidget):
         if before and before != paths:
             dropped = ()  # they refer to other images
         self._question = question
-        self._again.setEnabled(len(paths) == len(folders))
+        self.again.setEnabled(len(paths) == len(folders))
         self._show((), ())
         if len(paths) == len(folders):
-            work: Callable[..., object] = partial(look, paths, board)
             self.bar.run(
-                tr("Looking for the board"), work, lambda shots: self._show(shots, dropped)
+                tr("Looking for the board"),
+                partial(_look, paths, board),
+                lambda seen: self._show(seen[0], dropped, seen[1]),
             )
         else:
             self.bar.stop()
@@ -171,7 +172,9 @@ class ImagesPanel(QWidget):
         self.bar.stop()
         self._view.stop()
 
-    def _show(self, shots: tuple[Shot, ...], dropped: Sequence[str]) -> None:
+    def _show(
+        self, shots: tuple[Shot, ...], dropped: Sequence[str], other: Board | None = None
+    ) -> None:
         self.shots = shots
         self._trouble.hide()
         self._view.show_shot(None)
@@ -179,11 +182,30 @@ class ImagesPanel(QWidget):
         self._refresh()
         self.dropped_changed.emit()
         if self._question is not None and not all(shot.problem for shot in shots):
-            self.board_found.emit(self._question[1])
+            self._project.note_found(self._question[1])
+        if other is not None:
+            self._offer(other)
 
-    def _search_again(self) -> None:
-        self.forget()
-        self.again_requested.emit()
+    def _offer(self, other: Board) -> None:
+        """Offer the board that the images show, if it is not the one entered."""
+        entered = self._project.inputs.board
+        if self._question is None or self._question[1] != entered:
+            return  # not the printed board, but the grid on a display
+
+        def use() -> None:
+            self._project.enter(board=other)
+            self.again.click()
+
+        shown, expected = (f"{one.squares[0]} × {one.squares[1]}" for one in (other, entered))
+        found = tr("the images show {}, the board page says {}").format(shown, expected)
+        label = tr("Use {}").format(shown)
+        if other.squares == entered.squares:
+            found = tr("the images show a board printed by OpenCV before 4.6")
+            if entered.legacy:
+                found = tr("the images show a board printed by OpenCV 4.6 or later")
+            label = tr("Use this board")
+        self._trouble.show_finding(Finding("", Health.BROKEN, found), label, use)
+        self._trouble.show()
 
     def _show_chosen(self, place: int) -> None:
         self._view.show_shot(self.shots[place] if place >= 0 else None)
@@ -211,6 +233,13 @@ class ImagesPanel(QWidget):
         split.addWidget(self._view)
         split.setStretchFactor(1, 1)
         hbox((split, 1), side, on=self, margins=SPACING_PX, spacing=2 * SPACING_PX)
-        buttons = self._take, self._again
+        buttons = self.take, self.again
         self._button_row = hbox(*buttons, 1, on=self.buttons, margins=0, spacing=SPACING_PX)
         vbox(self._trouble, self.bar, on=self.search, margins=0, spacing=0)
+
+
+def _look(
+    folders: tuple[Path, ...], board: Board, progress: Progress
+) -> tuple[tuple[Shot, ...], Board | None]:
+    shots = look(folders, board, progress)
+    return shots, other_board(shots, board)

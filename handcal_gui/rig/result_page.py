@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QHideEvent
+from PySide6.QtGui import QHideEvent, QIcon
 from PySide6.QtWidgets import (
+    QAbstractItemView,
     QFormLayout,
     QHBoxLayout,
+    QHeaderView,
     QLineEdit,
     QMessageBox,
+    QTableWidget,
+    QTableWidgetItem,
     QTabWidget,
     QWidget,
 )
@@ -25,27 +29,49 @@ from handcal.rig.check import MAX_NAME
 from handcal.rig.report import RigFinding, report_rig
 from handcal.rig.rig_file import read_rig
 from handcal.station.checks.doctor import Finding, Health
-from handcal_gui.app.theme import SPACING_PX
+from handcal_gui.app.theme import SPACING_PX, colors, flat_header, follow_theme, icon
 from handcal_gui.app.translation import tr
 from handcal_gui.rig.accept_dialog import AcceptDialog
 from handcal_gui.rig.file_dialogs import ask_save
-from handcal_gui.rig.finding_list import FindingList
 from handcal_gui.rig.project import RigProject
 from handcal_gui.rig.rows import COLUMNS, difference_rows, rig_rows
 from handcal_gui.rig.step_inputs import STEP_TITLES
 from handcal_gui.widgets.action_strip import action_strip
-from handcal_gui.widgets.fields import button, label_for, main_button, paragraph, with_name
+from handcal_gui.widgets.fields import (
+    button,
+    label_for,
+    main_button,
+    make_linked,
+    paragraph,
+    with_name,
+)
 from handcal_gui.widgets.finding_line import FindingLine
 from handcal_gui.widgets.layouts import vbox
 from handcal_gui.widgets.path_field import PathField
+from handcal_gui.widgets.sentence import sentence
 from handcal_gui.widgets.table import Table
 from handcal_gui.widgets.times import local_time
 
 _RIG_FILES = tr("Rig files (*.yaml *.yml)")
+_CHECKS = "docs/tutorial.md#7-check-depth-and-displays"
+_HOW = tr(
+    "The depth and the displays are checked outside this window: "
+    '<a href="{}">how to check them</a>.'
+)
+_FOUND, _EXPECTED = 1, 2
+_WIDEST_PX = 45 * SPACING_PX
+_TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(\+\d\d:\d\d|Z)?")
+"""ISO 8601."""
 
 
 class ResultPage(QWidget):
     """Shows the findings on the rig and its numbers, compares it with others, and saves it.
+
+    Parameters
+    ----------
+    project : RigProject
+    read : callable
+        Shows a page of the manual.
 
     Attributes
     ----------
@@ -55,7 +81,12 @@ class ResultPage(QWidget):
 
     rig_saved = Signal(object)
 
-    def __init__(self, project: RigProject, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        project: RigProject,
+        read: Callable[[str], object] = lambda _page: None,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self.setObjectName("resultPage")
         self._project = project
@@ -64,7 +95,9 @@ class ResultPage(QWidget):
         self._name_problem = paragraph(
             "rigNameProblem", tr("Enter a name of printable characters, to save the rig.")
         )
-        self._findings = FindingList(tr("Check of the rig"))
+        self._findings = _findings_table()
+        self._how = make_linked(paragraph("howToCheck", _HOW.format(_CHECKS)))
+        self._how.linkActivated.connect(read)
         self._numbers = Table("numbers-of-the-rig", tr("Numbers of the rig"))
         self._other = PathField(tr("Rig file to compare with"), "file", _RIG_FILES)
         self._differences = Table("differences", tr("Differences"))
@@ -87,13 +120,16 @@ class ResultPage(QWidget):
         self._accept.clicked.connect(self._open_acceptance)
         self._use.clicked.connect(self._ask_to_use)
         project.rig_changed.connect(self.enter)
+        follow_theme(self, self._show_findings)
 
     def enter(self) -> None:
         """Show the present rig."""
         rig = self._project.rig
         self._name.setText(rig.name)
         findings = (*report_rig(rig), *self._outdated(), self._accepted())
-        self._findings.show_findings([_unless_initial(one, rig) for one in findings])
+        self._shown = [_unless_initial(one, rig) for one in findings]
+        self._show_findings()
+        self._how.setVisible(any(one.command for one in findings))
         self._numbers.show_rows(COLUMNS, rig_rows(rig))
         saved = self._project.saved_file
         self._use.setEnabled(saved is not None)
@@ -133,6 +169,24 @@ class ResultPage(QWidget):
         """Close the acceptance, if it is open."""
         if self._acceptance is not None:
             self._acceptance.reject()
+
+    def _show_findings(self) -> None:
+        """Show the findings: failed and doubtful ones come first, then what is not known."""
+        shown = sorted(self._shown, key=lambda one: (not one.has_failed, one.is_fine, one.is_known))
+        table = self._findings
+        table.setRowCount(len(shown))
+        for row, one in enumerate(shown):
+            found = _TIME.sub(lambda time: local_time(time[0]), one.found)
+            expected = "" if one.is_fine else one.expected
+            for column, text in enumerate((one.what, found, expected)):
+                item = QTableWidgetItem(sentence(text))
+                item.setTextAlignment(Qt.AlignmentFlag.AlignTop)
+                table.setItem(row, column, item)
+            sign, shade, word = _sign(one)
+            item = table.item(row, 0)
+            item.setIcon(icon(sign, getattr(colors(), shade)) if sign else QIcon())
+            item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, word)
+        table.setColumnHidden(_EXPECTED, all(one.is_fine for one in shown))
 
     def _outdated(self) -> list[RigFinding]:
         """Return the steps that were solved with other inputs than the present ones."""
@@ -211,10 +265,11 @@ class ResultPage(QWidget):
         self._differences.show()
 
     def _lay_out(self) -> None:
-        compare = QWidget()
+        check, compare = QWidget(), QWidget()
+        vbox((self._findings, 1), self._how, on=check, margins=0, spacing=SPACING_PX)
         vbox(self._other, self._compared, (self._differences, 1), 0, on=compare, spacing=SPACING_PX)
         tabs = QTabWidget(documentMode=True)
-        tabs.addTab(self._findings, tr("C&heck"))
+        tabs.addTab(check, tr("C&heck"))
         tabs.addTab(self._numbers, tr("Nu&mbers"))
         tabs.addTab(compare, tr("Com&pare"))
         form = QFormLayout()
@@ -228,6 +283,36 @@ class ResultPage(QWidget):
         foot.addWidget(self._accept)
         foot.addWidget(self._use)
         vbox(form, (tabs, 1), foot, on=self, margins=0, spacing=SPACING_PX)
+
+
+def _findings_table() -> QTableWidget:
+    table = with_name(QTableWidget(0, 3), "rigFindings", tr("Check of the rig"))
+    table.setHorizontalHeaderLabels([tr("Item"), tr("Found"), tr("Expected")])
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+    table.setTabKeyNavigation(False)
+    table.setAlternatingRowColors(True)
+    table.setShowGrid(False)
+    table.verticalHeader().hide()
+    table.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    flat_header(table.horizontalHeader())
+    table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    table.horizontalHeader().setSectionResizeMode(_FOUND, QHeaderView.ResizeMode.Stretch)
+    table.horizontalHeader().setMaximumSectionSize(_WIDEST_PX)
+    return table
+
+
+def _sign(finding: RigFinding) -> tuple[str, str, str]:
+    """Return the icon of a finding, its colour, and the word for it; empty if it is not judged."""
+    if finding.has_failed:
+        return "cross", "red", tr("Failed")
+    if not finding.is_known:
+        return "wait", "muted", tr("Not known")
+    if not finding.is_judged:
+        return "", "", ""
+    if finding.is_fine:
+        return "check", "good", tr("Good")
+    return "warning", "warning", tr("Doubtful")
 
 
 def _unless_initial(finding: RigFinding, rig: Rig) -> RigFinding:

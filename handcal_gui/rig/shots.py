@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,10 +15,13 @@ from handcal.core.progress import Progress
 from handcal.core.types import UInt8
 from handcal.io.images import read_image
 from handcal.rig.boards.board import Board
+from handcal.rig.boards.finder import shown_instead
 from handcal.rig.boards.views import BoardImage, image_files, pair_views, read_views
 from handcal_gui.app.translation import tr
 
 _SMALL_PX = 96
+_LOOKED_AT = 3
+"""Images that tell which board they show, if not the one entered."""
 _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
 
 
@@ -73,6 +77,18 @@ def look(
         of_views = tuple(files[number, view.name] for number, view in enumerate(views))
         shots.append(Shot(views, of_views, _small(of_views[0])))
     return tuple(shots)
+
+
+def other_board(shots: Sequence[Shot], board: Board) -> Board | None:
+    """Return the board that the first images show in place of `board`; None if not certain."""
+    if any(view.found for shot in shots for view in shot.views):
+        return None
+    shown = []
+    for shot in shots[:_LOOKED_AT]:
+        with suppress(FileError):
+            shown.append(shown_instead(read_color(shot.files[0]), board))
+    found = [one for one in shown if one is not None]
+    return found[0] if found and found == len(found) * found[:1] else None
 
 
 def excluding(shots: Sequence[Shot], names: Collection[str]) -> list[tuple[BoardImage, ...]]:

@@ -28,8 +28,6 @@ from handcal_gui.widgets.path_field import PathField
 
 _FIRST_PANEL = 2
 """Place of the first panel of images among the tabs."""
-_NARROW_PX = 112 * SPACING_PX
-"""Width below which two columns of inputs are too narrow for paths."""
 
 
 class StepPage(QWidget):
@@ -88,8 +86,7 @@ class StepPage(QWidget):
             panel.dropped_changed.connect(self.keep)
             panel.dropped_changed.connect(self._refresh)
             panel.bar.busy_changed.connect(self._refresh)
-            panel.again_requested.connect(self.enter)
-            panel.board_found.connect(project.note_found)
+            panel.again.clicked.connect(self.enter)
             panel.dropped_changed.connect(self._show_images)
         self.box.bar.busy_changed.connect(self._refresh)
         self.box.shown.connect(self._refresh)
@@ -193,7 +190,6 @@ class StepPage(QWidget):
             grid.setColumnStretch(column, 1)
             for row, part in enumerate((panel.hint, panel.drawing, panel.buttons)):
                 grid.addWidget(part, row, column)
-        self.form.narrow_px = _NARROW_PX
         vbox(self.form, 1, on=inputs, margins=SPACING_PX)
         self._tabs.addTab(setup, tr("Set-&up"))
         self._tabs.addTab(inputs, tr("&Inputs"))

@@ -75,10 +75,12 @@ class StereoPage(StepPage):
             }
         )
         form.show_entries(project.inputs.stereo)
-        panel = ImagesPanel((tr("Depth camera"), tr("Headset camera")), _HINT, "setup-stereo")
+        panel = ImagesPanel(
+            project, (tr("Depth camera"), tr("Headset camera")), _HINT, "setup-stereo"
+        )
         super().__init__("stereoPage", "T_H_D", project, form, {tr("&Pairs"): panel}, parent)
         self.panel = panel
-        self.panel.take_requested.connect(self._take)
+        self.panel.take.clicked.connect(self._take)
         self.show_known()
 
     def enter(self) -> None:

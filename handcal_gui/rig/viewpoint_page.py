@@ -49,12 +49,12 @@ class ViewpointPage(StepPage):
             }
         )
         form.show_entries(project.inputs.viewpoint)
-        panel = ImagesPanel((tr("Viewpoint camera"),), _HINT, "setup-viewpoint")
+        panel = ImagesPanel(project, (tr("Viewpoint camera"),), _HINT, "setup-viewpoint")
         super().__init__(
             "viewpointPage", "viewpoint", project, form, {tr("I&mages"): panel}, parent
         )
         self.panel = panel
-        self.panel.take_requested.connect(self._take)
+        self.panel.take.clicked.connect(self._take)
         self.show_known()
 
     def enter(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from PySide6.QtCore import QSize, Qt, Signal
@@ -101,24 +102,24 @@ class RigWizard(QDialog):
         Project folder; a later wizard resumes from it.
     realsense : RealSenseSettings, optional
         Settings of a RealSense used to take images.
+    read : callable
+        Shows a page of the manual.
 
     Attributes
     ----------
     rig_saved : Signal(Path)
         Rig file to use for the next calibration.
-    manual_wanted : Signal(str)
-        The user wants to read a page of the manual.
     project : RigProject
     """
 
     rig_saved = Signal(object)
-    manual_wanted = Signal(str)
 
     def __init__(
         self,
         folder: ProjectFolder,
         parent: QWidget | None = None,
         realsense: RealSenseSettings | None = None,
+        read: Callable[[str], object] = lambda _page: None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("rigWizard")
@@ -128,14 +129,14 @@ class RigWizard(QDialog):
         self._rail = with_name(QListWidget(), "rigRail", tr("Steps"))
         self._title, self._purpose = QLabel(), paragraph("rigPurpose")
         self._stack, self._strips = QStackedWidget(), QStackedWidget()
-        result = ResultPage(self.project)
+        result = ResultPage(self.project, read)
         self._pages: list[RigPage] = []
         for page in (
             BoardPage(self.project),
             StereoPage(self.project),
             ViewpointPage(self.project),
-            DisplayPage(self.project, "left"),
-            DisplayPage(self.project, "right"),
+            DisplayPage(self.project, "left", read),
+            DisplayPage(self.project, "right", read),
             result,
         ):
             self._stack.addWidget(page)
@@ -148,8 +149,6 @@ class RigWizard(QDialog):
             self._rail.addItem(QListWidgetItem(title))
         self._lay_out()
         self._rail.currentRowChanged.connect(self._go_to)
-        for display in self.findChildren(DisplayPage):
-            display.manual_wanted.connect(self.manual_wanted)
         self._back.clicked.connect(lambda: self.show_step(self.step - 1))
         self._next.clicked.connect(lambda: self.show_step(self.step + 1))
         self._close.clicked.connect(self.reject)

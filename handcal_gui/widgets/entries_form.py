@@ -1,17 +1,17 @@
-"""A form with one or two columns of fields for the entries of a dataclass."""
+"""A form for the entries of a dataclass."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QAbstractSpinBox,
     QCheckBox,
     QComboBox,
-    QGridLayout,
+    QFormLayout,
     QLineEdit,
     QSpinBox,
     QWidget,
@@ -19,14 +19,13 @@ from PySide6.QtWidgets import (
 
 from handcal_gui.app.theme import SPACING_PX
 from handcal_gui.widgets.fields import label_for, make_equally_wide
-from handcal_gui.widgets.layouts import fit_soon
 from handcal_gui.widgets.path_field import PathField
 
 Entries = TypeVar("Entries")
 
 
 class EntriesForm(QWidget):
-    """Shows fields of a dataclass: paths, choices, check boxes, texts and whole numbers.
+    """Shows fields of a dataclass: paths, choices, check boxes, texts and numbers.
 
     Parameters
     ----------
@@ -36,8 +35,6 @@ class EntriesForm(QWidget):
     Attributes
     ----------
     changed : Signal()
-    narrow_px : int
-        Width below which the fields stand in one column.
     """
 
     changed = Signal()
@@ -47,83 +44,56 @@ class EntriesForm(QWidget):
     ) -> None:
         super().__init__(parent)
         self._fields = {name: field for name, (_, field) in fields.items()}
-        self._labels = [label_for(field, text) for text, field in fields.values()]
         make_equally_wide(one for one in self._fields.values() if isinstance(one, QSpinBox))
-        self.narrow_px = 0
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setHorizontalSpacing(SPACING_PX)
-        self._grid.setVerticalSpacing(SPACING_PX // 2)
-        self._fit_soon = fit_soon(self._fit, self)
-        self._fit()
-        for field in self._fields.values():
-            _change_of(field).connect(self.changed)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Use as many columns as there is room for."""
-        super().resizeEvent(event)
-        self._fit_soon.start()
+        form = QFormLayout(self)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.setHorizontalSpacing(SPACING_PX)
+        form.setVerticalSpacing(SPACING_PX // 2)
+        for text, field in fields.values():
+            form.addRow(label_for(field, text), field)
+            _kind_of(field).change(field).connect(self.changed)
 
     def show_entries(self, entries: object) -> None:
         """Show the fields' values."""
-        for name, field in self._fields.items():
-            _show(field, getattr(entries, name))
+        self.enter(**{name: getattr(entries, name) for name in self._fields})
 
     def enter(self, **values: object) -> None:
         """Show other values of some fields, as if typed."""
         for name, value in values.items():
-            _show(self._fields[name], value)
+            _kind_of(self._fields[name]).show(self._fields[name], value)
 
     def take(self, entries: Entries) -> Entries:
         """Return the entered values."""
-        shown = {name: _value(field) for name, field in self._fields.items()}
+        shown = {name: _kind_of(field).value(field) for name, field in self._fields.items()}
         return cast(Entries, replace(cast(Any, entries), **shown))
 
-    def _fit(self) -> None:
-        columns = 1 if self.width() < self.narrow_px else 2
-        rows = -(-len(self._fields) // columns)
-        columns = -(-len(self._fields) // rows)
-        for number, field in enumerate(self._fields.values()):
-            row, column = number % rows, 3 * (number // rows)
-            self._grid.addWidget(self._labels[number], row, column)
-            self._grid.addWidget(field, row, column + 1)
-        self._grid.setColumnStretch(1, 1)
-        self._grid.setColumnStretch(4, columns - 1)
-        self._grid.setColumnMinimumWidth(2, SPACING_PX * (columns - 1))
+
+class _Kind(NamedTuple):
+    """How a kind of field tells a change, shows a value, and gives the one entered."""
+
+    change: Callable[[Any], Any]
+    show: Callable[[Any, Any], object]
+    value: Callable[[Any], Any]
 
 
-def _change_of(field: QWidget) -> Any:
-    if isinstance(field, PathField):
-        return field.changed
-    if isinstance(field, QComboBox):
-        return field.currentIndexChanged
-    if isinstance(field, QCheckBox):
-        return field.toggled
-    if isinstance(field, QLineEdit):
-        return field.textChanged
-    return cast(QSpinBox, field).valueChanged
+_KINDS: dict[type[QWidget], _Kind] = {
+    PathField: _Kind(lambda one: one.changed, PathField.set_path, lambda one: one.path),
+    QComboBox: _Kind(
+        lambda one: one.currentIndexChanged,
+        lambda one, value: one.setCurrentIndex(one.findData(value)),
+        QComboBox.currentData,
+    ),
+    QCheckBox: _Kind(lambda one: one.toggled, QCheckBox.setChecked, QCheckBox.isChecked),
+    QLineEdit: _Kind(
+        lambda one: one.textChanged, QLineEdit.setText, lambda one: one.text().strip()
+    ),
+    QAbstractSpinBox: _Kind(
+        lambda one: one.valueChanged,
+        lambda one, value: one.setValue(value),
+        lambda one: one.value(),
+    ),
+}
 
 
-def _show(field: QWidget, value: Any) -> None:
-    if isinstance(field, PathField):
-        field.set_path(value)
-    elif isinstance(field, QComboBox):
-        field.setCurrentIndex(field.findData(value))
-    elif isinstance(field, QCheckBox):
-        field.setChecked(value)
-    elif isinstance(field, QLineEdit):
-        field.setText(value)
-    else:
-        cast(QSpinBox, field).setValue(value)
-
-
-def _value(field: QWidget) -> Any:
-    if isinstance(field, PathField):
-        return field.path
-    if isinstance(field, QComboBox):
-        return field.currentData()
-    if isinstance(field, QCheckBox):
-        return field.isChecked()
-    if isinstance(field, QLineEdit):
-        return field.text().strip()
-    return cast(QSpinBox, field).value()
+def _kind_of(field: QWidget) -> _Kind:
+    return next(kind for of, kind in _KINDS.items() if isinstance(field, of))

@@ -8,7 +8,7 @@ from html import escape
 from typing import TypeVar, cast
 
 from PySide6.QtCore import QEvent, QLocale, QObject, Qt
-from PySide6.QtGui import QAction, QHelpEvent, QValidator
+from PySide6.QtGui import QAction, QValidator
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractSpinBox,
@@ -20,15 +20,12 @@ from PySide6.QtWidgets import (
     QSpinBox,
     QStackedWidget,
     QToolButton,
-    QToolTip,
     QWidget,
 )
 
 from handcal.report.cells import MINUS, with_minus
 from handcal_gui.app.keys import add_action, native
 from handcal_gui.app.theme import SPACING_PX, scale_font, set_style
-from handcal_gui.app.translation import tr
-from handcal_gui.widgets.brief import show_briefly
 from handcal_gui.widgets.layouts import hbox
 
 Field = TypeVar("Field", bound=QWidget)
@@ -59,26 +56,14 @@ def plain_message(text: str) -> str:
 class NumberField(QDoubleSpinBox):
     """A field for a number, with a point and a minus as in every other number shown.
 
-    A number out of range can be typed; once it is complete, the nearest one takes its place, and
-    the field says so. Otherwise its last digits would be dropped: 99 became 9.
-
-    A comma becomes a point, and a hyphen is read as a minus. In the system's locale a comma, or a
-    point, is a separator of thousands: 0,5 was read as 5.
-
-    Attributes
-    ----------
-    note : str
-        Why the range is as it is, if that is not plain; said with it.
+    A comma becomes a point, and a hyphen is read as a minus: in some locales a comma or a point
+    separates thousands, and 0,5 was read as 5. A number out of range can be typed, and the nearest
+    one takes its place: otherwise its last digits would be dropped, and 99 became 9.
     """
 
     def __init__(self, decimals: int) -> None:
         super().__init__(decimals=decimals)
-        self.note = ""
         self.setLocale(QLocale.c())
-
-    def event(self, event: QEvent) -> bool:
-        """Name the range in the tooltip."""
-        return _show_range(self, event) or super().event(event)
 
     def textFromValue(self, value: float) -> str:
         """Return a number as it is shown."""
@@ -92,26 +77,16 @@ class NumberField(QDoubleSpinBox):
         """Return whether a text is a number, or may become one."""
         text = text.replace(",", ".")
         state, _, place = super().validate(text.replace(MINUS, "-"), place)
-        if state == QValidator.State.Invalid and self._typed(text) is not None:
-            state = QValidator.State.Intermediate
-        return state, text, place
+        pattern = rf"-?\d+(\.\d{{0,{self.decimals()}}})?"
+        return _allowing(state, _typed(self, text), pattern), text, place
 
     def fixup(self, text: str) -> str:
-        """Return the nearest number that is allowed, and say which are."""
-        typed = self._typed(text)
-        if typed is None:
-            return super().fixup(text)
-        return _nearest(self, typed, self.note)
-
-    def _typed(self, text: str) -> float | None:
-        """Return the number in a text, whatever the range; None if there is none."""
-        number_text = text.removesuffix(self.suffix()).strip().replace(MINUS, "-")
-        is_number = re.fullmatch(rf"-?\d+(\.\d{{0,{self.decimals()}}})?", number_text, re.ASCII)
-        return float(number_text) if is_number else None
+        """Return the nearest number that is allowed."""
+        return _nearest(self, text) or super().fixup(text)
 
 
 class WholeNumberField(QSpinBox):
-    """A field for a whole number, which takes no separators: it showed 1,5 and was 15.
+    """A field for a whole number, without separators: it showed 1,5 and was 15.
 
     For a number out of range, the nearest one is taken, as in `NumberField`.
     """
@@ -120,27 +95,16 @@ class WholeNumberField(QSpinBox):
         super().__init__(minimum=low, maximum=high)
         self.setLocale(QLocale.c())
 
-    def event(self, event: QEvent) -> bool:
-        """Name the range in the tooltip."""
-        return _show_range(self, event) or super().event(event)
-
     def validate(self, text: str, place: int) -> tuple[QValidator.State, str, int]:
         """Refuse a point or a comma."""
-        if {".", ","} & set(text.removesuffix(self.suffix())):
+        if {".", ","} & set(_typed(self, text)):
             return QValidator.State.Invalid, text, place
         state, text, place = super().validate(text, place)
-        if state == QValidator.State.Invalid and self._is_number(text):
-            state = QValidator.State.Intermediate
-        return state, text, place
+        return _allowing(state, _typed(self, text), r"-?\d{1,18}"), text, place
 
     def fixup(self, text: str) -> str:
-        """Return the nearest number that is allowed, and say which are."""
-        if not self._is_number(text):
-            return super().fixup(text)
-        return _nearest(self, int(text.removesuffix(self.suffix())))
-
-    def _is_number(self, text: str) -> bool:
-        return re.fullmatch(r"-?\d{1,18}", text.removesuffix(self.suffix()), re.ASCII) is not None
+        """Return the nearest number that is allowed."""
+        return _nearest(self, text) or super().fixup(text)
 
 
 def number(
@@ -281,29 +245,25 @@ def _as_it_is(text: str, white_space: str) -> str:
     return f"<p style='white-space: {white_space}'>{escape(text)}</p>" if is_like_markup else text
 
 
-def _show_range(spin: QAbstractSpinBox, event: QEvent) -> bool:
-    """Show a field's tooltip and range if an event asks for it: nothing outside is taken."""
-    if event.type() != QEvent.Type.ToolTip:
-        return False
-    field = cast(QDoubleSpinBox, spin)  # or a field for whole numbers, with the same functions
-    text = f"{field.toolTip()}\n{_range_text(field)}".strip()
-    QToolTip.showText(cast(QHelpEvent, event).globalPos(), text, field)
-    return True
+def _typed(field: QDoubleSpinBox | QSpinBox, text: str) -> str:
+    return text.removesuffix(field.suffix()).strip().replace(MINUS, "-")
 
 
-def _nearest(spin: QAbstractSpinBox, typed: float, note: str = "") -> str:
-    """Return the text of the allowed number nearest to one typed, and say so over its field."""
-    field = cast(QDoubleSpinBox, spin)
-    nearest = min(max(typed, field.minimum()), field.maximum())
-    taken = f"{field.textFromValue(nearest)}{field.suffix()}"
-    said = tr("Changed to {}. {}").format(taken, _range_text(field))
-    show_briefly(field, "\n".join(filter(None, (said, note))))
-    return taken
+def _allowing(state: QValidator.State, typed: str, pattern: str) -> QValidator.State:
+    """Return a state in which a number out of range can be typed in full."""
+    is_number = re.fullmatch(pattern, typed, re.ASCII) is not None
+    is_refused = state == QValidator.State.Invalid
+    return QValidator.State.Intermediate if is_refused and is_number else state
 
 
-def _range_text(field: QDoubleSpinBox) -> str:
-    low, high = (field.textFromValue(end) for end in (field.minimum(), field.maximum()))
-    return tr("Allowed: {} to {}").format(low, high + field.suffix())
+def _nearest(field: QDoubleSpinBox | QSpinBox, text: str) -> str:
+    """Return the text of the allowed number nearest to the one typed; empty if there is none."""
+    try:
+        number = float(_typed(field, text))
+    except ValueError:
+        return ""
+    nearest = type(field.value())(min(max(number, field.minimum()), field.maximum()))
+    return f"{field.textFromValue(nearest)}{field.suffix()}"
 
 
 def _settle(field: Spin) -> Spin:

@@ -42,6 +42,10 @@ FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 LEFT_HANDED = np.diag([1.0, 1.0, -1.0, 1.0])
 
 
+def scaled(K: Float64, factor: float) -> Float64:
+    return K * np.array([[factor, 1.0, 1.0], [1.0, factor, 1.0], [1.0, 1.0, 1.0]])
+
+
 @pytest.mark.parametrize(
     ("make", "problem"),
     [
@@ -75,6 +79,7 @@ LEFT_HANDED = np.diag([1.0, 1.0, -1.0, 1.0])
         (lambda: with_depth_camera(width=720, height=1280), "cx is 639.5 .* another size of image"),
         (lambda: with_display(K=edited(LEFT.K, 0, 0, 24.56)), "left.K: fx is 24.56 px"),
         (lambda: with_display(K=edited(LEFT.K, 1, 2, 10.0)), "left.K: cy is 10 px"),
+        (lambda: with_display(K=scaled(LEFT.K, 0.13)), "left.K: the display is 127° across"),
         (lambda: with_display(T_V_H=rigid(None, [0.06, 0.4, 0])), "T_V_H: .* 0.404 m from"),
         (lambda: with_display(T_V_H=FROM_OPENGL @ LEFT.T_V_H), "T_V_H: .* 179° away .* OpenGL"),
         (

@@ -105,7 +105,8 @@ def test_edges_that_were_never_measured_are_told_with_what_is_assumed() -> None:
     d415 = replace(RIG, depth_camera=CameraIdentity("Intel RealSense D415", "123"))
     told = {one.what: one for one in report_rig(d415)}["Depth edges outside the true ones"]
     assert not told.is_known
-    assert told.found == ("not measured, +1.8 ± 0.7 px assumed: run 'handcal rig depth'")
+    assert told.found == "not measured, +1.8 ± 0.7 px assumed"
+    assert told.command == "handcal rig depth"
     edges = DepthEdges(1.2, 0.3, "measured", 9, "today")
     told = {one.what: one for one in report_rig(replace(d415, depth_edges=edges))}[told.what]
     assert told.is_known

@@ -36,6 +36,6 @@ def test_what_is_seen_agrees_with_the_rig(tmp_path: Path) -> None:
         places = [
             T @ invert(seen_pose(folder / name, VIEWPOINT_CAMERA)) for name, T in tracked.items()
         ]
-        assert len(places) == 4
+        assert len(places) == 8
         np.testing.assert_allclose(places, [places[0]] * 4, atol=0.01)
         assert len(list((tmp_path / f"grid-{eye}").iterdir())) == 2

@@ -97,14 +97,13 @@ def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     mirrored = np.ascontiguousarray(gray[:, ::-1])
     if len(find(mirrored, board)[0]) >= MIN_CORNERS:
         return "the image is mirrored: switch that off in the camera"
+    other_print = replace(board, legacy=not board.legacy)
+    if len(find(gray, other_print)[0]) >= MIN_CORNERS:
+        age = "before 4.6" if other_print.legacy else "4.6 or later"
+        return f"the board was printed by OpenCV {age}: enter that"
     other = other_squares(gray, board)
     if other:
         return other
-    other_print = replace(board, legacy=not board.legacy)
-    if len(find(gray, other_print)[0]) >= MIN_CORNERS:
-        kind = "an older" if other_print.legacy else "a newer"
-        use = "use" if other_print.legacy else "leave out"
-        return f"the board was printed by {kind} OpenCV: {use} --legacy"
     ids = list(_markers(gray, board.marker_dictionary))
     on_board = (board.squares[0] * board.squares[1]) // 2
     if len(ids) >= _ENOUGH_MARKERS:
@@ -127,14 +126,45 @@ def _why_no_charuco(gray: UInt8, board: Board, find: FindCorners) -> str:
     return "no board is seen: it must be sharp, evenly lit and large enough in the image"
 
 
+def shown_board(gray: UInt8, board: Board, find: FindCorners) -> Board | None:
+    """Return the board that an image shows in place of the one entered; None if it does not tell.
+
+    Parameters
+    ----------
+    gray, board, find
+        As for `explain_missing`.
+    """
+    if board.kind == "checkerboard":
+        size = _size(_checkerboard(gray))
+        if size is None or size == tuple(sorted(board.squares)):
+            return None
+        return replace(board, squares=size[::-1])
+    other_print = replace(board, legacy=not board.legacy)
+    if len(find(gray, other_print)[0]) >= MIN_CORNERS:
+        return other_print
+    return _board_of_markers(gray, board)
+
+
 def other_squares(gray: UInt8, board: Board) -> str:
     """Return a message with the number of squares that the markers' numbers and places show.
 
     It is empty if they do not show it, or lie as on the board entered.
     """
+    other = _board_of_markers(gray, board)
+    if other is None:
+        return ""
+    (columns, rows), (width, height) = other.squares, board.squares
+    return (
+        f"the markers lie as on a board of {columns}×{rows} squares, not {width}×{height}: "
+        f"{OTHER_BOARD}"
+    )
+
+
+def _board_of_markers(gray: UInt8, board: Board) -> Board | None:
+    """Return the board of other squares on which the markers seen lie; None if none is certain."""
     seen = _markers(gray, board.marker_dictionary)
     if len(seen) < _ENOUGH_MARKERS or _fits(seen, board):
-        return ""
+        return None
     fitting = []
     for columns in range(3, 41):
         # Rows up to that of the last marker seen; whether they are even says how they begin.
@@ -144,15 +174,11 @@ def other_squares(gray: UInt8, board: Board) -> str:
                 if _fits(seen, tried):
                     fitting.append(tried)
     if len({one.squares[0] for one in fitting}) != 1:
-        return ""
+        return None
     columns, rows = min(one.squares for one in fitting)
-    width, height = board.squares
-    if columns == height:  # exchanged; the last rows may be outside the image
-        rows = max(rows, width)
-    return (
-        f"the markers lie as on a board of {columns}×{rows} squares, not {width}×{height}: "
-        f"{OTHER_BOARD}"
-    )
+    if columns == board.squares[1]:  # exchanged; the last rows may be outside the image
+        rows = max(rows, board.squares[0])
+    return replace(board, squares=(columns, rows))
 
 
 def _fits(seen: Mapping[int, Float64], board: Board) -> bool:

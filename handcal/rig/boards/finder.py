@@ -17,7 +17,13 @@ from handcal.rig.boards.board import (
     charuco,
     corners_m,
 )
-from handcal.rig.boards.diagnosis import OTHER_BOARD, explain_missing, other_squares, why_not_plain
+from handcal.rig.boards.diagnosis import (
+    OTHER_BOARD,
+    explain_missing,
+    other_squares,
+    shown_board,
+    why_not_plain,
+)
 
 # In squares: corners farther than this from the place predicted by the others are rejected.
 _STRAY_SQUARES = 0.5
@@ -72,6 +78,16 @@ def find_board(image: UInt8, board: Board, *, explain: bool = True) -> BoardView
         ids=ids,
         blur_px=_blur_px(gray, ids, pixels, board),
     )
+
+
+def shown_instead(image: UInt8, board: Board) -> Board | None:
+    """Return the board that an image (H, W) or (H, W, 3) shows instead; None if it does not tell.
+
+    Of a ChArUco board, the numbers and places of its markers tell the squares, and whether it was
+    printed by OpenCV before 4.6; of a checkerboard, its corners.
+    """
+    gray = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) if image.ndim == 3 else image
+    return shown_board(np.asarray(gray, np.uint8), board, find_corners)
 
 
 def find_corners(gray: UInt8, board: Board) -> tuple[Int64, Float64]:

@@ -11,10 +11,12 @@ from PySide6.QtWidgets import QApplication, QDialog, QListWidget, QPushButton, Q
 from handcal.camera.settings import RealSenseSettings
 from handcal.core.errors import FileError
 from handcal_gui.app.autopilot.screenshots import Screenshots
-from handcal_gui.app.keys_dialog import KeysDialog
+from handcal_gui.app.manual import show_manual
+from handcal_gui.app.menus import show_keys
 from handcal_gui.app.preferences_dialog import PreferencesDialog
 from handcal_gui.app.program import Program
 from handcal_gui.calibrate.camera.panel import Mode
+from handcal_gui.calibrate.sections import TITLES
 from handcal_gui.calibrate.start.camera_settings import CameraSettingsDialog
 from handcal_gui.library.export_dialog import ExportDialog
 
@@ -76,17 +78,17 @@ class Tour(QObject):
         """Fine-tune φ, record trials, and save every panel and tab."""
         window = self._program.window
         yield from self._fine_tune()
-        for name, dock in window.docks.items():
-            dock.raise_()
+        for name in TITLES:
+            window.go_to(name)
             yield _LOOK_MS
-            picture = f"panel-{name.replace('_', '-')}"
-            self._save(picture, dock.widget())
-            for tabs in dock.findChildren(QTabWidget):
+            picture, panel = f"panel-{name.replace('_', '-')}", getattr(window.panels, name)
+            self._save(picture, panel)
+            for tabs in panel.findChildren(QTabWidget):
                 for i in range(tabs.count()):
                     tabs.setCurrentIndex(i)
                     yield _LOOK_MS
                     title = tabs.tabText(i).split(" (")[0].lower()
-                    self._save(f"{picture}-{title}", dock.widget())
+                    self._save(f"{picture}-{title}", panel)
                 tabs.setCurrentIndex(0)
         window.panels.camera.set_mode(Mode.BOTH)
         yield _LOOK_MS
@@ -118,7 +120,7 @@ class Tour(QObject):
         preferences = PreferencesDialog(program.preferences, program.window)
         shown: dict[str, QDialog] = {
             "preferences": preferences,
-            "keys": KeysDialog(program.window),
+            "keys": show_keys(program.window),
             "camera-settings": CameraSettingsDialog(RealSenseSettings(), program.window),
         }
         for name, one in shown.items():
@@ -157,11 +159,11 @@ class Tour(QObject):
                         self._save(f"{name}-{row + 1}", dialog)
                     yield from self._opened_by_buttons(name, dialog)
             dialog.close()
-        program.manual.open("docs/guide.md")
-        program.manual.search.setText("target")
+        manual = show_manual(program.window, "docs/guide.md")
+        manual.search.setText("target")
         yield _LOOK_MS
-        self._save("manual", program.manual)
-        program.manual.close()
+        self._save("manual", manual)
+        manual.close()
 
     def _opened_by_buttons(self, name: str, dialog: QWidget) -> Walk:
         """Save the dialogs that a page of a window opens, each once."""
@@ -179,7 +181,7 @@ class Tour(QObject):
     def _fine_tune(self) -> Walk:
         """Change φ, record trials with it, and reset it."""
         window, panel = self._program.window, self._program.window.panels.fine_tune
-        window.docks["fine_tune"].raise_()
+        window.go_to("fine_tune")
         yield _LOOK_MS
         for _ in range(_STEPS):
             _press(panel, Qt.Key.Key_Right)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTabWidget, QToolButton, QWidget
 
-from handcal_gui.calibrate.parts.tab_bar import TabBar
 from handcal_gui.widgets.table import Table
 
 
@@ -14,7 +13,6 @@ class RecordTabs(QTabWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setTabBar(TabBar())
         self._delete = QToolButton()
         self._delete.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the table handles Del
         self.setCornerWidget(self._delete)

@@ -124,8 +124,6 @@ class CalibrationFields(QWidget):
         self.add_row(tr("&Solver"), self._method, solves)
         self._near.valueChanged.connect(self._limit_gate)
         self._far.valueChanged.connect(self._limit_gate)
-        note = tr("“To” must be at least {:.2f} m larger than “from”.").format(_GATE_M)
-        self._near.note = self._far.note = note
         for field in (self._guard, self._near, self._far):
             field.valueChanged.connect(self.changed)
         for chosen in (self._roi, self._method):

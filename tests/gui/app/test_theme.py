@@ -9,17 +9,14 @@ from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
-from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QSlider, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal.core.types import Float64
 from handcal_gui.app.theme import colors, follow_theme, icon, is_dark, use_theme
 from handcal_gui.calibrate.parts.residual_scale import OUTLIER, residual_ramp
 from handcal_gui.widgets.fields import tool_button
-from tests.gui.helpers import show
 
 
 @pytest.fixture
@@ -73,32 +70,6 @@ def test_a_button_with_a_style_sheet_follows_the_theme(qtbot: QtBot) -> None:
     for theme in ("dark", "light", "contrast"):
         use_theme(theme)
         qtbot.waitUntil(follows)
-
-
-@pytest.mark.usefixtures("themes")
-@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
-def test_a_disabled_icon_is_grey(theme: Literal["light", "dark", "contrast"]) -> None:
-    use_theme(theme)
-    shades = []
-    for mode in (QIcon.Mode.Normal, QIcon.Mode.Disabled):
-        image = icon("undo").pixmap(QSize(24, 24), 1.0, mode).toImage()
-        pixels = [image.pixelColor(x, y) for x in range(24) for y in range(24)]
-        shades.append(max(pixels, key=QColor.alpha).lightness())
-    assert abs(shades[0] - shades[1]) > 60
-
-
-@pytest.mark.usefixtures("themes")
-@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
-def test_a_locked_slider_is_grey(qtbot: QtBot, theme: Literal["light", "dark", "contrast"]) -> None:
-    use_theme(theme)
-    slider = show(qtbot, QSlider(Qt.Orientation.Horizontal), 200, 30)
-    slider.setValue(50)
-    saturations = []
-    for is_enabled in (True, False):
-        slider.setEnabled(is_enabled)
-        saturations.append(slider.grab().toImage().pixelColor(40, 15).hslSaturation())
-    assert saturations[0] > 90
-    assert saturations[1] < 40
 
 
 def test_an_icon_takes_a_colour_with_a_meaning(qtbot: QtBot) -> None:
@@ -191,41 +162,6 @@ def test_every_colour_with_a_meaning_is_readable_as_text(
             shade = QColor(getattr(colors(), field.name))
             assert contrast(shade, ground) >= least, field.name
     assert contrast(QGuiApplication.palette().windowText().color(), ground) >= 7.0
-
-
-@pytest.mark.usefixtures("themes")
-@pytest.mark.parametrize("theme", ["light", "dark", "contrast"])
-def test_the_focus_is_seen(theme: Literal["light", "dark", "contrast"], qtbot: QtBot) -> None:
-    use_theme(theme)
-    window = QWidget()
-    field, other = QLineEdit("field", window), QPushButton("button", window)
-    for widget, top in ((field, 10), (other, 50)):
-        widget.setGeometry(10, top, 100, 24)
-    qtbot.addWidget(window)
-    window.show()
-    field.setFocus()
-    edges: dict[QWidget, list[QColor]] = {field: [], other: []}
-    for focused in (field, other):
-        qtbot.waitUntil(focused.hasFocus)
-        picture = window.grab().toImage()
-        for one, seen in edges.items():
-            seen.append(picture.pixelColor(one.x() + 50, one.y()))
-        QTest.keyClick(focused, Qt.Key.Key_Tab)
-    ground = window.palette().window().color()
-    for with_focus, without in (edges[field], edges[other][::-1]):
-        assert contrast(with_focus, ground) >= 3.0
-        if theme == "contrast":
-            assert contrast(without, ground) >= 7.0
-        assert with_focus != without
-    if theme == "contrast":
-        tool = tool_button(QAction())
-        tool.setParent(window)
-        tool.setGeometry(10, 90, 100, 24)
-        tool.show()
-        edge = tool.grab().toImage().pixelColor(50, 0)
-        assert contrast(edge, ground) >= 7.0
-    selected = field.palette()
-    assert contrast(selected.highlight().color(), selected.highlightedText().color()) >= 4.5
 
 
 @pytest.mark.usefixtures("themes")

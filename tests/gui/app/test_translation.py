@@ -1,25 +1,13 @@
-"""Every visible text of the window is in the catalogue, and is shown translated."""
+"""Every visible text of the window is marked with `tr`."""
 
 from __future__ import annotations
 
 import ast
 import re
-import shutil
-import subprocess
 from collections.abc import Iterator
-from pathlib import Path
-from string import Formatter
-from xml.etree import ElementTree
 
-import pytest
-from PySide6.QtCore import QCoreApplication, QLocale
-
-from handcal_gui.app import translation
-from handcal_gui.app.start import translation_for
-from handcal_gui.app.translation import tr, use_translator
 from tests.helpers import ROOT
 
-CATALOGUE = ROOT / "resources" / "translations" / "handcal_en.ts"
 NO_WINDOW = (
     "app/autopilot", "benchmark.py", "bundle.py", "app/start.py", "app/launch.py", "app/theme.py",
 )  # fmt: skip
@@ -96,77 +84,10 @@ def called(node: ast.AST) -> str:
     return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
 
 
-def test_no_visible_text_bypasses_the_catalogue() -> None:
+def test_no_visible_text_lacks_its_mark() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}: {text}"
         for path in SOURCES
         for line, text in untranslated(ast.parse(path.read_text("utf-8")))
     ]
     assert "\n".join(found) == ""
-
-
-def test_the_test_finds_texts_that_bypass_the_catalogue() -> None:
-    source = """
-label.setText("one")
-box = QLabel("Two words"), with_name(box, "three", "Four")
-_HELP = "Five is a sentence."
-name = f"{eye}, measured", f"color: {shade}", f"{kind}-number", f"{share:.1f} px"
-fine = tr("Six is translated"), with_name(box, "seven", tr("Eight")), label.setText("")
-"""
-    found = [text.strip("'") for _, text in untranslated(ast.parse(source))]
-    assert found == ["one", "Two words", "Four", ", measured", "Five is a sentence."]
-
-
-def test_the_catalogue_holds_every_text_once_in_one_context() -> None:
-    """If it fails, run ``python docs/translations.py``."""
-    root = ElementTree.parse(CATALOGUE).getroot()
-    assert [context.findtext("name") for context in root] == [""]
-    listed = [one.findtext("source") for one in root.iter("message")]
-    written = {
-        ast.literal_eval(node.args[0])
-        for path in (ROOT / "handcal_gui").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.Call) and called(node) == "tr"
-    }
-    assert len(listed) == len(set(listed))
-    assert set(listed) == written
-
-
-def test_placeholders_of_every_text_can_be_filled() -> None:
-    for message in ElementTree.parse(CATALOGUE).getroot().iter("message"):
-        source, translated = message.findtext("source"), message.findtext("translation")
-        assert source is not None
-        fields = [part[1:] for part in Formatter().parse(source) if part[1] is not None]
-        assert all(name == "" for name, _, _ in fields), source
-        if translated:
-            assert [part[1:] for part in Formatter().parse(translated) if part[1]] == fields
-
-
-@pytest.mark.process  # the compiler
-def test_a_compiled_translation_is_used(
-    tmp_path: Path, qapp: QCoreApplication, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    compiler = shutil.which("pyside6-lrelease")
-    if compiler is None:
-        pytest.skip("pyside6-lrelease is not installed")
-    text = CATALOGUE.read_text("utf-8")
-    source, empty = "<source>Show hand</source>", '<translation type="unfinished"></translation>'
-    assert source in text
-    before, after = text.split(source)
-    after = after.replace(empty, "<translation>Hand zeigen</translation>", 1)
-    (tmp_path / "handcal_de.ts").write_text(before + source + after, "utf-8")
-    compiled = tmp_path / "handcal_de.qm"
-    subprocess.run([compiler, "-silent", tmp_path / "handcal_de.ts", "-qm", compiled], check=True)
-    monkeypatch.setattr(translation, "_translate", [])
-    translator = translation_for(QLocale("de_AT"), tmp_path)
-    assert translator is not None
-    qapp.installTranslator(translator)
-    use_translator(lambda text: QCoreApplication.translate("", text))
-    assert tr("Show hand") == "Hand zeigen"
-    assert tr("Make cursor") == "Make cursor"
-    qapp.removeTranslator(translator)
-
-
-def test_no_object_name_is_made_of_a_shown_text() -> None:
-    made = re.compile(r"setObjectName\(.*\.lower\(\)")
-    assert [path.name for path in SOURCES if made.search(path.read_text("utf-8"))] == []

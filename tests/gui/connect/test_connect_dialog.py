@@ -208,12 +208,3 @@ def test_every_button_has_a_letter_of_its_own(dialog: ConnectDialog) -> None:
     found = letters(dialog)
     assert {"s", "i"} < {*found}  # of the two boxes
     assert len(set(found)) == len(found) >= 6
-
-
-def test_buttons_of_one_line_and_of_one_column_are_aligned(dialog: ConnectDialog) -> None:
-    bottoms = [
-        button(dialog, name).mapTo(dialog, button(dialog, name).rect().bottomLeft())
-        for name in ("invite", "close")
-    ]
-    assert bottoms[0].y() == bottoms[1].y()
-    assert button(dialog, "square-left").width() == button(dialog, "square-right").width()

@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
+from handcal_gui.app.manual import Manual
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
 from handcal_gui.evaluate.window import EvaluationWindow
@@ -34,8 +35,9 @@ def test_the_start_page_leads_to_evaluations(qtbot: QtBot, tmp_path: Path) -> No
     child(window.page, QLabel, "format").linkActivated.emit(
         "docs/commands.md#handcal-evaluate-segmentation"
     )
-    assert program.manual.isVisible()
-    shown = program.manual.page.textCursor().block().text()
+    manual = child(program.window, Manual, "manual")
+    assert manual.isVisible()
+    shown = manual.page.textCursor().block().text()
     assert shown == "handcal evaluate segmentation"
     window.show_page("noise")
     scheduler = child(window.page, QLineEdit, "scheduler")

@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
     QPushButton,
-    QTreeWidget,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -33,7 +32,7 @@ from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.path_field import PathField
 from handcal_gui.widgets.table import Table
-from tests.gui.helpers import letters
+from tests.gui.rig.wizard_steps import findings
 
 Kind = TypeVar("Kind", bound=QWidget)
 
@@ -60,19 +59,6 @@ def part(dialog: QWidget, kind: type[Kind], name: str) -> Kind:
     found = dialog.findChild(kind, name)
     assert isinstance(found, kind)
     return found
-
-
-def test_every_button_has_a_letter_of_its_own(dialog: AcceptDialog) -> None:
-    found = letters(dialog)
-    assert len(set(found)) == len(found) >= 6
-
-
-def test_on_a_small_screen_the_drawing_hides_no_button(dialog: AcceptDialog) -> None:
-    dialog.resize(dialog.width(), 360)
-    QApplication.processEvents()
-    drawing = part(dialog, Drawing, "drawing").geometry()
-    assert not drawing.intersects(part(dialog, QPushButton, "left-grid").geometry())
-    assert part(dialog, Table, "drawn-against-seen").isHidden(), "there are no numbers yet"
 
 
 def test_the_images_of_each_eye_are_counted_towards_what_is_needed(
@@ -181,12 +167,9 @@ def test_result_shows_the_last_acceptance_of_this_rig(qtbot: QtBot, project: Rig
     project.use_rig(replace(project.rig, eyes={**project.rig.eyes, "left": wrong}))
     page = ResultPage(project)
     qtbot.addWidget(page)
-    findings = part(page, QTreeWidget, "rigFindings")
 
     def acceptance() -> str:
-        rows = [findings.topLevelItem(row) for row in range(findings.topLevelItemCount())]
-        (found,) = (row.text(1) for row in rows if row and row.text(0) == "Acceptance")
-        return found
+        return findings(page)["Acceptance"][0]
 
     assert acceptance().startswith("Not yet")
     part(page, QPushButton, "acceptRig").click()

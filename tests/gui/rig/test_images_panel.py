@@ -1,46 +1,53 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QRect, QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
-    QApplication,
     QComboBox,
     QLabel,
     QPushButton,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
 
+from handcal.camera.settings import RealSenseSettings
+from handcal.rig.boards.board import Board
 from handcal.rig.boards.views import WorstView
 from handcal.rig.lens.uncertainty import ProjectionUncertainty
 from handcal.rig.verdict import CalibrationVerdict
-from handcal_gui.app.theme import use_theme
+from handcal.sim.photographs import BOARD
 from handcal_gui.rig.coverage_map import CoverageMap
 from handcal_gui.rig.images_panel import ImagesPanel
-from handcal_gui.rig.shot_list import ShotList
-from handcal_gui.rig.shot_view import ShotView
+from handcal_gui.rig.project import RigProject
+from handcal_gui.rig.project_folder import ProjectFolder
 from handcal_gui.rig.solve import SolvedPart
 from handcal_gui.rig.uncertainty_map import UncertaintyMap
 from handcal_gui.widgets.drawing import Drawing
 from handcal_gui.widgets.image_view import ImageView
-from tests.gui.helpers import child, height_px
+from tests.gui.helpers import child
 
 PAGES = "setup-stereo", "setup-viewpoint", "setup-display", "setup-board"
 
 
 @pytest.fixture
-def panel(qtbot: QtBot) -> Iterator[ImagesPanel]:
-    panel = ImagesPanel(("Depth camera", "Headset camera"), "Take some.", "setup-stereo")
+def project(photographs: Any, tmp_path: Path) -> RigProject:
+    folder = ProjectFolder(tmp_path / "rig")
+    folder.save(photographs.work)
+    return RigProject(folder, RealSenseSettings())
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, project: RigProject) -> Iterator[ImagesPanel]:
+    panel = ImagesPanel(project, ("Depth camera", "Headset camera"), "Take some.", "setup-stereo")
     qtbot.addWidget(panel)
     panel.resize(1000, 420)
     panel.show()
@@ -88,80 +95,20 @@ def test_an_image_is_shown_although_the_other_of_its_pair_cannot_be_read(
     qtbot.waitUntil(lambda: headset.has_image and "depth-001.png" in depth.message)
     assert not depth.has_image
     assert headset.message == ""
-    for column in range(4):
-        assert "depth-001.png" in item(panel, 0).toolTip(column), "the list may cut it"
+    assert "depth-001.png" in item(panel, 0).toolTip(4), "the list may cut it"
 
 
 def test_what_was_found_is_listed(qtbot: QtBot, full: ImagesPanel) -> None:
     assert text(full, "count") == "8 of 9 used"
     assert item(full, 0).text(0) == "depth-001.png"
     assert all(int(count) > 8 for count in item(full, 0).text(1).split(" · "))
-    name, problem = item(full, 8).text(0).split("\n")
-    assert name == "depth-099.png"
-    assert problem == f"{full.shots[8].problem[0].upper()}{full.shots[8].problem[1:]}"
+    assert item(full, 8).text(0) == "depth-099.png"
+    assert item(full, 8).text(4) == f"{full.shots[8].problem[0].upper()}{full.shots[8].problem[1:]}"
     images = full.findChildren(ImageView)
     qtbot.waitUntil(lambda: all(image.has_image for image in images))
     first, second = captions(full)
     assert first.text().startswith("Depth camera: ")
     assert "corners" in second.text()
-
-
-def test_captions_are_whole_and_not_over_small_images(qtbot: QtBot, full: ImagesPanel) -> None:
-    full.resize(735, 290)  # as in a window of 960x540
-    qtbot.waitUntil(lambda: all(one.text() for one in captions(full)))
-    QApplication.processEvents()
-    for caption, image in zip(captions(full), full.findChildren(ImageView), strict=True):
-        assert not image.caption
-        assert caption.height() >= caption.heightForWidth(caption.width())
-        assert not caption.geometry().intersects(image.geometry())
-
-
-def test_in_a_small_window_the_image_is_wide_and_notes_are_whole(
-    qtbot: QtBot, full: ImagesPanel
-) -> None:
-    full.resize(735, 290)  # as in a window of 960x540
-    QApplication.processEvents()
-    view, shots = child(full, ShotView), child(full, ShotList)
-    assert view.width() > 230 > 0.7 * shots.width()
-    plain, noted = (shots.visualItemRect(item(full, row)).height() for row in (7, 8))
-    note = item(full, 8).text(0).partition("\n")[2]
-    assert note
-    assert noted >= plain + height_px(shots, note, shots.viewport().width() - 8)
-    # It is drawn over all columns, and of its height nothing is left to the cells.
-    shots.setCurrentItem(item(full, 0))
-    row = shots.visualItemRect(item(full, 8))
-    low = row.adjusted(0, plain, 0, 0)
-    image = shots.viewport().grab(low).toImage()
-    inked = {
-        x
-        for x in range(image.width())
-        for y in range(image.height())
-        if image.pixelColor(x, y).lightness() < 128
-    }
-    assert max(inked) > shots.columnWidth(0), "it was cut at its column"
-
-
-def test_a_box_without_tick_is_seen_in_the_dark(qtbot: QtBot, full: ImagesPanel) -> None:
-    use_theme("dark")
-    try:
-        shots = child(full, ShotList)
-        item(full, 3).setCheckState(0, Qt.CheckState.Unchecked)
-        QApplication.processEvents()
-        row = shots.visualItemRect(item(full, 3))
-        image = shots.viewport().grab(QRect(0, row.y(), 20, row.height())).toImage()
-        lights = {image.pixelColor(x, row.height() // 2).lightness() for x in range(20)}
-        assert max(lights) - min(lights) > 60
-    finally:
-        use_theme("light")
-
-
-def test_the_sign_of_a_problem_is_as_large_as_elsewhere(qtbot: QtBot, full: ImagesPanel) -> None:
-    shots = child(full, ShotList)
-    option = QStyleOptionViewItem()
-    delegate = shots.itemDelegate()
-    assert isinstance(delegate, QStyledItemDelegate)
-    delegate.initStyleOption(option, shots.model().index(8, 1))
-    assert option.decorationSize == QSize(16, 16)
 
 
 def test_a_dropped_pair_no_longer_counts(qtbot: QtBot, full: ImagesPanel) -> None:
@@ -184,9 +131,33 @@ def test_results_stand_beside_the_images(full: ImagesPanel) -> None:
     residuals = {"depth-001.png": 0.25, "depth-002.png": 0.7}
     full.show_solved(SolvedPart(verdict, (), residuals, {"depth-001.png": 0.5}, worst))
     assert [item(full, 0).text(column) for column in (2, 3)] == ["0.25", "29°"]
-    assert item(full, 1).text(0) == "depth-002.png\nWorst: it is blurred"
+    assert item(full, 1).text(4) == "Worst: it is blurred"
     assert item(full, 2).text(2) == "–"
-    assert item(full, 8).text(0) != "depth-099.png"
+    assert item(full, 8).text(4), "why there is no board"
+
+
+@pytest.mark.parametrize("entered", [Board(squares=(10, 7)), replace(BOARD, legacy=True)])
+def test_another_board_in_the_images_is_named_once_and_taken_by_a_button(
+    qtbot: QtBot, panel: ImagesPanel, project: RigProject, photographs: Any, entered: Board
+) -> None:
+    project.enter(board=replace(entered, square_m=BOARD.square_m, marker_m=BOARD.marker_m))
+
+    def look_again() -> None:
+        stereo = photographs.work.stereo
+        folders = stereo.depth_images, stereo.headset_images
+        panel.look(folders, project.inputs.board, ())
+
+    look_again()
+    panel.again.clicked.connect(look_again)
+    offer = child(panel.search, QPushButton, "imagesFix")
+    qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
+    assert panel.used == 0
+    assert ("10 × 7" in text(panel.search, "imagesFound")) == (entered.squares == (10, 7))
+    offer.click()
+    qtbot.waitUntil(lambda: not panel.bar.is_busy, timeout=20_000)
+    assert project.inputs.board == BOARD
+    assert panel.used == 8
+    assert project.inputs.board_found
 
 
 def test_search_again_needs_all_folders(
@@ -241,26 +212,6 @@ def test_what_was_left_out_of_other_images_is_forgotten(
         full.look(folders, photographs.work.board, before)
     qtbot.waitUntil(lambda: not full.bar.is_busy, timeout=20_000)
     assert full.dropped_of(before) == ()
-
-
-def test_the_set_up_shows_a_drawing(qtbot: QtBot, panel: ImagesPanel) -> None:
-    drawing = panel.drawing
-    qtbot.addWidget(drawing)
-    drawing.resize(700, 300)
-    drawing.show()
-    image = drawing.grab().toImage()
-    shades = {image.pixel(x, y) for x in range(0, image.width(), 3) for y in range(0, 200, 3)}
-    assert len(shades) > 3
-
-
-def test_a_low_panel_has_lower_maps(qtbot: QtBot, panel: ImagesPanel) -> None:
-    maps = panel.findChildren(CoverageMap)
-    high = [one.height() for one in maps]
-    panel.resize(1000, 240)
-    QApplication.processEvents()
-    assert panel.height() == 240
-    assert all(one.height() < whole for one, whole in zip(maps, high, strict=True))
-    assert max(one.geometry().bottom() for one in maps) < panel.height()
 
 
 @pytest.mark.parametrize("page", sorted(PAGES))

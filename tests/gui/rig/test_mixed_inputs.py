@@ -23,6 +23,7 @@ from tests.gui.rig.wizard_steps import (
     STEREO,
     VIEWPOINT,
     child,
+    findings,
     marks,
     solve,
     wait,
@@ -56,11 +57,9 @@ def test_another_board_makes_every_solved_step_outdated(
         "Doubtful" in child(wizard, QLabel, "savedRigFound").text()
         or "doubtful" in child(wizard, QLabel, "savedRigFound").text()
     )
-    findings = child(wizard, QTreeWidget, "rigFindings")
-    rows = [findings.topLevelItem(row) for row in range(findings.topLevelItemCount())]
-    listed = {row.text(0): row.text(1) for row in rows}
-    assert "other inputs" in listed["Left display"]
-    assert "other inputs" in listed["Viewpoint camera"]
+    listed = findings(wizard)
+    assert "other inputs" in listed["Left display"][0]
+    assert "other inputs" in listed["Viewpoint camera"][0]
     assert "Depth and headset camera" not in listed
     # It is remembered, and with the board of before the other two are good again.
     wizard.accept()

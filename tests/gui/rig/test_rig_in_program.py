@@ -14,9 +14,9 @@ from pytestqt.qtbot import QtBot
 
 from handcal.rig.example import example_rig
 from handcal.rig.rig_file import write_rig
+from handcal_gui.app.manual import Manual
 from handcal_gui.app.preferences import PreferencesFile
 from handcal_gui.app.program import Program
-from handcal_gui.manual.window import Manual
 from handcal_gui.rig.wizard import RigWizard
 from tests.gui.rig.wizard_steps import LEFT
 

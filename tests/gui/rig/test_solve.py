@@ -110,8 +110,22 @@ def test_the_display_is_where_it_was(photographs: Any, display_shots: Any, tmp_p
     found, truth = display.add_to(RIG).eyes["left"], RIG.eyes["left"]
     assert np.linalg.norm(found.t_C0_V_m - truth.t_C0_V_m) < 0.001
     np.testing.assert_allclose(found.K[0, 0], truth.K[0, 0], rtol=0.003)
-    assert set(display.residuals_px) == {"grid-left-001.png", "grid-left-002.png"}
-    assert len(place.tilts_rad) == 4
+    assert set(display.residuals_px) == {f"grid-left-{n:03}.png" for n in (1, 2, 3)}
+    assert len(place.tilts_rad) == 8
+
+
+def test_fewer_images_than_the_page_asks_for_are_not_good(
+    photographs: Any, display_shots: Any, tmp_path: Path
+) -> None:
+    grids, boards = display_shots
+    display, place = solve_left(photographs, (grids[:2], boards), tmp_path)
+    assert display.verdict.name == "needs more views"
+    assert "2 images of the grid, take 3 or more" in display.verdict.reason
+    assert place.verdict.name == "good"
+    display, place = solve_left(photographs, (grids, boards[:7]), tmp_path)
+    assert display.verdict == place.verdict
+    assert place.verdict.name == "needs more views"
+    assert "7 images of the board, take 8 or more" in place.verdict.reason
 
 
 def test_the_distance_can_be_solved(photographs: Any, display_shots: Any, tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
-    QAbstractButton,
     QApplication,
     QCheckBox,
     QComboBox,
@@ -34,7 +33,6 @@ from handcal_gui.rig.take_dialog import TakeDialog
 from handcal_gui.rig.wizard import RigWizard
 from handcal_gui.widgets.fields import MainButton
 from handcal_gui.widgets.image_view import ImageView
-from handcal_gui.widgets.live_cameras import LiveCameras
 from handcal_gui.widgets.path_field import PathField
 from tests.gui.helpers import child
 from tests.gui.rig.wizard_steps import STEREO, wait
@@ -157,7 +155,7 @@ def test_earlier_images_count(qtbot: QtBot, wizard: RigWizard, photographs: Any)
     }
     page.form.enter(**folders)
     wait(qtbot, wizard)
-    page.panels[0].take_requested.emit()
+    page.panels[0].take.click()
     taking = child(wizard, TakeDialog)
     assert child(taking, QLabel, "takenCount").text() == "8 of 20 usable pairs of images"
     assert "–" not in taking.findChildren(CoverageMap)[1].caption
@@ -174,30 +172,6 @@ def test_what_has_been_taken_is_not_taken_again(
     button(dialog, "takeImage").click()
     qtbot.waitUntil(lambda: said(dialog) == "This has been taken already. Take another.")
     assert len(list(tmp_path.rglob("*.png"))) == 2
-
-
-def test_what_to_do_stands_above_and_moves_no_button(qtbot: QtBot, dialog: TakeDialog) -> None:
-    def places() -> list[object]:
-        buttons = (one for one in dialog.findChildren(QAbstractButton) if one.isVisible())
-        return [one.mapTo(dialog, QPoint()).toTuple() for one in buttons]
-
-    def told() -> str:
-        (task,) = (one for one in tasks if one.isVisible())
-        assert task.mapTo(dialog, QPoint()).y() < child(dialog, LiveCameras).y(), "at the top"
-        return task.text()
-
-    tasks = [child(dialog, QLabel, name) for name in ("takeShow", "takeTake", "takeWait")]
-    before = places()
-    assert told() == "Choose the cameras and press Show."
-    start(qtbot, dialog)
-    assert told() == "Press Take while nothing moves. Close when there are enough."
-    button(dialog, "takeImage").click()
-    qtbot.waitUntil(lambda: "corners" in said(dialog))
-    assert places() == before
-    child(dialog, QCheckBox, "byItself").click()
-    assert told() == "Images are taken automatically. Close when there are enough."
-    qtbot.waitUntil(lambda: said(dialog) == "2 taken: enough images.")
-    assert places() == before
 
 
 def test_the_large_button_does_what_the_sentence_asks_for(

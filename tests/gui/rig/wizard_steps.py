@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from PySide6.QtWidgets import QLabel, QListWidget, QPushButton, QTabWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QListWidget, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.rig.wizard import RigWizard
@@ -37,6 +38,15 @@ def show_tab(wizard: RigWizard, title: str) -> None:
     tabs = child(wizard, QTabWidget, "")
     (place,) = (i for i in range(tabs.count()) if tabs.tabText(i).replace("&", "") == title)
     tabs.setCurrentIndex(place)
+
+
+def findings(page: QWidget) -> dict[str, tuple[str, str]]:
+    """Return what was found of each item of a rig, and its sign in words."""
+    table = page.findChild(QTableWidget, "rigFindings")
+    assert isinstance(table, QTableWidget)
+    role = Qt.ItemDataRole.AccessibleDescriptionRole
+    rows = [(table.item(row, 0), table.item(row, 1)) for row in range(table.rowCount())]
+    return {item.text(): (found.text(), item.data(role)) for item, found in rows}
 
 
 def marks(wizard: RigWizard) -> list[str]:

@@ -9,7 +9,7 @@ from handcal.core.types import Eye
 from handcal.session.judged_trials import EyeTrials
 from handcal.session.library import EyeOutcome
 from handcal_gui.app.theme import colors
-from handcal_gui.widgets.error_bars import PICTURE_PX, error_bars, error_text, picture_text
+from handcal_gui.widgets.error_bars import PICTURE_PX, error_bars, error_text
 
 pytestmark = pytest.mark.usefixtures("qtbot")
 
@@ -54,17 +54,3 @@ def test_a_session_without_results_has_no_picture() -> None:
         for y in range(image.height())
     )
     assert error_text({}) == ""
-
-
-def test_the_text_says_the_same() -> None:
-    eyes: dict[Eye, EyeOutcome] = {
-        "left": EyeOutcome("accept", 20.0, 10.0, 5.0),
-        "right": EyeOutcome("repeat", None, 12.0, None),
-    }
-    assert error_text(eyes).split("\n") == [
-        "Left eye: 20.0′ before, 5.0′ after",
-        "Right eye: – before, 12.0′ after",
-    ]
-    assert picture_text(eyes).startswith(f"{error_text(eyes)}\nBars of the small picture: the left")
-    assert "The whole\nwidth is 30′." in picture_text(eyes)
-    assert picture_text({}) == ""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from PySide6.QtCore import QEvent, QLocale, QPoint, QPointF
-from PySide6.QtGui import QHelpEvent, Qt, QTextDocument, QWheelEvent
+from PySide6.QtCore import QLocale, QPoint, QPointF
+from PySide6.QtGui import Qt, QTextDocument, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QToolTip
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QSpinBox
 from pytestqt.qtbot import QtBot
 
 from handcal_gui.widgets.fields import (
@@ -18,7 +18,6 @@ from handcal_gui.widgets.fields import (
     plain_message,
     whole_number,
 )
-from tests.gui.helpers import child
 
 Field = QComboBox | QDoubleSpinBox | QSpinBox
 
@@ -61,15 +60,6 @@ def test_the_wheel_changes_only_the_field_with_the_focus(qtbot: QtBot, kind: str
     qtbot.waitUntil(field.hasFocus)
     turn_wheel(field)
     assert shown(field) != before
-
-
-def test_a_number_has_its_unit_on_the_right(qtbot: QtBot) -> None:
-    fine, coarse = number("x", 0.0, 2.0, 0.05, " m", ""), number("y", 0.0, 90.0, 0.5, " °", "")
-    for field in (fine, coarse):
-        qtbot.addWidget(field)
-        field.setValue(1.234)
-        assert field.alignment() & Qt.AlignmentFlag.AlignRight
-    assert (fine.text(), coarse.text()) == ("1.23 m", "1.2 °")
 
 
 @pytest.fixture(params=["C", "de_DE", "de_CH", "ar_EG"])
@@ -115,7 +105,7 @@ def test_a_minus_is_shown_and_a_hyphen_read_too(qtbot: QtBot, typed: str) -> Non
 @pytest.mark.parametrize(
     ("typed", "taken"), [("99", "30.00 mm"), ("-31", "−30.00 mm"), ("99.5", "30.00 mm")]
 )
-def test_a_number_out_of_range_is_typed_in_full_and_the_range_is_said(
+def test_a_number_out_of_range_is_typed_in_full_and_the_nearest_is_taken(
     qtbot: QtBot, typed: str, taken: str
 ) -> None:
     field = number("x", -30.0, 30.0, 0.01, " mm", "")
@@ -126,9 +116,6 @@ def test_a_number_out_of_range_is_typed_in_full_and_the_range_is_said(
     assert field.cleanText() == typed
     QTest.keyClick(field, Qt.Key.Key_Return)
     assert field.text() == taken
-    assert child(field, QLabel, "brief").text() == (
-        f"Changed to {taken}. Allowed: −30.00 to 30.00 mm"
-    )
 
 
 @pytest.mark.parametrize(("typed", "taken"), [("0", "2"), ("12345", "10000")])
@@ -143,7 +130,6 @@ def test_a_whole_number_out_of_range_is_not_replaced_by_the_former_one(
     QTest.keyClicks(field.lineEdit(), typed)
     QTest.keyClick(field, Qt.Key.Key_Return)
     assert field.text() == taken
-    assert child(field, QLabel, "brief").text() == f"Changed to {taken}. Allowed: 2 to 10000"
 
 
 @pytest.mark.parametrize("typed", ["1.234", "1e3", "nan", "x"])
@@ -153,19 +139,6 @@ def test_what_is_no_number_is_not_typed(qtbot: QtBot, typed: str) -> None:
     field.selectAll()
     QTest.keyClicks(field.lineEdit(), typed)
     assert field.cleanText() != typed
-
-
-def test_the_tooltip_names_the_range_with_the_unit(qtbot: QtBot) -> None:
-    length, port = number("x", -1.0, 2.5, 0.5, " m", "Length."), whole_number("y", 1, 65535, "")
-    texts = []
-    for field in (length, port):
-        qtbot.addWidget(field)
-        field.show()
-        middle = field.lineEdit().rect().center()
-        event = QHelpEvent(QEvent.Type.ToolTip, middle, field.lineEdit().mapToGlobal(middle))
-        QApplication.sendEvent(field.lineEdit(), event)
-        texts.append(QToolTip.text())
-    assert texts == ["Length.\nAllowed: −1.0 to 2.5 m", "Allowed: 1 to 65535"]
 
 
 @pytest.mark.parametrize("text", ["cannot write /a/<b>x</b>\n\nMake room.", "a&lt;b", "no markup"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
@@ -66,14 +65,3 @@ def test_a_click_mends(qtbot: QtBot) -> None:
     assert mended == ["b"]
     line.show_finding(Finding("X", Health.GOOD, "c"))
     assert button.isHidden()
-
-
-def test_the_icon_stands_beside_the_first_line_however_high_the_line_is(qtbot: QtBot) -> None:
-    line = FindingLine("x")
-    qtbot.addWidget(line)
-    line.show_finding(Finding("X", Health.GOOD, "session found"))
-    line.resize(400, 200)
-    line.show()
-    text = line.findChild(QLabel, "xFound")
-    assert isinstance(text, QLabel)
-    assert text.alignment() == Qt.AlignmentFlag.AlignTop

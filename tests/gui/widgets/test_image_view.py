@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 from pytestqt.qtbot import QtBot
@@ -101,33 +100,9 @@ def test_a_message_dims_the_image(qtbot: QtBot) -> None:
     assert picture.pixelColor(160, 172) != RED
 
 
-@pytest.mark.parametrize("size", [(1, 1), (10_000, 3)])
-def test_any_size_can_be_painted(qtbot: QtBot, size: tuple[int, int]) -> None:
-    view = ImageView("Test picture")
-    qtbot.addWidget(view)
-    view.setMinimumSize(1, 1)
-    view.show_image(red(320, 180))
-    assert not shown(view, *size).isNull()
-
-
 def test_shrinking_keeps_the_mean_of_fine_texture() -> None:
     stripes = np.zeros((720, 1280, 3), np.uint8)
     stripes[:, ::2] = 200
     small = shrink(stripes, (380, 214))
     assert small.shape == (214, 380, 3)
     assert np.abs(small.astype(int) - 100).max() <= 1
-
-
-@pytest.mark.parametrize("caption", ["", "Hand cut by the image border; move it to the middle"])
-def test_a_caption_beside_leaves_the_image_free_and_in_its_place(
-    qtbot: QtBot, caption: str
-) -> None:
-    view = ImageView("Camera", has_caption_beside=True)
-    qtbot.addWidget(view)
-    view.resize(354, 130)
-    view.show_image(np.full((720, 1280, 3), (10, 200, 30), np.uint8))
-    view.show_text(caption=caption)
-    pixels = view.grab().toImage()
-    assert all(pixels.pixelColor(x, 125).green() > 190 for x in range(1, 230)), "the hand's end"
-    beside = [pixels.pixelColor(x, y) for x in range(235, 354) for y in range(60, 130)]
-    assert (len({one.name() for one in beside}) > 1) == bool(caption)

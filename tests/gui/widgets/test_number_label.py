@@ -35,20 +35,6 @@ def label(around: QWidget, qtbot: QtBot) -> NumberLabel:
     return label
 
 
-def test_only_a_text_wider_than_any_before_moves_what_is_beside_it(
-    label: NumberLabel, around: QWidget, qtbot: QtBot
-) -> None:
-    requests = _Requests()
-    around.installEventFilter(requests)
-    for text in ("1.0 ms", "20.5 ms", "–", "99.9 ms"):
-        label.setText(text)
-        qtbot.wait(10)
-    assert requests.count == 0
-    label.setText("12,345.6 ms")
-    qtbot.waitUntil(lambda: requests.count > 0)
-    assert label.width() >= label.fontMetrics().horizontalAdvance("12,345.6 ms")
-
-
 def test_it_shows_and_tells_its_text(label: NumberLabel) -> None:
     unknown = label.grab().toImage()
     assert label.text() == UNKNOWN

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage, QTextDocument
+from PySide6.QtGui import QTextDocument
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
@@ -99,25 +99,3 @@ def test_blanks_around_a_typed_path_do_not_count(qtbot: QtBot) -> None:
     with qtbot.waitSignal(field.changed):
         line.setText("  /a b ")
     assert field.path == "/a b"
-
-
-def test_a_path_that_does_not_fit_shows_beginning_and_end(qtbot: QtBot) -> None:
-    def picture(path: str) -> QImage:
-        field.set_path(path)
-        return field.grab().toImage()
-
-    field = PathField("Rig file", "file", empty="Example")
-    field.setToolTip("Of this headset")
-    show(qtbot, field, 320, 40).setFocus()
-    line = child(field, QLineEdit)
-    line.clearFocus()
-    middle = 100 * "m"
-    path = f"/begin/{middle}/end"
-    shown = picture(path)
-    assert shown == picture(f"/begin/{middle}m/end"), "the middle is left out"
-    assert shown != picture(f"/other/{middle}/end")
-    assert shown != picture(f"/begin/{middle}/other")
-    field.set_path(path)
-    assert line.toolTip() == f"{path}\nOf this headset"
-    field.set_path("")
-    assert line.toolTip() == "Of this headset"

@@ -77,7 +77,7 @@ def _mostly_covered() -> UInt8:
     ("image", "board", "said"),
     [
         (_mirrored(), CHARUCO, "mirrored"),
-        (draw_board(LEGACY, SQUARE_PX), dataclasses.replace(LEGACY, legacy=False), "older OpenCV"),
+        (draw_board(LEGACY, SQUARE_PX), dataclasses.replace(LEGACY, legacy=False), "before 4.6"),
         (
             draw_board(Board(dictionary="DICT_6X6_250"), SQUARE_PX),
             CHARUCO,

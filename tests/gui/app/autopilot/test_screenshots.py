@@ -6,14 +6,12 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from handcal.core.errors import FileError
 from handcal_gui.app.autopilot.screenshots import Screenshots
 from handcal_gui.calibrate.guide.view import Action, ButtonSpec, Step, WizardView
-from handcal_gui.widgets.layouts import hbox
-from tests.gui.helpers import show
 
 
 @pytest.fixture
@@ -44,13 +42,3 @@ def test_a_picture_that_cannot_be_written_is_said(label: QLabel, tmp_path: Path)
     (tmp_path / "pictures" / "start.png").mkdir()
     with pytest.raises(FileError, match=r"start\.png"):
         screenshots.save("start")
-
-
-def test_a_picture_has_the_layout_of_what_it_shows(qtbot: QtBot, tmp_path: Path) -> None:
-    window, eyes = QWidget(), [QLabel("left"), QLabel("right")]
-    hbox(*((eye, 1) for eye in eyes), on=window, margins=0, spacing=0)
-    show(qtbot, window, 200, 40)
-    assert eyes[0].width() == 100
-    eyes[1].hide()
-    Screenshots(window, tmp_path).save("one")
-    assert eyes[0].width() == 200

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
@@ -34,7 +35,6 @@ from handcal_gui.app.program import Program
 from handcal_gui.calibrate.control import review
 from handcal_gui.calibrate.control.review import _Stored
 from handcal_gui.calibrate.parts.legend import LegendEntry
-from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from handcal_gui.calibrate.review_page import ReviewPage
 from handcal_gui.calibrate.start.example import copy_example
 from handcal_gui.connect.openxr_dialog import OpenxrDialog

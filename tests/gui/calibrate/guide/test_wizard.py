@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from handcal_gui.calibrate.guide.progress_ring import ProgressRing
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QComboBox, QLabel, QLineEdit, QPushButton
@@ -15,7 +16,6 @@ from handcal.core.types import EYES
 from handcal.session.session import SessionRecord
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import use_theme
-from handcal_gui.calibrate.guide.progress_ring import ProgressRing
 from handcal_gui.calibrate.guide.steps import Wizard
 from handcal_gui.calibrate.guide.view import Action, Step
 from handcal_gui.calibrate.guide.wizard import WizardPanel

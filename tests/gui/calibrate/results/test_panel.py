@@ -6,6 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pyqtgraph as pg
 import pytest
+from handcal_gui.calibrate.results.compare_tab import CompareTab
+from handcal_gui.calibrate.results.convergence_plot import ConvergencePlot
+from handcal_gui.calibrate.results.residual_map import ResidualMap
+from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
@@ -20,11 +24,7 @@ from handcal.register.results import Results, SolveSettings, solve_session
 from handcal.session.trial import make_trial
 from handcal.station.snapshot import Snapshot
 from handcal_gui.app.theme import colors
-from handcal_gui.calibrate.results.compare_tab import CompareTab
-from handcal_gui.calibrate.results.convergence_plot import ConvergencePlot
 from handcal_gui.calibrate.results.panel import ResultsPanel
-from handcal_gui.calibrate.results.residual_map import ResidualMap
-from handcal_gui.calibrate.results.verdict_card import VerdictCard
 from handcal_gui.widgets.plots import Plot
 from handcal_gui.widgets.result_rows import REGISTRATION
 from handcal_gui.widgets.table import Table

@@ -1,1 +1,0 @@
-"""The manual in a window of its own."""
