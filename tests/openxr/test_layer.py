@@ -59,7 +59,7 @@ def wanted_px(outcome: SessionOutcome, view: Float64) -> Float64:
     """Return where handcal's P draws the same points."""
     eye = EYES[int(view[2])]
     T_V_H = outcome.record.rig.eyes[eye].T_V_H
-    P = outcome.projection(eye, outcome.final(eye)).P
+    P = outcome.projection(eye).P
     image = np.column_stack([transform(T_V_H, POINTS_H_M), np.ones(len(POINTS_H_M))]) @ P.T
     pixels: Float64 = image[:, :2] / image[:, 2:]
     return pixels

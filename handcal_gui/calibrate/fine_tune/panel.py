@@ -116,7 +116,7 @@ class FineTunePanel(QWidget):
         self._obstacle = _NO_SESSION
         self._sign_name = "wait"
         self._history = QUndoStack(self)
-        self._history.indexChanged.connect(lambda _: self._refresh())
+        self._history.indexChanged.connect(self._refresh)
         self._burst = 0  # changes of one burst are undone together
         self._burst_of: tuple[tuple[Eye, ...], int] | None = None
         self._stream = ShiftStream(self)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import ceil
 
+from handcal.calibration.hands import MATCH_NS
 from handcal.core.types import Eye
 from handcal.register.verdict_words import VERDICT_WORDS
 from handcal.session.record import eye_trials
@@ -53,7 +54,7 @@ def hand_found(snapshot: Snapshot) -> Precondition:
 
 def can_match(snapshot: Snapshot) -> Precondition:
     """Return whether a confirmation would find its image: a hand is found, in enough of them."""
-    needed_hz = ceil(0.5 / snapshot.settings.match_tolerance_s)
+    needed_hz = ceil(0.5e9 / MATCH_NS)
     rate_hz = snapshot.camera.rate_hz
     if snapshot.camera.problem or rate_hz >= needed_hz:
         return hand_found(snapshot)

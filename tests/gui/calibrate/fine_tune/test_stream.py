@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from handcal_gui.calibrate.fine_tune.history import same_shifts
 from pytestqt.qtbot import QtBot
 
 from handcal.calibration.states import State
@@ -17,6 +16,7 @@ from handcal_gui.calibrate.fine_tune.stream import (
     Arrival,
     Shifts,
     ShiftStream,
+    is_same_shifts,
 )
 
 MakeSnapshot = Callable[..., Snapshot]
@@ -58,7 +58,7 @@ def test_many_changes_are_sent_as_few(qtbot: QtBot, stream: ShiftStream) -> None
     periods = (time.monotonic() - started_s) / (1e-3 * PERIOD_MS)
     # One at the start, one for each period, and the last one by `flush`.
     assert 1 < len(sent) <= periods + 2
-    assert same_shifts(sent[-1], shifts_of(1e-5 * 199))
+    assert is_same_shifts(sent[-1], shifts_of(1e-5 * 199))
 
 
 def test_settles_once_after_the_last_change(qtbot: QtBot, stream: ShiftStream) -> None:
