@@ -18,7 +18,7 @@ from handcal.calibration.procedure import Calibration
 from handcal.calibration.sight import Observation
 from handcal.calibration.states import ProcedureError, State
 from handcal.core.errors import FileError, HandError
-from handcal.core.types import EYES, Eye, EyePlan, Frame, PlanName, Verdict, VerdictName
+from handcal.core.types import EYES, Eye, EyePlan, Float64, Frame, PlanName, Verdict, VerdictName
 from handcal.register.placement import PlacementSettings, Planned, next_alignment, next_verification
 from handcal.register.verdict import Advice, planned_eyes
 
@@ -104,6 +104,11 @@ class NextStep:
     is_requested: bool = False
     """True if a person has asked for it."""
 
+    @property
+    def displacement_W_m(self) -> Float64 | None:
+        """(3,); from the raised hand to the cursor, if the plan chooses its place."""
+        return None if self.planned is None else self.planned.displacement_W_m
+
 
 class Plan:
     """Leads one calibration by a plan, frame by frame.
@@ -150,8 +155,7 @@ class Plan:
     ) -> None:
         """Take a frame through the calibration, from the picture to the projections.
 
-        Every calibration goes this way from top to bottom, each frame as far as it is due. What the
-        session cannot write is kept in memory; `Session.write_waiting` says so.
+        Every calibration goes this way from top to bottom, each frame as far as it is due.
 
         Parameters
         ----------
@@ -166,6 +170,8 @@ class Plan:
         ------
         LinkError
             If the link is closed, or projections were not acknowledged in time.
+        FileError
+            If the session cannot be written, which keeps the data; the step is done anyway.
         """
         calibration = self._calibration
         if frame is not None:
@@ -175,17 +181,20 @@ class Plan:
             # Observation → alignment or verification → journal. The wearer's press was some time
             # ago, so the hand of that time is judged, not the newest.
             self.observation = calibration.judge(observation)
+        if calibration.state is State.APPLYING:
+            # Link → journal. The headset acknowledges projections some frames after they were sent.
+            calibration.poll_applied()
         if self.observation is None:
             return
         # Procedure. The plan only chooses; the calibration refuses what is out of turn.
         self.step = step = self.next_step(self.observation.is_steady)
         is_automatic = frame is not None and not is_held and self._is_due(step, self.observation)
+        is_due = is_pressed or is_automatic
         try:
-            match step.name if is_pressed or is_automatic else None:
+            match step.name if is_due else None:
                 case StepName.CURSOR:
                     # Hand → cursor: where the hand is, or where an alignment tells most.
-                    place_m = None if step.planned is None else step.planned.displacement_W_m
-                    calibration.make_cursor(step.eyes, place_m)
+                    calibration.make_cursor(step.eyes, step.displacement_W_m)
                 case StepName.SOLVE:
                     # Alignments → φ → verdict → journal. Each is solved alone, all are fused with
                     # the prior and the verifications by their covariances; the verdict asks for
@@ -201,15 +210,9 @@ class Plan:
                     calibration.verify(step.eyes[0])
                 case StepName.DONE if not self._is_over:
                     calibration.release_hand()
-            if is_pressed or is_automatic:
-                self._is_over = step.name is StepName.DONE
-            if calibration.state is State.APPLYING:
-                # Link → journal. Only what the headset has acknowledged is applied.
-                calibration.poll_applied()
+            self._is_over = is_due and step.name is StepName.DONE
         except (ProcedureError, HandError) as error:
             self.step = replace(step, name=StepName.WAIT, text=str(error), planned=None)
-        except FileError:
-            pass  # the session keeps it, and the station says so
 
     def next_step(self, is_steady: bool) -> NextStep:
         """Return the next step; nothing changes. `is_steady`: the hand is in view and still."""
