@@ -337,7 +337,7 @@ class Plan:
     def _made(self, eyes: tuple[Eye, ...]) -> int:
         """Return the number of alignments in which these eyes were open."""
         made = (alignment.eyes for alignment in self._calibration.alignments.values())
-        return sum(set(eyes) <= set(one) for one in made)
+        return sum(set(eyes) <= set(opened) for opened in made)
 
     def _worst_advice(self) -> Advice | None:
         """Return the advice for the eye that is to be repeated with the largest expected error."""
@@ -375,7 +375,7 @@ class Plan:
                     calibration.T_W_H(newest),
                     calibration.rig,
                     calibration.results,
-                    [one.eyes for one in calibration.alignments.values()],
+                    [alignment.eyes for alignment in calibration.alignments.values()],
                     calibration.applied_shift_m,
                     plan="recommended",
                     usable_eyes=self.settings.usable_eyes,
@@ -392,21 +392,21 @@ class Plan:
 
     def _fault(self, *names: VerdictName) -> str:
         """Return the reason of the first verdict with one of these names; empty if none has."""
-        return next((one.reason for one in self._verdicts() if one.name in names), "")
+        return next((verdict.reason for verdict in self._verdicts() if verdict.name in names), "")
 
     def _verdicts(self) -> list[Verdict]:
         """Return the verdicts on the usable eyes; an eye may have been aligned before a choice."""
         results = self._calibration.results
-        found = {} if results is None else results.verdicts
-        return [one for eye, one in found.items() if eye in self.settings.usable_eyes]
+        verdicts = {} if results is None else results.verdicts
+        return [verdict for eye, verdict in verdicts.items() if eye in self.settings.usable_eyes]
 
     def _end(self, unverified: tuple[Eye, ...]) -> str:
         """Return why the recommended plan ends now; else empty."""
         results = self._calibration.results
         if results is None:
             return ""
-        found = {eye: one.name for eye, one in results.verdicts.items()}
-        is_judged = all(found.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
+        names = {eye: verdict.name for eye, verdict in results.verdicts.items()}
+        is_judged = all(names.get(eye) in _JUDGED for eye in self.settings.usable_eyes)
         is_verified = not (unverified and self.settings.verify)
         # A stored calibration that its verification does not refuse is kept.
         is_kept = not self._calibration.alignments or self._next_verification() is None
@@ -429,7 +429,7 @@ class Plan:
 
     def _takes(self) -> str:
         """Return what it would take to be accepted."""
-        reasons = dict.fromkeys(one.reason for one in self._verdicts())
+        reasons = dict.fromkeys(verdict.reason for verdict in self._verdicts())
         return "; ".join(reasons) or "nothing more is planned"
 
     def _with_hand(self, name: StepName, eyes: tuple[Eye, ...], is_steady: bool) -> NextStep:
