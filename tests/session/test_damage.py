@@ -165,8 +165,7 @@ def test_a_repaired_session_is_sound_and_holds_what_could_be_read(
 
 @pytest.mark.parametrize("line", range(1, 15))
 def test_every_line_costs_only_itself(sound: SessionRecord, tmp_path: Path, line: int) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     lines = (path / "journal.jsonl").read_bytes().split(b"\n")
     lines[line - 1] = lines[line - 1].replace(b'"time": "2', b'"time": "3')
     (path / "journal.jsonl").write_bytes(b"\n".join(lines))
@@ -182,8 +181,7 @@ def test_every_line_costs_only_itself(sound: SessionRecord, tmp_path: Path, line
 def test_lines_that_are_missing_or_in_another_order_are_named(
     sound: SessionRecord, tmp_path: Path
 ) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     journal = path / "journal.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     for changed, what in (
@@ -197,8 +195,7 @@ def test_lines_that_are_missing_or_in_another_order_are_named(
 
 
 def test_notes_that_vanish_are_named(sound: SessionRecord, tmp_path: Path) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     (path / "notes.txt").unlink()
     assert [damage.file for damage in Session.open(path).damaged] == ["notes.txt"]
 
@@ -223,8 +220,7 @@ def test_a_crash_leaves_the_old_or_the_new_notes(tmp_path: Path) -> None:
 
 
 def test_a_rig_is_read_from_the_journal_or_given(sound: SessionRecord, tmp_path: Path) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     (path / "rig.yaml").write_text("nonsense")
     assert canonical(Session.open(path).rig) == canonical(sound.rig)
     journal = path / "journal.jsonl"
@@ -243,8 +239,7 @@ def test_a_rig_is_read_from_the_journal_or_given(sound: SessionRecord, tmp_path:
 def test_a_repaired_session_goes_on(
     sound: SessionRecord, tmp_path: Path, alignment: Alignment
 ) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(sound.path, path)
+    path = Path(shutil.copytree(sound.path, tmp_path / "session"))
     (path / "alignments/1.npz").unlink()
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
     repaired = repair_session(path, tmp_path / "repaired")

@@ -211,8 +211,7 @@ def test_a_sound_alignment_of_another_place_is_noticed(
 def test_a_newer_version_is_refused_as_a_whole(
     tmp_path: Path, finished: SessionRecord, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "session"
-    shutil.copytree(finished.path, path)
+    path = Path(shutil.copytree(finished.path, tmp_path / "session"))
     journal = path / "journal.jsonl"
     monkeypatch.setattr("handcal.session.journal.JOURNAL_VERSION", 4)
     line = journal_line(happens_now(13, "later", {}))
@@ -247,8 +246,7 @@ def test_a_strange_event_is_refused_or_harmless(
     event: SessionEvent,
     data: dict[str, object],
 ) -> None:
-    path = tmp_path_factory.mktemp("copy") / "session"
-    shutil.copytree(finished.path, path)
+    path = Path(shutil.copytree(finished.path, tmp_path_factory.mktemp("copy") / "session"))
     with (path / "journal.jsonl").open("ab") as journal:
         journal.write(journal_line(happens_now(13, event, data)))
     record = Session.open(path)

@@ -122,8 +122,10 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         with pytest.raises(ProcedureError, match="solve and apply"):
             station.trials.compare()
         calibration.make_cursor(EYES)
-        refused = step_until(station, "a refusal", lambda s: s.record.refused > 0, PATIENCE_S)
-        assert "turned" in refused.procedure.refusal
+        # On a busy machine the hand may be refused first as it moves between two frames.
+        refused = step_until(
+            station, "a refusal", lambda s: "turned" in s.procedure.refusal, PATIENCE_S
+        )
         assert refused.procedure.state is State.ALIGN
         assert refused.record.alignments == {}
         aligned = step_until(station, "an alignment", is_in(State.ALIGNED), PATIENCE_S)
