@@ -37,9 +37,9 @@ STAMP_ADVICE = (
     "stamp each pose with the time that it is for: of a predicted pose, that of display; if the "
     "stamps are right, the camera's latency is not the assumed one"
 )
-_CAMERA_OFFSETS_S: Float64 = 0.01 * np.arange(-30, 31)
+_CAMERA_OFFSETS_S = np.asarray(0.01 * np.arange(-30, 31), np.float64)
 _STAMP_STEP_S = 0.004
-_STAMP_OFFSETS_S: Float64 = _STAMP_STEP_S * np.arange(-30, 31)
+_STAMP_OFFSETS_S = np.asarray(_STAMP_STEP_S * np.arange(-30, 31), np.float64)
 _LEAST_SEEN = 30
 _LEAST_TURN_RAD = np.radians(10.0)
 _REACH_M = 0.5
