@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from handcal.core.errors import FileError
 from handcal.core.types import Alignment
 from handcal.rig.example import example_rig
+from handcal.session.alignment_file import decode_alignment
+from handcal.session.library import read_library
 from handcal.session.repair import check_session, repair_session
 from handcal.session.session import Session, SessionRecord
 from handcal.session.trial import make_trial
@@ -261,3 +263,24 @@ def test_a_journal_can_be_checked_as_its_page_says(monkeypatch: pytest.MonkeyPat
     exec(code, {})
     with pytest.raises(AssertionError):
         exec(code.replace("-47", "-46"), {})
+
+
+def test_a_sound_alignment_of_another_place_is_noticed(
+    tmp_path: Path, alignment: Alignment
+) -> None:
+    """Files swapped within a session, or copied from another, are whole but not the journal's."""
+    other = replace(alignment, t_b_ns=alignment.t_b_ns + 1)
+    with Session.create(tmp_path, example_rig(), {}, name="one") as session:
+        session.save_alignment(alignment)
+        session.save_alignment(other)
+    first, second = (session.path / "alignments" / f"{number}.npz" for number in (1, 2))
+    content = first.read_bytes(), second.read_bytes()
+    assert decode_alignment(content[1]).t_b_ns == other.t_b_ns
+    second.write_bytes(content[0])
+    record = Session.open(session.path)
+    assert [damage.file for damage in record.damaged] == ["alignments/2.npz"]
+    assert set(record.alignments) == {1}
+    first.write_bytes(content[1])
+    assert len(Session.open(session.path).damaged) == 2
+    (entry,) = read_library(tmp_path)
+    assert entry.damaged == 2
