@@ -1,4 +1,4 @@
-"""What the poses of a headset tell while the head turns: the camera's place, and their own time.
+"""The place of a headset's camera and the times of its poses, measured while the head turns.
 
 Poses of a headset's own camera and of its app are in the same world, so the camera's place on the
 rig is the same however the head moves. A hand at rest stays where it is in the world. Both hold

@@ -24,7 +24,7 @@ class Trials:
     """Shows targets and other drawings in the headset, and saves trials and comparisons.
 
     In a blinded comparison the headset draws with two φ in random order, and the wearer chooses.
-    The order is told only to the journal.
+    Only the journal knows the order.
 
     Parameters
     ----------
