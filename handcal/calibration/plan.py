@@ -184,21 +184,21 @@ class Plan:
         if calibration.state is State.APPLYING:
             # Link → journal. The headset acknowledges projections some frames after they were sent.
             calibration.poll_applied()
-        if self.observation is None:
+        if self.observation is None or (frame is None and not is_pressed):
             return
-        # Procedure. The plan only chooses; the calibration refuses what is out of turn.
-        self.step = step = self.next_step(self.observation.is_steady)
-        is_automatic = frame is not None and not is_held and self._is_due(step, self.observation)
-        is_due = is_pressed or is_automatic
+        # Procedure. The plan only chooses; the calibration refuses what is out of turn. A cursor
+        # that was withdrawn has made it forget the hands, so the observation may be outdated.
+        is_steady = self.observation.is_steady and calibration.steady_hand is not None
+        self.step = step = self.next_step(is_steady)
+        is_due = is_pressed or (not is_held and self._is_due(step, self.observation))
         try:
             match step.name if is_due else None:
                 case StepName.CURSOR:
                     # Hand → cursor: where the hand is, or where an alignment tells most.
                     calibration.make_cursor(step.eyes, step.displacement_W_m)
                 case StepName.SOLVE:
-                    # Alignments → φ → verdict → journal. Each is solved alone, all are fused with
-                    # the prior and the verifications by their covariances; the verdict asks for
-                    # evidence from outside, because residuals cannot tell that φ is right.
+                    # Alignments → φ → verdict → journal. All are fused by their covariances, and
+                    # judged by evidence from outside: residuals cannot tell that φ is right.
                     if calibration.state is State.ALIGNED:
                         self._requested = ()
                     calibration.solve()
