@@ -51,6 +51,8 @@ def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StationSettings
     monkeypatch.setattr("handcal.calibration.procedure._APPLY_TIMEOUT_S", 0.5)
     # A busy computer gives few frames a second, and the wearer's answer lies between two.
     monkeypatch.setattr("handcal.calibration.hands.MATCH_NS", 2 * 10**9)
+    # Between two such frames a hand moves, which would be refused before it is found turned.
+    monkeypatch.setattr("handcal.calibration.aligning.MOVED_LIMIT_M", 0.05)
     # Its camera is late, which would be reported instead of what is tested.
     monkeypatch.setattr("handcal.calibration.delay._LIMIT_S", 5.0)
     return StationSettings(
@@ -122,7 +124,6 @@ def test_a_novice_is_refused_then_calibrated(settings: StationSettings) -> None:
         with pytest.raises(ProcedureError, match="solve and apply"):
             station.trials.compare()
         calibration.make_cursor(EYES)
-        # On a busy machine the hand may be refused first as it moves between two frames.
         refused = step_until(
             station, "a refusal", lambda s: "turned" in s.procedure.refusal, PATIENCE_S
         )
